@@ -1,0 +1,38 @@
+# Everything a fresh machine needs: make demo, make test. Each sets up what it needs first.
+PYTHON ?= python3.11
+NAME := $(notdir $(PYTHON))
+VENV ?= $(if $(filter python3.11,$(NAME)),.venv,.venv-$(NAME))
+BIN := $(VENV)/bin
+OUT ?= out/demo
+SCENE ?= caustics
+
+.PHONY: setup demo test test-fast check bench clean
+setup: $(VENV)/.installed
+
+$(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
+	sh scripts/debian-packages
+	sh scripts/make-venv $(PYTHON) $(VENV)
+	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --editable '.[blender,gl,report,test,dev]'
+	touch $@
+
+demo: setup
+	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
+
+test: setup
+	$(BIN)/pytest
+
+test-fast: setup
+	$(BIN)/pytest -m "not blender"
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: setup
+	$(BIN)/python benchmarks/relight.py
+
+clean:
+	rm -rf .venv .venv-* out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

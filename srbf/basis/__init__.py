@@ -1,0 +1,1 @@
+"""Function spaces on the sphere of light directions, one a file."""

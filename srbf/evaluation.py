@@ -1,0 +1,116 @@
+"""Error of an asset against the reference images of a capture, by role and by light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Int
+from srbf.asset import Asset
+from srbf.capture import COVERED, ROLES, Capture
+from srbf.errors import InputError
+from srbf.methods import directional_responses
+
+PEAK_QUANTILE = 0.999
+
+
+@dataclass(frozen=True)
+class RoleError:
+    """Error over all lights of one role: texels of coverage >= 0.5, ambient excluded, both images clamped at 0.
+
+    `rmse` pools images, texels and channels; `relative_rmse` = rmse / rms of the reference; `psnr` is the mean over images of
+    20 log10(peak / rmse_image), `psnr_pooled` that of the pooled rmse.
+    """
+
+    rmse: float
+    relative_rmse: float
+    psnr: float
+    psnr_pooled: float
+    peak: float
+
+
+class PeakHistogram:
+    """The 99.9 % quantile of non-negative values, exact on half floats, from a histogram over all half-float bit patterns."""
+
+    def __init__(self) -> None:
+        self._counts: Int[ndarray, " 32768"] = np.zeros(1 << 15, np.int64)
+
+    def add(self, values: Float32[ndarray, "*shape"]) -> None:
+        """Count `values`, clamped at 0; other than half floats are rounded to them (a relative 5e-4)."""
+        bits = np.clip(values, 0, 65504).astype(np.float16).ravel().view(np.uint16) & 0x7FFF
+        self._counts += np.bincount(bits, minlength=1 << 15)
+
+    def quantile(self, q: float) -> float:
+        """Linear interpolation between order statistics, as numpy.quantile has it."""
+        cumulative = np.cumsum(self._counts)
+        rank = q * (cumulative[-1] - 1)
+        low, high = (int(np.searchsorted(cumulative, r, side="right")) for r in (np.floor(rank), np.ceil(rank)))
+        a, b = np.array([low, high], np.uint16).view(np.float16).astype(np.float64)
+        return float(a + (b - a) * (rank - np.floor(rank)))
+
+
+def evaluate(asset: Asset, capture: Capture, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
+    """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
+
+    The peak is the 99.9 % quantile of the train references (1 for 8-bit sources). A role without lights is left out.
+    InputError where asset and capture differ in size.
+    """
+    if (asset.width, asset.height) != (capture.width, capture.height):
+        raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
+    covered = capture.coverage().ravel() >= COVERED
+    if not covered.any():
+        raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
+    samples = int(covered.sum()) * 3
+    peaks = PeakHistogram()
+    squares: dict[int, float] = {}  # sum of squared differences a light
+    powers: dict[int, float] = {}  # sum of squared references a light
+    for role in ROLES:
+        indices = capture.indices(role)
+        for first, block in capture.blocks(indices):
+            chosen = indices[first : first + len(block)]
+            relit = directional_responses(asset, capture.directions(chosen)).reshape(block.shape)
+            for index, answer, reference in zip(chosen, relit, block, strict=True):
+                reference = np.maximum(reference[covered], 0)
+                if role == "train":
+                    peaks.add(reference)
+                difference = np.maximum(answer[covered], 0) - reference
+                squares[index] = float(np.einsum("pc,pc->", difference, difference, dtype=np.float64))
+                powers[index] = float(np.einsum("pc,pc->", reference, reference, dtype=np.float64))
+                progress(len(squares), len(capture.lights))
+    has_train = bool(capture.indices("train"))
+    peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
+    result: dict[str, Any] = {}
+    for role in ROLES:
+        indices = capture.indices(role)
+        if indices:
+            error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples, peak)
+            result[role] = asdict(error)
+    result["lights"] = [
+        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples))} for i, light in enumerate(capture.lights)
+    ]
+    return result
+
+
+def _role_error(squares: np.ndarray, powers: np.ndarray, samples: int, peak: float) -> RoleError:
+    per_image = np.sqrt(squares / samples)
+    rmse = float(np.sqrt(squares.sum() / (samples * len(squares))))
+    reference = float(np.sqrt(powers.sum() / (samples * len(powers))))
+    return RoleError(
+        rmse=rmse,
+        relative_rmse=rmse / reference if reference > 0 else 0.0,
+        psnr=float(np.mean([psnr(peak, e) for e in per_image])),
+        psnr_pooled=psnr(peak, rmse),
+        peak=peak,
+    )
+
+
+MAX_PSNR = 200.0  # dB: stands for "no difference", where the formula has infinity and JSON has none
+
+
+def psnr(peak: float, rmse: float) -> float:
+    """20 log10(peak / rmse), at most MAX_PSNR."""
+    return float(min(MAX_PSNR, 20 * np.log10(max(peak, 1e-30) / max(rmse, 1e-30))))

@@ -1,0 +1,70 @@
+"""A capture or an asset in a few facts, after checking that its files are there and whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from srbf import asset as assets
+from srbf import capture as captures
+from srbf.asset import Asset
+from srbf.capture import ROLES, Capture
+from srbf.errors import ManifestError
+from srbf.image import size_of
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Facts of the folder at `path`; ManifestError where it is neither, ImageError where a file of it is damaged."""
+    if (path / captures.MANIFEST).is_file():
+        return describe_capture(Capture.open(path))
+    if (path / assets.MANIFEST).is_file():
+        return describe_asset(Asset.open(path), path)
+    raise ManifestError(f"expected a capture.json or an asset.json in {path}, found neither")
+
+
+def describe_capture(capture: Capture) -> dict[str, Any]:
+    """Size, lights by role, receiver and disk of a capture; every image's header is read."""
+    for light in capture.lights:
+        size_of(capture.folder / light.file)
+    return {
+        "format": "srbf-capture",
+        "version": 1,
+        "quantity": capture.quantity,
+        "transport": capture.transport,
+        "width": capture.width,
+        "height": capture.height,
+        "lights": {role: len(capture.indices(role)) for role in ROLES},
+        **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
+        "disk_bytes": folder_bytes(capture.folder),
+    }
+
+
+def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
+    """Method, basis, error and memory of an asset.
+
+    `bytes_per_texel` is, per light kind, what a shader reads of a texel's own maps (RGB counts as RGBA, position excluded);
+    `resident_bytes` is everything the asset keeps on a GPU, tables included.
+    """
+    texel = asset.map_bytes_per_texel()
+    return {
+        "format": "srbf-asset",
+        "version": 1,
+        "method": asset.method,
+        "quantity": asset.quantity,
+        "transport": asset.transport,
+        "width": asset.width,
+        "height": asset.height,
+        "k": asset.k,
+        "spread": asset.basis.spread,
+        "domain": asset.domain,
+        "encoding": asset.encoding,
+        "bytes_per_texel": {"directional": texel, "point": texel, "spot": texel, "environment": texel},
+        "resident_bytes": asset.resident_bytes(),
+        "disk_bytes": folder_bytes(folder),
+        "error": asset.manifest.get("error", {}),
+    }
+
+
+def folder_bytes(folder: Path) -> int:
+    """Bytes of all files under a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,130 @@
+"""Files that appear whole or not at all, and paths in manifests that cannot leave their folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from srbf.errors import ImageError, ManifestError, OutputExistsError, SrbfError
+
+
+class WriteError(SrbfError, OSError):
+    """A target that cannot be written: read-only, full, or not a folder."""
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` to write to; on success it is flushed to disk and renamed, on failure removed."""
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        yield temporary
+        with open(temporary, "rb+") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except (OSError, SrbfError) as error:
+        temporary.unlink(missing_ok=True)
+        if isinstance(error, SrbfError) and not isinstance(error, ImageError):
+            raise
+        raise WriteError(f"cannot write {path}: {_reason(error, path)}") from error
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _reason(error: Exception, path: Path) -> str:
+    if isinstance(error, SrbfError):
+        free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else 0
+        text = str(error)
+        return f"no space left on the disk ({free} bytes free); free some and run again" if free < 1 << 20 else text
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.strerror}; choose a folder that can be written"
+    return str(error)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write UTF-8 text atomically."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON atomically: sorted as given, two spaces, NaN refused, so that equal values give equal bytes."""
+    write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """A JSON object from a file; ManifestError where there is none."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ManifestError(f"expected {path}, found no such file") from error
+    except OSError as error:
+        raise ManifestError(f"cannot read {path}: {error.strerror}") from error
+    except ValueError as error:  # JSONDecodeError, UnicodeDecodeError
+        raise ManifestError(f"expected JSON in {path}, found a syntax error: {error}") from error
+    if not isinstance(value, dict):
+        raise ManifestError(f"expected a JSON object in {path}, found {type(value).__name__}")
+    return value
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and its parents; WriteError where the target cannot hold one."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteError(f"cannot make folder {path}: {error.strerror}; choose a folder that can be written") from error
+
+
+def inside(folder: Path, name: str, manifest: Path) -> Path:
+    """The file `name` of a manifest under its folder; ManifestError where it would leave the folder."""
+    pure = PurePosixPath(name)
+    resolved = (folder / pure).resolve()
+    if not name or "\\" in name or pure.is_absolute() or ".." in pure.parts or not resolved.is_relative_to(folder.resolve()):
+        raise ManifestError(f"expected a relative path inside {folder}, found {name!r} in {manifest.name}")
+    return folder / pure
+
+
+def sha256_of(path: Path) -> str:
+    """Hex SHA-256 of a file."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+@contextmanager
+def atomic_folder(path: Path, force: bool, marker: str) -> Iterator[Path]:
+    """A temporary folder beside `path` to fill, renamed to it on success.
+
+    An existing `path` is replaced only with `force`, and only where it is empty or holds the file `marker`, so that a slip of
+    -o never deletes a folder that is not ours.
+    """
+    check_replaceable(path, force, marker)
+    make_folder(path.parent)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    make_folder(temporary)
+    try:
+        yield temporary
+        if path.exists():
+            old = path.with_name(f".{path.name}.{os.getpid()}.old")
+            path.replace(old)
+            temporary.replace(path)
+            shutil.rmtree(old) if old.is_dir() else old.unlink()
+        else:
+            temporary.replace(path)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def check_replaceable(path: Path, force: bool, marker: str) -> None:
+    """OutputExistsError where `path` exists and may not be replaced."""
+    if not path.exists():
+        return
+    if not force:
+        raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
+    if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
+        raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")

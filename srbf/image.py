@@ -1,0 +1,133 @@
+"""Images on disk: the only module that imports OpenImageIO. Arrays are (H, W, C), row 0 at the top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32
+from srbf.errors import ImageError, MissingLibraryError
+from srbf.files import atomic_path
+
+Encoding = Literal["half", "float", "uint8"]
+HALF_MAX = 65504.0
+
+
+def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W C"]:
+    """All channels of an image as float32: EXR values as stored, integers over their maximum (8 bit: byte / 255).
+
+    With `channels` 3, grey is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned as they
+    are: `require_finite` names the file. ImageError on a missing, damaged or truncated file.
+    """
+    oiio = _oiio()
+    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    if source is None:
+        reason = _first_line(oiio.geterror()) if path.is_file() else "no such file"
+        raise ImageError(f"cannot read image {path}: {reason}")
+    try:
+        pixels = source.read_image(0, 0, 0, source.spec().nchannels, oiio.FLOAT)
+        if pixels is None:
+            raise ImageError(f"cannot read image {path}: {_first_line(source.geterror())}; is it damaged or cut short?")
+    finally:
+        source.close()
+    pixels = np.asarray(pixels, np.float32)
+    if pixels.ndim == 2:
+        pixels = pixels[:, :, None]
+    if channels is None or pixels.shape[2] == channels:
+        return pixels
+    if channels == 3 and pixels.shape[2] in (1, 2):
+        return np.repeat(pixels[:, :, :1], 3, axis=2)
+    if pixels.shape[2] > channels:
+        return np.ascontiguousarray(pixels[:, :, :channels])
+    raise ImageError(f"expected {channels} channels in {path}, found {pixels.shape[2]}")
+
+
+def bits_of(path: Path) -> int:
+    """Bits a channel of a stored image: 8, 16 or 32."""
+    oiio = _oiio()
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise ImageError(f"cannot read image {path}: {_first_line(oiio.geterror())}")
+    bits = int(source.spec().format.basesize()) * 8
+    source.close()
+    return bits
+
+
+def size_of(path: Path) -> tuple[int, int]:
+    """(height, width) from the header alone; ImageError where there is none to read."""
+    oiio = _oiio()
+    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    if source is None:
+        raise ImageError(f"cannot read image {path}: {_first_line(oiio.geterror()) if path.is_file() else 'no such file'}")
+    spec = source.spec()
+    source.close()
+    return spec.height, spec.width
+
+
+def require_finite(pixels: Float32[ndarray, "H W C"], path: Path) -> None:
+    """ImageError that names the file, the count and the first texel where `pixels` holds NaN or Inf."""
+    if not np.isfinite(pixels).all():
+        bad = ~np.isfinite(pixels).all(axis=2)
+        r, c = np.argwhere(bad)[0]
+        raise ImageError(f"expected finite values in {path}, found NaN or Inf in {int(bad.sum())} texels, first at row {r}, column {c}")
+
+
+def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
+    """Write (H, W) or (H, W, C) pixels, atomically. `half`, `float`: EXR, ZIP. `uint8`: PNG of bytes given as uint8.
+
+    ImageError where a value does not fit a half float (beyond 65504) or is not finite: nothing is written then.
+    """
+    oiio = _oiio()
+    pixels = pixels[:, :, None] if pixels.ndim == 2 else pixels
+    if encoding == "uint8":
+        if pixels.dtype != np.uint8:
+            raise ImageError(f"expected bytes for {path}, found {pixels.dtype}")
+        stored = pixels
+    else:
+        if not np.isfinite(pixels).all():
+            raise ImageError(f"refused to write {path}: it would hold NaN or Inf")
+        if encoding == "half" and pixels.size and float(np.abs(pixels).max()) > HALF_MAX:
+            raise ImageError(f"expected values within half float's ±{HALF_MAX:.0f} for {path}, found {float(np.abs(pixels).max()):.4g}")
+        stored = pixels.astype(np.float16 if encoding == "half" else np.float32)
+    height, width, channels = stored.shape
+    spec = oiio.ImageSpec(width, height, channels, {"half": oiio.HALF, "float": oiio.FLOAT, "uint8": oiio.UINT8}[encoding])
+    if encoding != "uint8":
+        spec.attribute("compression", "zip")
+    with atomic_path(path) as temporary:
+        target = oiio.ImageOutput.create(str(path))
+        if target is None or not target.open(str(temporary), spec):
+            raise ImageError(f"cannot write image {path}: {_first_line(target.geterror() if target else oiio.geterror())}")
+        written = target.write_image(np.ascontiguousarray(stored))
+        if not (target.close() and written):
+            raise ImageError(f"cannot write image {path}: {_first_line(target.geterror())}; is the disk full?")
+
+
+def write_picture(path: Path, linear: Float32[ndarray, "H W 3"], exposure: float = 0.0) -> None:
+    """A PNG to look at: the sRGB encoding of clip(value 2^exposure), 8 bits."""
+    srgb = encode_srgb(np.clip(linear * 2.0**exposure, 0, 1))
+    write_image(path, np.round(srgb * 255).astype(np.uint8), "uint8")
+
+
+def encode_srgb(linear: ndarray) -> ndarray:
+    """Linear [0, 1] to sRGB [0, 1] [IEC61966]."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def decode_srgb(srgb: ndarray) -> ndarray:
+    """sRGB [0, 1] to linear [0, 1] [IEC61966]."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+def _oiio() -> Any:
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise MissingLibraryError("reading and writing images needs OpenImageIO: pip install OpenImageIO") from error
+    return OpenImageIO
+
+
+def _first_line(message: str) -> str:
+    return message.strip().splitlines()[0] if message.strip() else "unknown error"

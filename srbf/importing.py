@@ -1,0 +1,110 @@
+"""Photographs, or anyone's renders, with a light list become a capture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+from typing import Any, Literal
+
+import numpy as np
+
+import srbf
+from srbf import files
+from srbf.capture import MANIFEST, Quantity, Role
+from srbf.errors import ImageError, InputError
+from srbf.image import HALF_MAX, bits_of, decode_srgb, read_image, require_finite, write_image
+from srbf.light_list import LightListEntry, read_light_list
+
+Transfer = Literal["srgb", "linear"]
+
+
+@dataclass(frozen=True)
+class LightListImport:
+    """A .lp list and its images (JPG, PNG, TIFF, EXR), paired by the name in the list; an optional list of unseen lights.
+
+    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are. `mask` becomes coverage.
+    """
+
+    lights: Path
+    transfer: Transfer
+    holdout: Path | None = None
+    mask: Path | None = None
+    quantity: Quantity = "radiance"
+
+    def write(self, folder: Path, force: bool = False, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
+        """Write the capture, whole or not at all; returns its manifest.
+
+        ManifestError or ImageError where the list or an image is damaged, missing, of another size, or not finite.
+        """
+        if self.transfer not in ("srgb", "linear"):
+            raise InputError(f"expected a transfer of srgb, linear, found {self.transfer!r}")
+        pairs: list[tuple[Path, LightListEntry, Role]] = [(p, e, "train") for p, e in paired(self.lights)]
+        if self.holdout is not None:
+            pairs += [(p, e, "holdout") for p, e in paired(self.holdout)]
+        with files.atomic_folder(folder, force, MANIFEST) as temporary:
+            (temporary / "lights").mkdir()
+            size: tuple[int, int] = (0, 0)
+            lights = []
+            for index, (path, entry, role) in enumerate(pairs):
+                pixels = self._read(path)
+                height, width = pixels.shape[:2]
+                size = (height, width) if index == 0 else size
+                if (height, width) != size:
+                    raise ImageError(f"expected {size[1]}x{size[0]} pixels in {path}, as in {pairs[0][0].name}, found {width}x{height}")
+                file = f"lights/{index:04d}.exr"
+                wide = bits_of(path) > 8 and float(np.abs(pixels - pixels.astype(np.float16)).max()) > 0
+                write_image(temporary / file, pixels, "float" if wide or np.abs(pixels).max() > HALF_MAX else "half")
+                lights.append({"kind": "directional", "direction": list(entry.direction), "role": role, "file": file})
+                progress(index + 1, len(pairs))
+            manifest: dict[str, Any] = {
+                "format": "srbf-capture",
+                "version": 1,
+                "quantity": self.quantity,
+                "transport": "combined",
+                "width": size[1],
+                "height": size[0],
+                "lights": lights,
+            }
+            if self.mask is not None:
+                mask = read_image(self.mask, 3)[:, :, :1]
+                require_finite(mask, self.mask)
+                if mask.shape[:2] != size:
+                    raise ImageError(f"expected a mask of {size[1]}x{size[0]} pixels, found {self.mask} of {mask.shape[1]}x{mask.shape[0]}")
+                write_image(temporary / "coverage.exr", np.clip(mask, 0, 1), "float")
+                manifest["coverage"] = "coverage.exr"
+            manifest["source"] = {
+                "srbf": srbf.__version__,
+                "lights": self.lights.name,
+                "transfer": self.transfer,
+                "bits": max(bits_of(path) for path, _, _ in pairs),
+            }
+            files.write_json(temporary / MANIFEST, manifest)
+        return manifest
+
+    def _read(self, path: Path) -> np.ndarray:
+        pixels = read_image(path, 3)
+        require_finite(pixels, path)
+        return decode_srgb(pixels).astype(np.float32) if self.transfer == "srgb" else pixels
+
+
+def paired(light_list: Path) -> list[tuple[Path, LightListEntry]]:
+    """Each entry of a list with its image beside the list: by the name as written, else its last part, else its stem alone."""
+    entries = read_light_list(light_list)
+    folder = light_list.parent
+    stems: dict[str, list[Path]] = {}
+    for path in sorted(folder.iterdir()):
+        if path.is_file() and path.suffix.lower() in (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr"):
+            stems.setdefault(path.stem.lower(), []).append(path)
+    pairs = []
+    for entry in entries:
+        last = PureWindowsPath(entry.name).name  # splits at both kinds of slash
+        alike = stems.get(Path(last).stem.lower(), [])
+        if (folder / last).is_file():
+            pairs.append((folder / last, entry))
+        elif len(alike) == 1:
+            pairs.append((alike[0], entry))
+        else:
+            found = f"several with that stem ({', '.join(p.name for p in alike)})" if alike else "none"
+            raise ImageError(f"expected the image {last!r} of {light_list.name} in {folder}, found {found}")
+    return pairs

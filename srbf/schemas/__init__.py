@@ -1,0 +1,38 @@
+"""JSON Schemas of the manifests, and the check of a manifest against its schema."""
+
+from __future__ import annotations
+
+import functools
+import json
+from importlib import resources
+from typing import Any, Literal
+
+from srbf.errors import ManifestError, MissingLibraryError
+
+SchemaName = Literal["capture", "asset", "frames"]
+
+
+@functools.cache
+def load_schema(name: SchemaName) -> dict[str, Any]:
+    """The JSON Schema (draft 2020-12) of `name`."""
+    return json.loads(resources.files(__package__).joinpath(f"{name}.schema.json").read_text(encoding="utf-8"))
+
+
+@functools.cache
+def _validator(name: SchemaName) -> Any:
+    try:
+        import jsonschema
+    except ImportError as error:
+        raise MissingLibraryError("reading manifests needs jsonschema: pip install jsonschema") from error
+    return jsonschema.Draft202012Validator(load_schema(name))
+
+
+def check(value: dict[str, Any], name: SchemaName, where: str) -> None:
+    """ManifestError, in one line, where `value` breaks the schema; `where` names the file."""
+    from jsonschema.exceptions import best_match
+
+    error = best_match(_validator(name).iter_errors(value))
+    if error is not None:
+        place = "/".join(str(p) for p in error.absolute_path) or "its top level"
+        message = error.message if len(error.message) <= 200 else error.message[:197] + "..."
+        raise ManifestError(f"{where} breaks the {name} format at {place}: {message}")

@@ -1,0 +1,111 @@
+"""Point sets on the sphere of directions: Hammersley, Fibonacci, their hemispheres by rejection, uniform random.
+
+A direction is a unit vector (x, y, z) in Blender's world frame: right-handed, z up. Point sets are float64 `(n, 3)`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float, Float64
+from srbf.errors import InputError
+
+PointSet = Literal["hammersley", "hammersley3", "fibonacci"]
+Domain = Literal["sphere", "hemisphere"]
+
+
+def normalize(vectors: Float[ndarray, "*shape 3"]) -> Float64[ndarray, "*shape 3"]:
+    """Unit vectors of `vectors`; InputError on one that is zero or not finite."""
+    v = np.asarray(vectors, np.float64)
+    length = np.linalg.norm(v, axis=-1, keepdims=True)
+    if not np.isfinite(length).all() or (length < 1e-12).any():
+        raise InputError(f"expected a direction of non-zero, finite length, found {v[..., :].tolist()}; give x,y,z not all zero")
+    return v / length
+
+
+def van_der_corput(n: int, base: int) -> Float64[ndarray, " n"]:
+    """Radical inverses of 0 … n-1 in `base`: the digits mirrored about the point [Wong1997b, eq. 1-2]."""
+    i = np.arange(n)
+    value, digit_weight = np.zeros(n), 1.0 / base
+    while i.any():
+        value += (i % base) * digit_weight
+        i //= base
+        digit_weight /= base
+    return value
+
+
+def hammersley(n: int, base: int = 2) -> Float64[ndarray, "n 3"]:
+    """n Hammersley points on the sphere: z = 2 vdC(i) - 1, azimuth = 2 pi (i + 1/2) / n.
+
+    Base 2 is [Wong1997b]; the code that its authors released with [Wong2005] uses base 3.
+    """
+    return _from_z_and_azimuth(2 * van_der_corput(n, base) - 1, 2 * np.pi * (np.arange(n) + 0.5) / n)
+
+
+def fibonacci(n: int) -> Float64[ndarray, "n 3"]:
+    """n points of the spherical Fibonacci lattice: z from the top down, azimuth by the golden angle [Gonzalez2010]."""
+    i = np.arange(n)
+    golden_angle = np.pi * (3 - np.sqrt(5))
+    return _from_z_and_azimuth(1 - (2 * i + 1) / n, golden_angle * i)
+
+
+POINT_SETS: dict[str, Callable[[int], np.ndarray]] = {
+    "hammersley": lambda n: hammersley(n, base=2),
+    "hammersley3": lambda n: hammersley(n, base=3),
+    "fibonacci": fibonacci,
+}
+
+
+def point_set(kind: PointSet, k: int, domain: Domain) -> Float64[ndarray, "k 3"]:
+    """Exactly k points of the set `kind` on the sphere or on the open hemisphere z > 0.
+
+    The hemisphere is the rejection of [Wong2005]'s released code: the smallest n of the sphere set that leaves exactly k.
+    """
+    if kind not in POINT_SETS:
+        raise InputError(f"expected a point set of {', '.join(POINT_SETS)}, found {kind!r}")
+    if domain not in get_args(Domain):
+        raise InputError(f"expected a domain of sphere, hemisphere, found {domain!r}")
+    if k < 1:
+        raise InputError(f"expected at least 1 direction, found {k}")
+    generate = POINT_SETS[kind]
+    if domain == "sphere":
+        return generate(k)
+    for n in range(k, 4 * k + 16):
+        points = generate(n)
+        above = points[points[:, 2] > 0]
+        if len(above) == k:
+            return above
+    raise InputError(f"no {kind} set of the sphere leaves exactly {k} points above the horizon; choose another count")
+
+
+def random_directions(n: int, domain: Domain, rng: np.random.Generator) -> Float64[ndarray, "n 3"]:
+    """n directions, uniform in solid angle on the domain (z > 0 strictly on the hemisphere)."""
+    u = 1 - rng.random(n)  # (0, 1]
+    z = u if domain == "hemisphere" else 2 * u - 1
+    return _from_z_and_azimuth(z, 2 * np.pi * rng.random(n))
+
+
+def domain_of(directions: Float[ndarray, "n 3"]) -> Domain:
+    """`hemisphere` where every direction has z > 0, else `sphere`."""
+    return "hemisphere" if bool((np.asarray(directions)[:, 2] > 0).all()) else "sphere"
+
+
+def nearest_neighbour_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
+    """Geodesic distance (rad) of every point to its nearest other point; pi for a lone point. n x n work."""
+    points = np.asarray(points, np.float64)
+    if len(points) < 2:
+        return np.full(len(points), np.pi)
+    cosines = points @ points.T
+    np.fill_diagonal(cosines, -1)
+    nearest = points[cosines.argmax(axis=1)]
+    # The chord is accurate where acos of a cosine near 1 is not.
+    return 2 * np.arcsin(np.clip(np.linalg.norm(points - nearest, axis=1) / 2, 0, 1))
+
+
+def _from_z_and_azimuth(z: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    r = np.sqrt(np.maximum(0, 1 - z**2))
+    return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=1)
