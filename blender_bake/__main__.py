@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`python -m blender_bake JOB.json`, or `blender --background --python blender_bake/__main__.py -- JOB.json`.
+
+The job says scene, receiver, size, quantity, lights and scratch folder; see `run`. Events come out as JSON lines:
+scene, warning, image (name or light, file, seconds), error, done.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+import traceback
+from pathlib import Path
+from typing import Any
+
+if not __package__:  # run as a script by an installed Blender
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from blender_bake.channel import Channel, WorkerError, die_with_host, hand_over, leave
+
+
+def main() -> None:
+    """Run the job named by the last argument; exit 0 when done, 1 after an error event."""
+    channel = Channel()
+    die_with_host()
+    try:
+        run(json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8")), channel)
+    except WorkerError as error:
+        channel.emit("error", message=str(error))
+        leave(1)
+    except Exception as error:  # the one place where anything unforeseen becomes an event instead of a silent death
+        traceback.print_exc()
+        channel.emit("error", message=f"Blender's worker failed: {type(error).__name__}: {error}".replace("\n", " "))
+        leave(1)
+    channel.emit("done")
+    leave(0)
+
+
+def run(job: dict[str, Any], channel: Channel) -> None:
+    """Open the scene, prepare the receiver, then hand over what `job` asks for.
+
+    job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
+    geometry (bool), ambient {samples, seed} or null, lights [{index, kind, direction | position, samples, seed}].
+    """
+    from blender_bake import scene as scenes
+    from blender_bake.illuminant import Illuminant
+    from blender_bake.lightmap import LightmapReceiver
+    from blender_bake.view import ViewReceiver
+
+    scratch = Path(job["scratch"])
+    scene = scenes.open_scene(job["scene"], channel)
+    scenes.configure(scene)
+    own_light = scenes.silence(scene)
+    kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
+    receiver = kind(scene, job, channel)
+    channel.emit("scene", blender=scenes.version(), receiver=receiver.description(), **receiver.facts())
+
+    def image(name: str, array: Any, started: float, **fields: Any) -> None:
+        channel.emit("image", name=name, file=hand_over(scratch, name, array), seconds=time.perf_counter() - started, **fields)
+
+    if job["geometry"]:
+        for name, array in receiver.geometry().items():
+            image(name, array, time.perf_counter())
+    if job["ambient"]:
+        started = time.perf_counter()
+        image("emission", receiver.answer(job["ambient"]["samples"], job["ambient"]["seed"]), started)
+        if job["keep_lamps"]:
+            own_light.restore()
+            started = time.perf_counter()
+            image("ambient", receiver.answer(job["ambient"]["samples"], job["ambient"]["seed"]), started)
+            own_light.off()
+    illuminant = Illuminant(scene, job["sun_angle"])
+    for light in job["lights"]:
+        started = time.perf_counter()
+        illuminant.aim(light)
+        image(f"light_{light['index']}", receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+
+
+if __name__ == "__main__":
+    main()

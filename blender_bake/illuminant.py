@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sole illuminant of a light image: a sun of unit irradiance, or a point lamp of unit irradiance at one metre."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+from mathutils import Vector
+
+POINT_WATTS = 4 * math.pi  # a lamp of P watts gives the irradiance P / (4 pi d^2) at d metres
+
+
+class Illuminant:
+    """A sun and a point lamp of ours, one of them lit at a time."""
+
+    def __init__(self, scene: bpy.types.Scene, sun_angle: float) -> None:
+        self._sun = _lamp(scene, "SUN")
+        self._sun.data.angle = sun_angle
+        self._point = _lamp(scene, "POINT")
+        self._point.data.shadow_soft_size = 0.0
+
+    def aim(self, light: dict[str, Any]) -> None:
+        """Light up `light` {kind: directional, direction} (towards the light) or {kind: point, position}."""
+        directional = light["kind"] == "directional"
+        self._sun.data.energy = 1.0 if directional else 0.0
+        self._point.data.energy = 0.0 if directional else POINT_WATTS
+        if directional:
+            # A sun shines along its local -z.
+            self._sun.rotation_quaternion = Vector(light["direction"]).to_track_quat("Z", "Y")
+        else:
+            self._point.location = light["position"]
+
+
+def _lamp(scene: bpy.types.Scene, kind: str) -> bpy.types.Object:
+    data = bpy.data.lights.new(f"srbf {kind.lower()}", kind)
+    data.energy = 0.0
+    lamp = bpy.data.objects.new(data.name, data)
+    lamp.rotation_mode = "QUATERNION"
+    scene.collection.objects.link(lamp)
+    return lamp

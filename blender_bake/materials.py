@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials of a baked receiver: copies that hold the bake's image node, and the white Lambert that stands in where nothing is diffuse."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def bakeable_slots(obj: bpy.types.Object, image: bpy.types.Image) -> None:
+    """Give every slot of `obj` a material of its own with `image` as the active node, which is where a bake goes.
+
+    Copies leave other objects that share a material alone. An empty slot becomes what Cycles shows for it: 80 % grey.
+    """
+    if not obj.material_slots:
+        obj.data.materials.append(None)
+    for slot in obj.material_slots:
+        source = slot.material
+        if source is None or source.node_tree is None or not source.use_nodes:
+            material = lambert(tuple(source.diffuse_color[:3]) if source else (0.8, 0.8, 0.8))
+        else:
+            material = source.copy()
+        add_target(material, image)
+        slot.material = material
+
+
+def lambert(color: tuple[float, float, float]) -> bpy.types.Material:
+    """A plain diffuse material."""
+    material = bpy.data.materials.new("srbf lambert")
+    if bpy.app.version < (5, 0):
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (*color, 1)
+    links.new(diffuse.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material
+
+
+def add_target(material: bpy.types.Material, image: bpy.types.Image) -> None:
+    """Add the image node that a bake writes to and make it the active one."""
+    nodes = material.node_tree.nodes
+    for node in nodes:
+        node.select = False
+    target = nodes.new("ShaderNodeTexImage")
+    target.image = image
+    target.select = True
+    nodes.active = target

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Opening a .blend without running anything in it, and making the capture's light the only one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+from blender_bake.channel import Channel, WorkerError
+
+WORKING_SPACE = "Linear Rec.709"
+
+
+def version() -> str:
+    """Blender's version, as "4.5.15"."""
+    return ".".join(str(n) for n in bpy.app.version)
+
+
+def open_scene(path: str, channel: Channel) -> bpy.types.Scene:
+    """The .blend's active scene. Its scripts, drivers with Python and handlers do not run; what it misses is named."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = False
+    try:
+        bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
+    except RuntimeError as error:
+        reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
+        raise WorkerError(f"expected a .blend that Blender {version()} can open, found {path}: {reason}") from error
+    for missing in missing_files():
+        channel.warn(missing)
+    space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
+    if space != WORKING_SPACE:
+        raise WorkerError(f"expected the working colour space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")
+    return bpy.context.scene
+
+
+def missing_files() -> list[str]:
+    """A line for each texture and library file that the .blend names and that is not there."""
+    lines = []
+    for library in bpy.data.libraries:
+        path = bpy.path.abspath(library.filepath)
+        if not Path(path).is_file():
+            lines.append(f"missing library {path}: what it holds is not in the picture")
+    for image in bpy.data.images:
+        if image.source not in {"FILE", "SEQUENCE", "MOVIE"} or image.packed_file or image.users == 0:
+            continue
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if not Path(path).is_file():
+            lines.append(f"missing texture {path or image.name} (image {image.name!r}): Blender renders it magenta")
+    return lines
+
+
+def configure(scene: bpy.types.Scene) -> None:
+    """Cycles on the CPU, unbiased and repeatable: no clamps, no adaptive sampling, no denoiser, no compositor, no view transform.
+
+    Bounces, caustics, Filter Glossy and subdivision stay as the scene has them.
+    """
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    for name, value in {
+        "use_adaptive_sampling": False,
+        "use_denoising": False,
+        "use_light_tree": False,
+        "use_guiding": False,
+        "use_animated_seed": False,
+        "sample_clamp_direct": 0.0,
+        "sample_clamp_indirect": 0.0,
+        "light_sampling_threshold": 0.0,
+        "film_exposure": 1.0,
+        "time_limit": 0.0,
+        "sample_offset": 0,
+        "use_sample_subset": False,
+    }.items():
+        if hasattr(cycles, name):  # Blender versions differ in what they have
+            setattr(cycles, name, value)
+    render = scene.render
+    render.use_compositing = False
+    render.use_sequencer = False
+    render.use_motion_blur = False
+    render.use_border = False
+    render.use_multiview = False
+    render.use_freestyle = False
+    render.use_persistent_data = False  # in 4.5 a render that keeps data leaves the next bake all zero; views switch it on
+    if hasattr(render, "use_bake_multires"):
+        render.use_bake_multires = False
+    elif hasattr(render.bake, "use_multires"):  # Blender 5
+        render.bake.use_multires = False
+    render.use_stamp = False
+    render.use_overwrite = True
+    render.use_file_extension = True
+    render.threads_mode = "AUTO"
+
+
+class OwnLight:
+    """The scene's own lamps and world, switched off, and on again for `--keep-lamps`."""
+
+    def __init__(self, scene: bpy.types.Scene) -> None:
+        self._scene = scene
+        self._world = scene.world
+        self._black = black_world()
+        self._lamps = [(data, data.energy) for data in bpy.data.lights]
+        for data, _ in self._lamps:
+            data.animation_data_clear()
+        self.off()
+
+    def off(self) -> None:
+        """No lamp, a black world."""
+        self._scene.world = self._black
+        for data, _ in self._lamps:
+            data.energy = 0.0
+
+    def restore(self) -> None:
+        """The scene as its author lit it."""
+        self._scene.world = self._world
+        for data, energy in self._lamps:
+            data.energy = energy
+
+
+def silence(scene: bpy.types.Scene) -> OwnLight:
+    """Switch off every lamp and the world; emissive materials stay and become ambient."""
+    return OwnLight(scene)
+
+
+def black_world() -> bpy.types.World:
+    """A world of no light at all."""
+    world = bpy.data.worlds.new("srbf black")
+    if bpy.app.version < (5, 0):
+        world.use_nodes = True
+    world.node_tree.nodes.clear()
+    output = world.node_tree.nodes.new("ShaderNodeOutputWorld")
+    background = world.node_tree.nodes.new("ShaderNodeBackground")
+    background.inputs["Color"].default_value = (0, 0, 0, 1)
+    background.inputs["Strength"].default_value = 0
+    world.node_tree.links.new(background.outputs["Background"], output.inputs["Surface"])
+    return world

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A view receiver: the pixels of a fixed camera (perspective, orthographic or panoramic), rendered by Cycles."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from blender_bake import materials
+from blender_bake.channel import Channel, WorkerError
+from blender_bake.exr import read_passes
+
+GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the centre that its position reprojects onto it
+NOT_DIFFUSE = 1e-3
+
+
+class ViewReceiver:
+    """The pixels of one camera; arrays are (H, W, C) float32, row 0 at the top, unpremultiplied."""
+
+    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
+        self._scene = scene
+        self._irradiance = job["quantity"] == "irradiance"
+        self._file = Path(job["scratch"]) / "view.exr"
+        self._camera = find_camera(scene, job["receiver"].get("camera"))
+        self._layer = bpy.context.view_layer
+        self._coverage_samples = job["coverage_samples"]
+        self._prepare(job["width"], job["height"])
+        if self._irradiance:
+            self._whiten_if_nothing_is_diffuse(channel)
+
+    def description(self) -> dict[str, Any]:
+        """What the manifest says of this receiver."""
+        return {"kind": "view", "camera": self._camera.name}
+
+    def facts(self) -> dict[str, Any]:
+        """For the dry run, the log and depth-based shaders: the camera's kind and pose."""
+        data = self._camera.data
+        return {
+            "camera": {
+                "type": data.type,
+                "matrix_world": [list(row) for row in self._camera.matrix_world],
+                "angle_x": data.angle_x,
+                "ortho_scale": data.ortho_scale,
+            }
+        }
+
+    def geometry(self) -> dict[str, np.ndarray]:
+        """World position and normal at pixel centres, with `hit` where there is one; albedo and coverage over the whole pixel."""
+        cycles = self._scene.cycles
+        filter_type, filter_width = cycles.pixel_filter_type, cycles.filter_width
+        cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", GEOMETRY_FILTER
+        centre = self._render(1, 0, ("Combined", "Position", "Normal"))
+        cycles.pixel_filter_type, cycles.filter_width = filter_type, filter_width
+        whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
+        hit, coverage = (centre["Combined"][:, :, 3:] > 0).astype(np.float32), np.clip(whole["Combined"][:, :, 3:], 0, 1)
+        normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
+        albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
+        return {"position": centre["Position"] * hit, "normal": normal * hit, "albedo": albedo, "coverage": coverage, "hit": hit}
+
+    def answer(self, samples: int, seed: int) -> np.ndarray:
+        """Radiance over coverage (COMBINED, unpremultiplied), or irradiance E = pi x (diffuse direct + indirect, without colour)."""
+        if self._irradiance:
+            passes = self._render(samples, seed, ("Diffuse Direct", "Diffuse Indirect"))
+            return (passes["Diffuse Direct"] + passes["Diffuse Indirect"])[:, :, :3] * np.float32(math.pi)
+        combined = self._render(samples, seed, ("Combined",))["Combined"]
+        alpha = combined[:, :, 3:]
+        return np.where(alpha > 0, combined[:, :, :3] / np.where(alpha > 0, alpha, 1), 0)
+
+    def _prepare(self, width: int, height: int) -> None:
+        render = self._scene.render
+        self._scene.camera = self._camera
+        render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
+        render.film_transparent = True
+        render.use_persistent_data = True  # half of a small render's time is otherwise spent on handing the scene over again
+        render.filepath = str(self._file)
+        settings = render.image_settings
+        if hasattr(settings, "media_type"):  # Blender 5
+            settings.media_type = "MULTI_LAYER_IMAGE"
+        settings.file_format = "OPEN_EXR_MULTILAYER"
+        settings.color_depth = "32"
+        settings.exr_codec = "NONE"
+        for layer in self._scene.view_layers:
+            layer.use = layer == self._layer
+        layer = self._layer
+        layer.use_pass_combined = layer.use_pass_position = layer.use_pass_normal = True
+        layer.use_pass_diffuse_color = layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = True
+
+    def _render(self, samples: int, seed: int, passes: tuple[str, ...]) -> dict[str, np.ndarray]:
+        self._scene.cycles.samples = samples
+        self._scene.cycles.seed = seed
+        self._file.unlink(missing_ok=True)
+        try:
+            result = bpy.ops.render.render(write_still=True)
+        except RuntimeError as error:
+            reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
+            raise WorkerError(f"Blender could not render camera {self._camera.name!r}: {reason}") from error
+        if result != {"FINISHED"} or not self._file.is_file():
+            raise WorkerError(f"Blender's render of camera {self._camera.name!r} ended as {', '.join(result)} without an image")
+        return read_passes(self._file, passes)
+
+    def _whiten_if_nothing_is_diffuse(self, channel: Channel) -> None:
+        passes = self._render(1, 0, ("Combined", "Diffuse Color"))
+        seen = passes["Combined"][:, :, 3] > 0
+        dark = (passes["Diffuse Color"][:, :, :3].max(axis=2) < NOT_DIFFUSE) & seen
+        if seen.any() and dark[seen].all():
+            self._layer.material_override = materials.lambert((1, 1, 1))
+            channel.warn("nothing in view is diffuse: irradiance is taken with every surface white Lambert instead")
+        elif dark.any():
+            channel.warn(f"{int(dark.sum())} pixels show nothing diffuse (metal, glass, black): they have no irradiance and hold 0")
+
+
+def find_camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
+    """The camera named, or the scene's own; WorkerError says what there is."""
+    cameras = sorted(o.name for o in scene.objects if o.type == "CAMERA")
+    shown = ", ".join(repr(n) for n in cameras) or "none"
+    if name is None:
+        if scene.camera is None or scene.camera.type != "CAMERA":
+            raise WorkerError(
+                f"expected an active camera in scene {scene.name!r}, found none; its cameras are {shown}: name one as view:NAME"
+            )
+        return scene.camera
+    camera = scene.objects.get(name)
+    if camera is None or camera.type != "CAMERA":
+        raise WorkerError(f"expected a camera {name!r} in scene {scene.name!r}, found none; its cameras are {shown}")
+    return camera

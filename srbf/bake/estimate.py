@@ -1,0 +1,70 @@
+"""The dry run: what a bake will cost, from two small lights of it."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf.bake.run import Bake, base_job
+from srbf.bake.settings import plan_lights
+from srbf.bake.worker import Worker
+from srbf.image import write_image
+
+PROBE_SAMPLES = 4  # more than that of the other probe: enough to tell a light's fixed cost from its cost a sample
+
+
+def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list[str]:
+    """Lines that tell receiver, lights, disk and time of `bake`; nothing is written where it would bake.
+
+    Two lights are rendered in a scratch folder; errors of the scene or receiver come up here as they would in the bake.
+    """
+    settings = bake.settings
+    bake.check_scene()
+    lights = plan_lights(settings)
+    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
+        scratch = Path(name)
+        probes = [{**lights[len(lights) // 3].job(), "index": i, "samples": n} for i, n in enumerate((1, 1, 1 + PROBE_SAMPLES))]
+        job = {**base_job(bake.scene, settings, scratch), "geometry": False, "ambient": None, "lights": probes}
+        facts: dict[str, Any] = {}
+        seconds, image_bytes = [0.0] * len(probes), 0
+        with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
+            for event in worker.events():
+                if event["event"] == "warning":
+                    say(event["message"])
+                elif event["event"] == "scene":
+                    facts = event
+                elif event["event"] == "image":
+                    seconds[event["light"]] = event["seconds"]
+                    write_image(scratch / "probe.exr", np.clip(np.load(scratch / event["file"]), -6e4, 6e4), "half")
+                    image_bytes = (scratch / "probe.exr").stat().st_size
+    # The first light also hands the scene to Cycles: the second and third tell what every other one costs.
+    per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
+    fixed = max(0.0, seconds[1] - per_sample)
+    time = len(lights) * fixed + sum(light.samples for light in lights) * per_sample
+    disk = len(lights) * image_bytes + settings.width * settings.height * 40
+    where = bake.folder if bake.folder.exists() else bake.folder.resolve().parent
+    free = shutil.disk_usage(where).free if where.exists() else 0
+    roles = Counter(light.role for light in lights)
+    train_from = settings.domain if settings.light_list is None else "from the light list"
+    receiver = ", ".join(f"{key} {value}" for key, value in facts["receiver"].items() if key != "kind")
+    covered = f", {facts['covered_texels']} texels covered" if "covered_texels" in facts else ""
+    return [
+        f"scene      {bake.scene} (Blender {facts['blender']})",
+        f"receiver   {facts['receiver']['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
+        f"lights     {roles['train']} train at {settings.samples} samples, {roles['validation']} validation and "
+        f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
+        f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
+        f"time       about {_duration(time)} on this machine as busy as it is now",
+    ]
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

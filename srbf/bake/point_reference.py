@@ -1,0 +1,144 @@
+"""How far the point relighter is from the truth: the same receivers under real Cycles lamps inside the scene."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf import methods
+from srbf.asset import Asset
+from srbf.bake.run import base_job
+from srbf.bake.settings import BakeSettings, Receiver, noise_seed
+from srbf.bake.worker import Worker
+from srbf.errors import InputError
+from srbf.lights import Falloff, PointLight
+
+FALLOFFS: tuple[Falloff, ...] = ("inverse-square", "linear")
+DISTANCE_BINS = 6
+HEIGHT_ABOVE = (0.15, 1.0)  # lamps stand this far above the receivers' middle, in units of their largest extent
+
+
+def compare_with_lamps(
+    asset: Asset,
+    scene: Path,
+    count: int,
+    samples: int = 64,
+    seed: int = 0,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+    say: Callable[[str], None] = lambda line: None,
+    blender: Path | None = None,
+) -> dict[str, Any]:
+    """Error of the point relighter by distance, against `count` random lamps of unit irradiance at 1 m rendered by Cycles.
+
+    For each falloff and distance bin: relative RMSE as it stands (a0 = 1 m) and `scaled`, at the one global a0 that fits best.
+    The asset's captured light is directional, so occluders beyond a lamp still cast: this measures that approximation.
+    """
+    if count < 1:
+        raise InputError(f"expected at least 1 lamp, found {count}")
+    if "position" not in asset.images:
+        raise InputError("comparing with lamps needs a position map, and this asset has none")
+    receiver = asset.manifest.get("source", {}).get("receiver")
+    if receiver is None:
+        raise InputError("expected an asset baked from a scene, found one that names no receiver")
+    if not scene.is_file():
+        raise InputError(f"expected a .blend at {scene}, found no such file")
+    covered = asset.covered
+    positions = asset.images["position"][covered]  # (p, 3)
+    lamps = lamp_positions(positions, count, seed)
+    references = _render(asset, receiver, scene, lamps, samples, seed, progress, say, blender)
+    distances: list[np.ndarray] = []
+    errors: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]] = {falloff: [] for falloff in FALLOFFS}
+    for lamp, reference in zip(lamps, references, strict=True):
+        distances.append(np.linalg.norm(lamp - positions, axis=1))
+        for falloff in FALLOFFS:
+            relit = methods.relight(asset, [PointLight(tuple(lamp), falloff=falloff)])
+            if "ambient" in asset.images:
+                relit = relit - asset.images["ambient"]
+            errors[falloff].append((relit[covered], reference[covered]))
+    return _by_distance(np.concatenate(distances), errors, lamps)
+
+
+def lamp_positions(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """(count, 3) places over the receivers: uniform in their horizontal box, above their middle height."""
+    rng = np.random.default_rng(seed)
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    extent = float((high - low).max())
+    places = rng.uniform(low, high, (count, 3))
+    places[:, 2] = np.median(positions[:, 2]) + extent * rng.uniform(*HEIGHT_ABOVE, count)
+    return places
+
+
+def _render(
+    asset: Asset,
+    receiver: dict[str, Any],
+    scene: Path,
+    lamps: np.ndarray,
+    samples: int,
+    seed: int,
+    progress: Callable[[float, float], None],
+    say: Callable[[str], None],
+    blender: Path | None,
+) -> list[np.ndarray]:
+    parsed = Receiver(receiver["kind"], receiver.get("object") or receiver.get("camera"), receiver.get("uv_layer"))
+    settings = BakeSettings(parsed, asset.width, asset.height, quantity=asset.quantity)
+    lights = [
+        {"index": i, "kind": "point", "position": lamp.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
+        for i, lamp in enumerate(lamps)
+    ]
+    images: list[np.ndarray] = []
+    emission: np.ndarray | float = 0.0
+    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
+        scratch = Path(name)
+        job = {
+            **base_job(scene, settings, scratch),
+            "geometry": False,
+            "ambient": {"samples": samples, "seed": noise_seed(seed, -1)},
+            "lights": lights,
+        }
+        with Worker(job, scratch, scratch / "bake.log", blender) as worker:
+            for event in worker.events():
+                if event["event"] == "warning":
+                    say(event["message"])
+                elif event["event"] == "image":
+                    array = np.load(scratch / event["file"])
+                    if "light" in event:
+                        images.append(np.maximum(array - emission, 0))
+                        progress(len(images), len(lights))
+                    else:
+                        emission = array
+    return images
+
+
+def _by_distance(distance: np.ndarray, pairs: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]], lamps: np.ndarray) -> dict[str, Any]:
+    edges = np.quantile(distance, np.linspace(0, 1, DISTANCE_BINS + 1))
+    which = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, DISTANCE_BINS - 1)
+    measured: dict[str, tuple[np.ndarray, np.ndarray, float]] = {}
+    for falloff, images in pairs.items():
+        relit = np.concatenate([a for a, _ in images]).astype(np.float64)
+        reference = np.concatenate([b for _, b in images]).astype(np.float64)
+        measured[falloff] = (relit, reference, float((relit * reference).sum() / max((relit**2).sum(), 1e-30)))
+
+    def errors(mask: np.ndarray | slice) -> dict[str, Any]:
+        row: dict[str, Any] = {}
+        for falloff, (relit, reference, scale) in measured.items():
+            power = max(float((reference[mask] ** 2).mean()), 1e-30)
+            row[falloff] = {
+                "relative_rmse": float(np.sqrt(((relit[mask] - reference[mask]) ** 2).mean() / power)),
+                "scaled": float(np.sqrt(((scale * relit[mask] - reference[mask]) ** 2).mean() / power)),
+            }
+        return row
+
+    return {
+        "lamps": lamps.tolist(),
+        "best_scale": {falloff: scale for falloff, (_, _, scale) in measured.items()},
+        "all": errors(slice(None)),
+        "by_distance": [
+            {"from": float(edges[i]), "to": float(edges[i + 1]), "texels": int((which == i).sum()), **errors(which == i)}
+            for i in range(DISTANCE_BINS)
+            if (which == i).any()
+        ],
+    }

@@ -1,0 +1,299 @@
+"""Baking a capture: ask the worker for what is missing, write each image as it comes, the manifest last."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import srbf
+from srbf import files
+from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
+from srbf.bake.worker import Worker
+from srbf.capture import MANIFEST
+from srbf.dilation import dilate, nearest_covered
+from srbf.errors import BakeError, ImageError, InputError, OutputExistsError
+from srbf.image import HALF_MAX, read_image, size_of, write_image
+
+STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
+LOG = "bake.log"
+SCRATCH = ".scratch"
+LOCK = ".lock"
+AMBIENT_SEED = -1  # the light index of the image without a light
+COVERAGE_SAMPLES = 64
+GEOMETRY = ("position", "normal", "albedo", "coverage")
+
+
+@dataclass
+class Reporter:
+    """Where a bake tells of itself: progress in units of work (done, total, what), and lines for the user."""
+
+    progress: Callable[[float, float, str], None] = lambda done, total, what: None
+    say: Callable[[str], None] = lambda line: None
+
+
+@dataclass(frozen=True)
+class Bake:
+    """One bake of a scene into a folder; `run` starts it or goes on with it."""
+
+    scene: Path
+    folder: Path
+    settings: BakeSettings
+    blender: Path | None = None
+
+    def run(self, reporter: Reporter, force: bool = False, restart: bool = False) -> bool:
+        """Bake what is not there yet; False where the capture was complete already. Killed at any moment, it goes on when run again.
+
+        Finished lights are kept, and every image and the manifest are bit-identical to those of an uninterrupted bake.
+        BakeError where Blender fails or another process bakes here; OutputExistsError where the folder holds something else.
+        """
+        identity = self._identity()
+        self._check_folder(identity, force, restart)
+        files.make_folder(self.folder / "lights")
+        import filelock
+
+        lock = filelock.FileLock(str(self.folder / LOCK))
+        try:
+            lock.acquire(timeout=0)
+        except filelock.Timeout as error:
+            raise BakeError(f"another process is baking into {self.folder}; wait for it, or choose another -o") from error
+        except OSError as error:
+            raise files.WriteError(f"cannot write into {self.folder}: {error.strerror}; choose a folder that can be written") from error
+        scratch = self.folder / SCRATCH
+        try:
+            if (self.folder / MANIFEST).is_file():
+                return False
+            if not (self.folder / STATE).is_file():
+                files.write_json(self.folder / STATE, identity)
+            shutil.rmtree(scratch, ignore_errors=True)
+            files.make_folder(scratch)
+            self._sweep()
+            manifest = self._bake(scratch, reporter)
+            files.write_json(self.folder / MANIFEST, manifest)
+            (self.folder / STATE).unlink()
+            return True
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+            lock.release()
+
+    def check_scene(self) -> None:
+        """InputError where there is no scene to bake."""
+        if not self.scene.is_file():
+            raise InputError(f"expected a .blend at {self.scene}, found no such file")
+
+    def _identity(self) -> dict[str, Any]:
+        self.check_scene()
+        return {"scene": self.scene.name, "scene_sha256": files.sha256_of(self.scene), "settings": self.settings.record()}
+
+    def _check_folder(self, identity: dict[str, Any], force: bool, restart: bool) -> None:
+        """Refuse a folder that this bake can neither go on with nor replace; empty it where the user said so."""
+        if not self.folder.exists():
+            return
+        if not self.folder.is_dir():
+            raise OutputExistsError(f"expected a folder or nothing at {self.folder}, found a file; choose another -o")
+        done, begun = self.folder / MANIFEST, self.folder / STATE
+        if not done.is_file() and not begun.is_file():
+            if any(p.name not in (LOCK, SCRATCH, LOG, "lights") for p in self.folder.iterdir()):
+                raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
+            return
+        recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
+        changed = _differences(recorded, identity)
+        if not changed and not restart and not (force and done.is_file()):
+            return
+        if not (force or restart):
+            state = "a finished capture" if done.is_file() else "a capture half done"
+            flag = "--force" if done.is_file() else "--restart"
+            raise OutputExistsError(
+                f"expected {state} of the same scene and settings at {self.folder}, found another {', '.join(changed)}; "
+                f"choose another -o, or {flag} to bake anew"
+            )
+        # The manifest first: a folder emptied half way is an unfinished bake, never a capture with holes.
+        done.unlink(missing_ok=True)
+        begun.unlink(missing_ok=True)
+        for path in self.folder.iterdir():
+            if path.name != LOCK:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    def _sweep(self) -> None:
+        """Remove what a killed process left half-written."""
+        for partial in [*self.folder.glob(".*.partial*"), *(self.folder / "lights").glob(".*.partial*")]:
+            partial.unlink()
+
+    def _bake(self, scratch: Path, reporter: Reporter) -> dict[str, Any]:
+        lights = plan_lights(self.settings)
+        missing = [light for light in lights if not self._is_done(self.folder / light.file)]
+        images = _Images(self.folder, self.settings, reporter)
+        total = float(sum(light.samples for light in lights))
+        done = total - sum(light.samples for light in missing)
+        log = self.folder / LOG
+        started = time.perf_counter()
+        if done:
+            reporter.say(f"going on: {len(lights) - len(missing)} of {len(lights)} lights are done")
+        reporter.progress(done, total, "opening the scene")
+        facts: dict[str, Any] = {}
+        planned = {light.index: light for light in missing}
+        with Worker(self._job(missing, scratch), scratch, log, self.blender) as worker:
+            for event in worker.events():
+                if event["event"] == "warning":
+                    reporter.say(event["message"])
+                elif event["event"] == "scene":
+                    facts = event
+                    self._check_version(event["blender"])
+                    self._write_uv(event)
+                elif event["event"] == "image":
+                    array = np.load(scratch / event["file"])
+                    (scratch / event["file"]).unlink()
+                    if "light" not in event:
+                        images.take(event["name"], array)
+                        continue
+                    light = planned.pop(event["light"])
+                    images.take_light(light, array)
+                    done += light.samples
+                    reporter.progress(done, total, f"light {len(lights) - len(planned)} of {len(lights)}")
+                    with open(log, "a", encoding="utf-8") as lines:
+                        lines.write(f"srbf: light {light.index} in {event['seconds']:.3f} s\n")
+        if planned:
+            raise BakeError(f"expected {len(missing)} lights from Blender, found {len(missing) - len(planned)}; run the same command again")
+        if images.is_all_black(lights):
+            raise BakeError(
+                f"every light image is black: does light reach {facts['receiver'].get('object') or 'the camera'} from the "
+                f"{self.settings.domain}? Delete {self.folder} after mending the scene"
+            )
+        with open(log, "a", encoding="utf-8") as lines:
+            lines.write(f"srbf: {len(missing)} lights in {time.perf_counter() - started:.1f} s\n")
+        return self._manifest(lights, facts, images)
+
+    def _job(self, missing: list[PlannedLight], scratch: Path) -> dict[str, Any]:
+        settings = self.settings
+        return {
+            **base_job(self.scene, settings, scratch),
+            "geometry": True,
+            "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)},
+            "lights": [light.job() for light in missing],
+        }
+
+    def _is_done(self, path: Path) -> bool:
+        """A light's file is whole by construction (renamed into place); a size that is not ours is baked again."""
+        with suppress(ImageError):
+            return path.is_file() and size_of(path) == (self.settings.height, self.settings.width)
+        return False
+
+    def _check_version(self, blender: str) -> None:
+        """Record which Blender bakes; another version would not give the bits that an uninterrupted bake has."""
+        state = files.read_json(self.folder / STATE)
+        if state.setdefault("blender", blender) != blender:
+            raise BakeError(f"expected Blender {state['blender']}, which began {self.folder}, found {blender}; use it, or add --restart")
+        files.write_json(self.folder / STATE, state)
+
+    def _write_uv(self, event: dict[str, Any]) -> None:
+        if "uv" in event:
+            files.write_json(self.folder / "uv.json", {"uv_layer": event["made_uv_layer"], "per_loop": event["uv"]})
+
+    def _manifest(self, lights: list[PlannedLight], facts: dict[str, Any], images: _Images) -> dict[str, Any]:
+        source = {**self._identity(), "srbf": srbf.__version__, "blender": facts["blender"]}
+        if "camera" in facts:
+            source["camera"] = facts["camera"]
+        if "made_uv_layer" in facts:
+            source["uv"] = "uv.json"
+        return {
+            "format": "srbf-capture",
+            "version": 1,
+            "quantity": self.settings.quantity,
+            "transport": "combined",
+            "width": self.settings.width,
+            "height": self.settings.height,
+            "receiver": facts["receiver"],
+            "lights": [
+                {"kind": "directional", "direction": list(light.direction), "role": light.role, "file": light.file} for light in lights
+            ],
+            **{name: f"{name}.exr" for name in GEOMETRY},
+            **({"ambient": "ambient.exr"} if images.has_ambient else {}),
+            "source": source,
+        }
+
+
+def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, Any]:
+    """What every job tells the worker of scene and receiver."""
+    return {
+        "scene": str(scene.resolve()),
+        "receiver": settings.receiver.job(),
+        "width": settings.width,
+        "height": settings.height,
+        "quantity": settings.quantity,
+        "keep_lamps": settings.keep_lamps,
+        "sun_angle": settings.sun_angle,
+        "coverage_samples": COVERAGE_SAMPLES,
+        "scratch": str(scratch.resolve()),
+    }
+
+
+class _Images:
+    """The capture's images as they arrive: geometry, what the scene emits, then the lights with that subtracted."""
+
+    def __init__(self, folder: Path, settings: BakeSettings, reporter: Reporter) -> None:
+        self._folder = folder
+        self._settings = settings
+        self._reporter = reporter
+        self._emission: np.ndarray | None = None
+        self._raw: dict[str, np.ndarray] = {}
+        self._nearest: np.ndarray | None = None
+        self.has_ambient = False
+        self._brightest = 0.0
+
+    def take(self, name: str, array: np.ndarray) -> None:
+        """Geometry is kept until `hit`, its last image, tells where it is real; then all of it is dilated and written."""
+        if name == "emission":
+            self._emission = dilate(array, self._nearest) if array.any() else None
+            if self._emission is not None and not self._settings.keep_lamps:
+                self._write_ambient(self._emission)
+        elif name == "ambient":
+            if array.any():
+                self._write_ambient(dilate(array, self._nearest))
+        elif name == "hit":
+            coverage = self._raw["coverage"]
+            self._nearest = nearest_covered(coverage[:, :, 0])
+            of_hits = nearest_covered(array[:, :, 0])
+            for geometry, image in self._raw.items():
+                if geometry != "coverage":
+                    image = dilate(image, self._nearest if geometry == "albedo" else of_hits)
+                write_image(self._folder / f"{geometry}.exr", image, "float")
+            self._raw.clear()
+        else:
+            self._raw[name] = array
+
+    def take_light(self, light: PlannedLight, array: np.ndarray) -> None:
+        """Write one light's answer: finite, what the scene emits subtracted, dilated, half float (fireflies clipped, and said)."""
+        if not np.isfinite(array).all():
+            raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
+        array = dilate(array, self._nearest)
+        if self._emission is not None:
+            array = array - self._emission
+        beyond = int((np.abs(array) > HALF_MAX).sum())
+        if beyond:
+            self._reporter.say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
+            array = np.clip(array, -HALF_MAX, HALF_MAX)
+        self._brightest = max(self._brightest, float(array.max()))
+        write_image(self._folder / light.file, array, "half")
+
+    def is_all_black(self, lights: list[PlannedLight]) -> bool:
+        """Whether no light image of the capture, baked now or earlier, has a texel above 0."""
+        if self._brightest > 0:
+            return False
+        return all(float(read_image(self._folder / light.file, 3).max()) <= 0 for light in lights)
+
+    def _write_ambient(self, image: np.ndarray) -> None:
+        self.has_ambient = True
+        write_image(self._folder / "ambient.exr", image, "float")
+
+
+def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:
+    """Names of what differs between a recorded bake and this one."""
+    changed = ["scene"] if recorded.get("scene_sha256") != asked["scene_sha256"] else []
+    before, now = recorded.get("settings", {}), asked["settings"]
+    return changed + [name.replace("_", " ") for name in now if before.get(name) != now[name]]

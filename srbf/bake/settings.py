@@ -1,0 +1,126 @@
+"""What a bake is asked for, and the lights that it plans."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf.capture import Quantity, Role
+from srbf.errors import InputError
+from srbf.light_list import read_light_list
+from srbf.sphere import Domain, domain_of, point_set, random_directions
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """`lightmap:OBJECT` (with its UV layer, else the active one) or `view[:CAMERA]` (else the scene's own camera)."""
+
+    kind: str
+    name: str | None = None
+    uv_layer: str | None = None
+
+    @staticmethod
+    def parse(text: str, uv_layer: str | None = None) -> Receiver:
+        """From the command line's word; InputError on any other."""
+        kind, _, name = text.partition(":")
+        if kind == "lightmap" and name:
+            return Receiver(kind, name, uv_layer)
+        if kind == "view":
+            if uv_layer is not None:
+                raise InputError("--uv-layer belongs to a lightmap receiver, found it with a view")
+            return Receiver(kind, name or None)
+        raise InputError(f"expected a receiver lightmap:OBJECT or view[:CAMERA], found {text!r}")
+
+    def job(self) -> dict[str, Any]:
+        """As the worker reads it."""
+        return {"kind": self.kind, ("object" if self.kind == "lightmap" else "camera"): self.name, "uv_layer": self.uv_layer}
+
+
+@dataclass(frozen=True)
+class BakeSettings:
+    """All that decides a capture's pixels, apart from the scene and Blender's version. Sizes in texels, angles in radians."""
+
+    receiver: Receiver
+    width: int = 256
+    height: int = 256
+    lights: int = 400
+    domain: Domain = "hemisphere"
+    samples: int = 2
+    validation: int = 16
+    holdout: int = 32
+    holdout_samples: int = 64
+    quantity: Quantity = "irradiance"
+    seed: int = 0
+    sun_angle: float = 0.0
+    keep_lamps: bool = False
+    light_list: Path | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("width", "height", "lights", "samples", "holdout_samples"):
+            if getattr(self, name) < 1:
+                raise InputError(f"expected {name.replace('_', ' ')} of 1 or more, found {getattr(self, name)}")
+        for name in ("validation", "holdout", "seed", "sun_angle"):
+            if getattr(self, name) < 0:
+                raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
+        if max(self.width, self.height) > 16384:
+            raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
+        if self.sun_angle > np.pi:
+            raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
+
+    def record(self) -> dict[str, Any]:
+        """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
+        record = asdict(self)
+        if self.light_list is not None:
+            record["light_list"] = hashlib.sha256(self.light_list.read_bytes()).hexdigest()
+        return record
+
+
+@dataclass(frozen=True)
+class PlannedLight:
+    """A light to bake: its place in the capture, direction, role, samples a texel, and the seed of its own noise."""
+
+    index: int
+    direction: tuple[float, float, float]
+    role: Role
+    samples: int
+    seed: int
+
+    @property
+    def file(self) -> str:
+        return f"lights/{self.index:04d}.exr"
+
+    def job(self) -> dict[str, Any]:
+        """As the worker reads it."""
+        return {"index": self.index, "kind": "directional", "direction": self.direction, "samples": self.samples, "seed": self.seed}
+
+
+def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
+    """Train lights (Hammersley, or the light list's), then validation, then holdout: uniform random, of more samples."""
+    if settings.light_list is not None:
+        train = np.array([entry.direction for entry in read_light_list(settings.light_list)])
+        domain = domain_of(train)
+    else:
+        domain = settings.domain
+        train = point_set("hammersley", settings.lights, domain)
+    rng = np.random.default_rng(settings.seed)
+    groups: list[tuple[Role, np.ndarray, int]] = [
+        ("train", train, settings.samples),
+        ("validation", random_directions(settings.validation, domain, rng), settings.holdout_samples),
+        ("holdout", random_directions(settings.holdout, domain, rng), settings.holdout_samples),
+    ]
+    planned: list[PlannedLight] = []
+    for role, directions, samples in groups:
+        for x, y, z in directions:
+            index = len(planned)
+            planned.append(PlannedLight(index, (float(x), float(y), float(z)), role, samples, noise_seed(settings.seed, index)))
+    return planned
+
+
+def noise_seed(seed: int, light: int, sampling_pass: int = 0) -> int:
+    """Cycles' seed for one image: a hash, so that no two lights share their noise and a fit can average it."""
+    digest = hashlib.blake2b(f"{seed}:{light}:{sampling_pass}".encode(), digest_size=4).digest()
+    return int.from_bytes(digest, "big") & 0x7FFFFFFF

@@ -1,0 +1,103 @@
+"""Blender's process as seen from outside: start it, read its events, notice its death, and never leave it behind."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from srbf.errors import BakeError, MissingLibraryError
+
+
+def command(blender: Path | None, job: Path) -> list[str]:
+    """The worker's command line: an installed Blender, else the bpy module of this Python."""
+    package = importlib.util.find_spec("blender_bake")
+    if package is None or package.origin is None:
+        raise MissingLibraryError("expected the package blender_bake beside srbf, found none; install srbf again")
+    if blender is not None:
+        script = str(Path(package.origin).parent / "__main__.py")
+        return [str(blender), "--background", "--factory-startup", "--disable-autoexec", "--python", script, "--", str(job)]
+    if importlib.util.find_spec("bpy") is None:
+        version = f"{sys.version_info.major}.{sys.version_info.minor}"
+        raise MissingLibraryError(
+            f"baking needs Blender: this Python {version} has no bpy (there is one for 3.11 and 3.13); "
+            "add --blender /path/to/blender, or install srbf[blender] under such a Python"
+        )
+    return [sys.executable, "-m", "blender_bake", str(job)]
+
+
+class Worker:
+    """A running worker; iterate its events. As a context manager it is dead at the end, whatever happened."""
+
+    def __init__(self, job: dict[str, Any], scratch: Path, log: Path, blender: Path | None = None) -> None:
+        path = scratch / "job.json"
+        path.write_text(json.dumps(job), encoding="utf-8")
+        self._log_path = log
+        self._log = open(log, "ab")  # noqa: SIM115 - closed in __exit__
+        try:
+            # A session of its own: Ctrl-C reaches the host alone, which decides. Its stdin is our life line, see die_with_host.
+            self._process = subprocess.Popen(
+                command(blender, path),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                text=True,
+                encoding="utf-8",
+                errors="replace",
+                start_new_session=True,
+            )
+        except OSError as error:
+            self._log.close()
+            raise BakeError(f"cannot start Blender at {blender or sys.executable}: {error.strerror}") from error
+
+    def __enter__(self) -> Worker:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._process.poll() is None:
+            self._process.kill()
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                stream.close()
+        self._log.close()
+
+    def events(self) -> Iterator[dict[str, Any]]:
+        """Every event until `done`; BakeError on an error event, or when the process ends without one."""
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            event = self._parse(line)
+            if event is None:
+                continue
+            if event["event"] == "error":
+                raise BakeError(event["message"])
+            if event["event"] == "done":
+                return
+            yield event
+        status = self._process.wait()
+        cause = f"signal {-status}" if status < 0 else f"status {status}"
+        raise BakeError(
+            f"Blender's process ended unexpectedly ({cause}); finished lights are kept, run the same command to go on. "
+            f"Its last words are in {self._log_path}: {self._last_words()}"
+        )
+
+    def _parse(self, line: str) -> dict[str, Any] | None:
+        try:
+            event = json.loads(line)
+        except ValueError:
+            event = None
+        if isinstance(event, dict) and "event" in event:
+            return event
+        self._log.write(line.encode())
+        return None
+
+    def _last_words(self) -> str:
+        self._log.flush()
+        with open(self._log_path, "rb") as log:
+            lines = log.read()[-2000:].decode(errors="replace").strip().splitlines()
+        return repr(lines[-1]) if lines else "(nothing)"
