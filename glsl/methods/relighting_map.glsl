@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+/* srbfRelightDirectional, srbfRelightPoint: what a receiver answers to the lights, by relighting maps; add the results of all
+   lights, then call srbfFinish once.
+   use:    vec3 srbfRelightDirectional(sampler2DArray maps, vec2 uv, int firstMap,
+                                       vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
+           vec3 srbfRelightPoint(sampler2DArray maps, vec2 uv, int firstMap, sampler2D rTable,
+                                 vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfLamp lamp)
+   domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, metres, and the lamp in the
+           asset's frame; weights summed on the host over all directional and environment lights
+   twin:   srbf.methods.relighting_map.linear_response
+   cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
+#include "combine/directional.glsl"
+#include "combine/finish.glsl"
+#include "combine/point.glsl"
+#include "lights/lamp_strength.glsl"
+#include "lights/light_direction.glsl"
+#include "lights/light_vector.glsl"
+
+vec3 srbfRelightDirectional(highp sampler2DArray maps, vec2 uv, int firstMap,
+                            vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K]) {
+    return srbfCombineDirectional(maps, uv, firstMap, weights, scale, bias);
+}
+
+vec3 srbfRelightPoint(highp sampler2DArray maps, vec2 uv, int firstMap, highp sampler2D rTable,
+                      vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfLamp lamp) {
+    vec3 lightVector = srbfLightVector(lamp.position, lamp.positionLow, receiver);
+    float strength = srbfLampStrength(lamp, lightVector);
+    if (strength == 0.0) {
+        return vec3(0.0);  // outside a spot's cone
+    }
+    vec3 lightDirection = srbfLightDirection(lightVector);
+    return lamp.color * strength * srbfCombinePoint(maps, uv, firstMap, rTable, lightDirection, centers, scale, bias);
+}

@@ -1,0 +1,73 @@
+"""An asset's images as textures: texel (c, r) of every texture is row r, column c of the array, row 0 at the top, never flipped."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.asset import Asset
+from srbf.errors import ShaderError
+from srbf.gl.context import Limits
+
+if TYPE_CHECKING:
+    import moderngl
+
+_DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalised byte
+
+
+class AssetTextures:
+    """Textures of one asset, each made when first asked for; released with `resources`."""
+
+    def __init__(self, context: moderngl.Context, asset: Asset, limits: Limits, resources: ExitStack) -> None:
+        side = max(asset.width, asset.height, len(asset.table))
+        if side > limits.texture_size:
+            raise ShaderError(f"expected at most {limits.texture_size} texels a side on this GPU, found {side}; shrink the asset")
+        self._context, self._asset, self._limits, self._resources = context, asset, limits, resources
+        self._made: dict[str, moderngl.Texture] = {}
+        self._maps: moderngl.TextureArray | None = None
+
+    def maps(self) -> moderngl.TextureArray:
+        """All K maps as stored, one layer a map. ShaderError where the GPU has fewer layers."""
+        if self._maps is None:
+            asset, most = self._asset, self._limits.array_layers
+            if asset.k > most:
+                raise ShaderError(f"expected at most {most} maps on this GPU (array layers), found {asset.k}; fit with fewer")
+            dtype = _DTYPES[asset.stored.dtype.name]
+            size = (asset.width, asset.height, asset.k)
+            texture = self._context.texture_array(size, 3, np.ascontiguousarray(asset.stored), alignment=1, dtype=dtype)
+            texture.filter = (self._context.NEAREST, self._context.NEAREST)
+            texture.repeat_x = texture.repeat_y = False
+            self._resources.callback(texture.release)
+            self._maps = texture
+        return self._maps
+
+    def map(self, i: int) -> moderngl.Texture:
+        """Map i alone as a plain 2D texture, for the article's multi-pass variant."""
+        return self._plain(f"map {i}", self._asset.stored[i])
+
+    def table(self) -> moderngl.Texture:
+        """The R table, n x 1."""
+        return self._plain("table", self._asset.table[None, :, None])
+
+    def positions(self) -> moderngl.Texture:
+        """The position map, RGBA32F."""
+        position = self._asset.images["position"]
+        return self._plain("position", np.concatenate([position, np.ones_like(position[..., :1])], axis=2, dtype=np.float32))
+
+    def ambient(self) -> moderngl.Texture:
+        """The ambient image, or one black texel."""
+        return self._plain("ambient", self._asset.images.get("ambient", np.zeros((1, 1, 3), np.float32)))
+
+    def _plain(self, name: str, pixels: ndarray) -> moderngl.Texture:
+        if name not in self._made:
+            height, width, channels = pixels.shape
+            dtype = _DTYPES[pixels.dtype.name]
+            texture = self._context.texture((width, height), channels, np.ascontiguousarray(pixels), alignment=1, dtype=dtype)
+            texture.filter = (self._context.NEAREST, self._context.NEAREST)
+            texture.repeat_x = texture.repeat_y = False
+            self._resources.callback(texture.release)
+            self._made[name] = texture
+        return self._made[name]

@@ -1,0 +1,135 @@
+"""What the GPU tests share: one context, small asymmetric assets made in memory, and single shader functions run on a grid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+import pytest
+
+from srbf.asset import Asset
+from srbf.basis.gaussian import r_table, spread_of
+from srbf.errors import MissingLibraryError, ShaderError
+from srbf.gl.context import compile_program, create_context
+from srbf.gl.includes import resolve, resolve_text
+from srbf.methods.relighting_map import quantize
+from srbf.sphere import point_set
+
+WIDEST = 1.0  # rad: wider tables break their own tolerance
+
+
+def build_asset(
+    k: int = 7,
+    encoding: str = "float",
+    height: int = 9,
+    width: int = 14,
+    *,
+    coefficients: np.ndarray | None = None,
+    ambient: bool = False,
+    position: bool = True,
+    spread: float | None = None,
+    seed: int = 0,
+) -> Asset:
+    """An asset of random signed maps over scattered receivers; nothing in it is symmetric."""
+    rng = np.random.default_rng([seed, k])
+    centers = point_set("fibonacci", k, "hemisphere")
+    if spread is None:
+        spread = min(spread_of(centers, "mean"), WIDEST) if k > 1 else 0.9
+    if coefficients is None:
+        coefficients = rng.normal(size=(k, height, width, 3)).astype(np.float32)
+    stored, scale, bias = quantize(coefficients, encoding)  # type: ignore[arg-type]
+    images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
+    if position:
+        images["position"] = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
+    if ambient:
+        images["ambient"] = rng.random((height, width, 3)).astype(np.float32)
+    manifest: dict[str, Any] = {
+        "method": "relighting-map",
+        "width": width,
+        "height": height,
+        "domain": "hemisphere",
+        "basis": {"kind": "gaussian", "centers": centers.tolist(), "spread": spread},
+        "maps": [{"encoding": encoding} for _ in range(k)],
+    }
+    return Asset(manifest, stored, scale, bias, r_table(spread), images)
+
+
+@pytest.fixture(scope="session")
+def make_asset() -> Callable[..., Asset]:
+    return build_asset
+
+
+@pytest.fixture(scope="session")
+def context() -> Iterator[Any]:
+    try:
+        made = create_context()
+    except (ShaderError, MissingLibraryError) as error:
+        pytest.skip(str(error))
+    yield made
+    made.release()
+
+
+@pytest.fixture
+def evaluate(context: Any) -> Callable[..., np.ndarray]:
+    """evaluate(file, expression, *inputs): a vec4 expression of a, b, c ... (rows of (N, 4) inputs) and uv, as (N, 4) float32."""
+
+    def run(
+        file: str,
+        expression: str,
+        *inputs: np.ndarray,
+        declarations: str = "",
+        uniforms: dict[str, Any] | None = None,
+        arrays: dict[str, np.ndarray] | None = None,
+        images: dict[str, np.ndarray] | None = None,
+        defines: dict[str, object] | None = None,
+    ) -> np.ndarray:
+        count = len(inputs[0])
+        textures = {f"input{i}": np.asarray(x, np.float32)[None] for i, x in enumerate(inputs)} | (images or {})
+        letters = [f"    vec4 {'abcdefg'[i]} = texelFetch(input{i}, at, 0);" for i in range(len(inputs))]
+        text = "\n".join(
+            [
+                "precision highp float; precision highp int; precision highp sampler2D; precision highp sampler2DArray;",
+                f'#include "{file}"',
+                *(f"uniform sampler2D{'Array' if x.ndim == 4 else ''} {name};" for name, x in textures.items()),
+                declarations,
+                "layout(location = 0) out vec4 result;",
+                "void main() {",
+                "    ivec2 at = ivec2(gl_FragCoord.xy);",
+                f"    vec2 uv = vec2(gl_FragCoord.x / {count}.0, 0.5);",
+                *letters,
+                f"    result = {expression};",
+                "}",
+            ]
+        )
+        with context, ExitStack() as made:
+
+            def kept(resource: Any) -> Any:
+                made.callback(resource.release)
+                return resource
+
+            source = resolve_text(text, "grid.frag", defines=defines)
+            program = kept(compile_program(context, resolve("stages/fullscreen.vert"), source))
+            for unit, (name, x) in enumerate(textures.items()):
+                pixels, size = np.ascontiguousarray(x, np.float32), (x.shape[-2], x.shape[-3])
+                if x.ndim == 4:
+                    texture = kept(context.texture_array((*size, len(x)), x.shape[-1], pixels, alignment=1, dtype="f4"))
+                else:
+                    texture = kept(context.texture(size, x.shape[-1], pixels, alignment=1, dtype="f4"))
+                texture.filter = (context.NEAREST, context.NEAREST)
+                texture.use(unit)
+                if name in program:
+                    program[name].value = unit
+            for name, value in (uniforms or {}).items():
+                program[name].value = value
+            for name, content in (arrays or {}).items():
+                program[name].write(np.ascontiguousarray(content, np.float32))
+            target = kept(context.framebuffer([kept(context.texture((count, 1), 4, dtype="f4"))]))
+            corners = kept(context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
+            target.use()
+            context.enable_only(context.NOTHING)
+            kept(context.vertex_array(program, [(corners, "2f", "corner")])).render(vertices=3)
+            return np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(count, 4).copy()
+
+    return run

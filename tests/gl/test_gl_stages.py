@@ -1,0 +1,84 @@
+"""Every stage compiles as desktop 330 core, as ES 3.00 and for Vulkan, and keeps the pack's rules."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from srbf.errors import ShaderError
+from srbf.gl.context import compile_program
+from srbf.gl.includes import resolve, resolve_text, shader_root
+
+ROOT = shader_root()
+STAGES = sorted(path.name for path in (ROOT / "stages").iterdir())
+FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if path.suffix in (".glsl", ".vert", ".frag"))
+DEFINES: dict[str, list[dict[str, object]]] = {
+    "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
+    "point.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
+    "accumulate.frag": [{}, *({"SRBF_UNITS": units} for units in range(1, 9))],
+}
+CASES = [(name, defines) for name in STAGES for defines in DEFINES.get(name, [{}])]
+IDS = [f"{name}-{'-'.join(map(str, defines.values()))}" for name, defines in CASES]
+VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]}  # -R gathers loose uniforms into a block
+
+
+def test_there_are_the_five_stages() -> None:
+    assert STAGES == ["accumulate.frag", "directional.frag", "finish.frag", "fullscreen.vert", "point.frag"]
+
+
+@pytest.mark.parametrize("version", ["330 core", "300 es"])
+@pytest.mark.parametrize(("name", "defines"), CASES, ids=IDS)
+def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[str, object], version: str) -> None:
+    if version == "300 es" and "GL_ARB_ES3_compatibility" not in context.extensions:
+        pytest.skip("this driver compiles no ES 3.00 on a desktop context")
+    fragment = "finish.frag" if name.endswith(".vert") else name
+    vertex = resolve("stages/fullscreen.vert", version=version)
+    with context:
+        compile_program(context, vertex, resolve(f"stages/{fragment}", version=version, defines=defines)).release()
+
+
+@pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)")
+@pytest.mark.parametrize("version", VALIDATOR)
+@pytest.mark.parametrize("name", STAGES)
+def test_the_reference_compiler_accepts_every_stage(name: str, version: str, tmp_path: Path) -> None:
+    source = resolve(f"stages/{name}", version=version, defines=DEFINES.get(name, [{}])[-1])
+    path = tmp_path / name
+    path.write_text(source.text)
+    output = ["-o", str(tmp_path / "out.spv")] if "-V" in VALIDATOR[version] else []
+    done = subprocess.run(["glslangValidator", *VALIDATOR[version], *output, str(path)], capture_output=True, text=True)
+    assert done.returncode == 0, source.locate(done.stdout)
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_file_states_its_licence_and_only_stages_have_a_main(file: str) -> None:
+    text = (ROOT / file).read_text()
+    assert text.splitlines()[0] == "// SPDX-License-Identifier: MIT"
+    is_stage = file.startswith("stages/")
+    assert bool(re.search(r"^#version", text, re.MULTILINE)) == is_stage
+    assert bool(re.search(r"\bvoid main\(", text)) == is_stage
+    assert "texture(" not in text  # implicit derivatives: undefined in loops and branches
+
+
+def test_a_pass_without_its_count_says_which_define_is_missing(context: Any) -> None:
+    with context, pytest.raises(ShaderError, match=r"combine/directional\.glsl:\d+.*SRBF_K"):
+        compile_program(context, resolve("stages/fullscreen.vert"), resolve("stages/directional.frag"))
+
+
+def test_the_readme_lists_every_file() -> None:
+    assert sorted(re.findall(r"^\| `(\w+/\w+\.\w+)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)) == FILES
+
+
+@pytest.mark.parametrize("version", ["330 core", "300 es"])
+def test_the_readme_snippet_compiles(context: Any, version: str) -> None:
+    snippet = re.search(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert snippet is not None
+    head = "precision highp float; precision highp int;\n"
+    tail = "out vec4 o;\nvoid main() { o = relitLightmap(vec2(0.5), vec3(1.0)).rgbr; }\n"
+    vertex = resolve("stages/fullscreen.vert", version=version)
+    with context:
+        compile_program(context, vertex, resolve_text(head + snippet[1] + tail, "README.md", version=version)).release()

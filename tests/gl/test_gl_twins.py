@@ -1,0 +1,273 @@
+"""Every shader function against the numpy function that its header names, on a grid."""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from srbf.asset import Asset
+from srbf.basis.gaussian import lookup, r_table
+from srbf.gl.includes import shader_root
+from srbf.gl.uniforms import lamp_uniforms, padded
+from srbf.lights import DirectionalLight, PointLight, SpotLight, attenuation, spot_cone
+from srbf.methods.relighting_map import linear_response, receiver_weights, relight
+from srbf.sphere import normalize
+
+ROOT = shader_root()
+FUNCTIONS = sorted(p.relative_to(ROOT).as_posix() for p in ROOT.rglob("*.glsl") if p.parent.name != "stages")
+HEADER = re.compile(
+    r"\A// SPDX-License-Identifier: MIT\n/\* (?P<names>srbf\w+(?:, srbf\w+)*): .+?"
+    r"^   use:    (?P<use>.+?)^   domain: (?P<domain>.+?)^   twin:   (?P<twin>[\w.]+)\n   cite:   (?P<cite>.+?) \*/\n",
+    re.DOTALL | re.MULTILINE,
+)
+
+EPS = 2.0**-23  # one step of a float32 near 1
+UNIT = 4 * EPS  # a few roundings of numbers near 1
+SUM = 1e-5  # the contract, of sum |c_i R_i|
+
+N = 97
+K = 5
+SPOT = SpotLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.7, falloff="inverse-square")
+POINT = PointLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, radius=0.7)
+
+Evaluate = Callable[..., np.ndarray]
+Twin = Callable[[Evaluate, Callable[..., Asset]], None]
+TWINS: dict[str, Twin] = {}
+
+
+def twin(file: str) -> Callable[[Twin], Twin]:
+    def register(test: Twin) -> Twin:
+        TWINS[file] = test
+        return test
+
+    return register
+
+
+def vec4(*columns: Any) -> np.ndarray:
+    """(N, 4) float32 from columns of one or three, zero at the end."""
+    out = np.column_stack(columns).astype(np.float32)
+    return np.pad(out, ((0, 0), (0, 4 - out.shape[1])))
+
+
+def units(n: int, seed: int) -> np.ndarray:
+    """Unit vectors, (n, 3), rounded to float32 as the shader sees them."""
+    return normalize(np.random.default_rng(seed).normal(size=(n, 3))).astype(np.float32)
+
+
+def lamp_expression(light: PointLight) -> str:
+    """SrbfLamp(...) with the members in the struct's order."""
+    u = lamp_uniforms(light)
+    names = ("position", "positionLow", "color", "axis", "a0", "radius", "versineInner", "versineOuter", "falloff")
+    members = [f"vec3({', '.join(map(repr, map(float, u[name])))})" for name in names[:4]]
+    members += [repr(float(u[name])) for name in names[4:8]] + [str(u["falloff"])]
+    return f"SrbfLamp({', '.join(members)})"
+
+
+@twin("basis/weight.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    for spread in (0.12, 0.45, 1.0):
+        table = r_table(spread)
+        ends = np.geomspace(1e-7, 1e-2, 20)
+        cosine = np.concatenate([np.linspace(-1.2, 1.2, 500), 1 - ends, ends - 1, [1, -1, 0]]).astype(np.float32)
+        found = evaluate("basis/weight.glsl", "vec4(srbfWeight(rTable, a.x))", vec4(cosine), images={"rTable": table[None, :, None]})
+        slope = np.abs(np.diff(table)).max() * (len(table) - 1) / 2  # steepest change with cosTheta
+        np.testing.assert_allclose(found[:, 0], lookup(table, cosine), atol=UNIT + slope * EPS / 2)
+
+
+@twin("lights/light_vector.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    rng = np.random.default_rng(1)
+    position = rng.uniform(2000, 2001, (N, 3))
+    high = position.astype(np.float32)
+    receiver = rng.uniform(2000, 2001, (N, 3)).astype(np.float32)
+    expression = "vec4(srbfLightVector(a.xyz, b.xyz, c.xyz), 0.0)"
+    found = evaluate("lights/light_vector.glsl", expression, vec4(high), vec4(position - high), vec4(receiver))[:, :3]
+    np.testing.assert_allclose(found, np.subtract(position, receiver), rtol=EPS)
+
+
+@twin("lights/light_direction.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    vectors = np.random.default_rng(2).normal(size=(N, 3)) * np.geomspace(1e-6, 1e6, N)[:, None]
+    vectors = vectors.astype(np.float32)
+    expression = "vec4(srbfLightDirection(a.xyz), 0.0)"
+    found = evaluate("lights/light_direction.glsl", expression, vec4(np.vstack([vectors, np.zeros(3)])))[:, :3]
+    np.testing.assert_allclose(found[:-1], normalize(vectors), atol=UNIT)
+    assert (found[-1] == 0).all()
+
+
+@twin("lights/versine.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    a, b = units(N, 3), units(N, 4)
+    b[:40] = normalize(a[:40] + b[:40] * np.geomspace(1e-6, 1e-1, 40)[:, None])
+    b[40] = -a[40]
+    a[41] = 0
+    expected = 1 - np.einsum("nc,nc->n", a.astype(float), b.astype(float))
+    found = evaluate("lights/versine.glsl", "vec4(srbfVersine(a.xyz, b.xyz))", vec4(a), vec4(b))[:, 0]
+    np.testing.assert_allclose(found, expected, atol=UNIT)
+    lengths = (np.linalg.norm(a.astype(float), axis=1), np.linalg.norm(b.astype(float), axis=1))
+    exact = (0.5 * ((a.astype(float) / np.maximum(lengths[0], 1e-9)[:, None] - b / lengths[1][:, None]) ** 2).sum(axis=1))[:40]
+    chord = np.sqrt(2 * exact)
+    np.testing.assert_array_less(np.abs(found[:40] - exact), UNIT * chord + UNIT**2)  # relative to the chord, not to 1
+
+
+@twin("lights/attenuation.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    distance = np.concatenate([[0], np.geomspace(1e-5, 1e4, N - 1)]).astype(np.float32)
+    for i, falloff in enumerate(("linear", "inverse-square")):
+        light = PointLight((0.0, 0.0, 0.0), a0=0.75, radius=0.125, falloff=falloff)  # type: ignore[arg-type]
+        found = evaluate("lights/attenuation.glsl", f"vec4(srbfAttenuation(a.x, 0.75, 0.125, {i}))", vec4(distance))[:, 0]
+        np.testing.assert_allclose(found, attenuation(distance.astype(float), light), rtol=UNIT)
+
+
+@twin("lights/spot_cone.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    versine = np.linspace(0, 2, 400).astype(np.float32)
+    for inner, outer in ((0.25, 0.5), (0.0, 2.0), (0.0078125, 0.03125), (0.4, 0.4)):
+        expression = f"vec4(srbfSpotCone(a.x, {inner!r}, {outer!r}))"
+        found = evaluate("lights/spot_cone.glsl", expression, vec4(versine))[:, 0]
+        expected = spot_cone(1 - versine.astype(float), 1 - inner, 1 - outer)
+        np.testing.assert_allclose(found, expected, atol=UNIT * outer / max(outer - inner, 1e-2))
+    assert (evaluate("lights/spot_cone.glsl", "vec4(srbfSpotCone(a.x, 3.0, 4.0))", vec4(versine)) == 1).all()
+
+
+@twin("lights/lamp_strength.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K)
+    positions = np.random.default_rng(6).uniform(-1, 1, (N, 3)).astype(np.float32)
+    for light in (POINT, SPOT, replace(SPOT, falloff="linear", inner=0.0, outer=np.pi)):
+        vectors = (np.array(light.position) - positions).astype(np.float32)
+        expression = f"vec4(srbfLampStrength({lamp_expression(light)}, a.xyz))"
+        found = evaluate("lights/lamp_strength.glsl", expression, vec4(vectors))[:, 0]
+        _, expected = receiver_weights(asset, light, positions)
+        strongest = attenuation(np.linalg.norm(vectors, axis=1), light)
+        np.testing.assert_array_less(np.abs(found - expected), SUM * strongest)
+
+
+@twin("combine/decode.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    for i in range(K):
+        stored, scale, bias = asset.stored[i, 0] / 255, asset.scale[i], asset.bias[i]
+        rows = [vec4(np.broadcast_to(x, (N, 3))) for x in (stored, scale, bias)]
+        found = evaluate("combine/decode.glsl", "vec4(srbfDecode(a.rgb, b.rgb, c.rgb), 0.0)", *rows)[:, :3]
+        expected = asset.coefficients()[i, 0]
+        np.testing.assert_allclose(found, expected, atol=UNIT * float((scale + np.abs(bias)).max()))
+
+
+def _uploads(asset: Asset) -> dict[str, Any]:
+    """Everything that the combining functions read, for one row of N receivers, decoded from floats that are stored / 255."""
+    return {
+        "images": {"maps": asset.stored.astype(np.float32) / 255, "rTable": asset.table[None, :, None]},
+        "arrays": {"scale": padded(asset.scale), "bias": padded(asset.bias), "centers": padded(asset.basis.centers)},
+        "defines": {"SRBF_K": asset.k},
+        "declarations": "uniform vec4 scale[SRBF_K]; uniform vec4 bias[SRBF_K]; uniform vec4 centers[SRBF_K];",
+    }
+
+
+def _sizes(asset: Asset) -> np.ndarray:
+    """|stored scale| + |bias| of every coefficient, (K, N, 3): what decoding may round."""
+    bias = np.abs(asset.bias[:, None])
+    return np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + bias
+
+
+def _directional(evaluate: Evaluate, asset: Asset, file: str, function: str) -> None:
+    lights = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
+    uploads = _uploads(asset)
+    directions = np.array([light.direction for light in lights])
+    weights = lookup(asset.table, asset.basis.centers @ directions.T) @ np.array([light.color for light in lights])
+    uploads["arrays"]["weights"] = padded(weights)
+    del uploads["arrays"]["centers"]
+    uploads["declarations"] += " uniform vec4 weights[SRBF_K];"
+    found = evaluate(file, f"vec4({function}(maps, uv, 0, weights, scale, bias), 0.0)", vec4(np.zeros(N)), **uploads)[:, :3]
+    bound = np.einsum("kc,knc->nc", weights, _sizes(asset))
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, lights)[0]), SUM * bound)
+
+
+@twin("combine/directional.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    _directional(evaluate, make_asset(K, "uint8", 1, N), "combine/directional.glsl", "srbfCombineDirectional")
+
+
+@twin("combine/point.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    positions = asset.images["position"][0]
+    directions = normalize(np.array(POINT.position) - positions)
+    expression = "vec4(srbfCombinePoint(maps, uv, 0, rTable, a.xyz, centers, scale, bias), 0.0)"
+    found = evaluate("combine/point.glsl", expression, vec4(directions), **_uploads(asset))[:, :3]
+    weights, _ = receiver_weights(asset, POINT, positions)
+    expected = np.einsum("knc,nk->nc", asset.coefficients()[:, 0], weights)
+    np.testing.assert_array_less(np.abs(found - expected), SUM * np.einsum("knc,nk->nc", _sizes(asset), weights))
+
+
+@twin("combine/finish.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    """On an asset of one map whose R is read at its center, relight is the clamp and the ambient alone."""
+    asset = make_asset(1, "float", 1, N, ambient=True)
+    lights = [DirectionalLight(tuple(asset.basis.centers[0].tolist()))]
+    rows = vec4(linear_response(asset, lights)[0]), vec4(asset.images["ambient"][0])
+    found = evaluate("combine/finish.glsl", "vec4(srbfFinish(a.rgb, b.rgb), 0.0)", *rows)[:, :3]
+    assert (found == relight(asset, lights)[0]).all()
+    assert (linear_response(asset, lights) < 0).any()
+
+
+@twin("methods/relighting_map.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset, file = make_asset(K, "uint8", 1, N), "methods/relighting_map.glsl"
+    _directional(evaluate, asset, file, "srbfRelightDirectional")
+    positions = asset.images["position"][0]
+    for light in (POINT, SPOT):
+        expression = f"vec4(srbfRelightPoint(maps, uv, 0, rTable, centers, scale, bias, a.xyz, {lamp_expression(light)}), 0.0)"
+        found = evaluate(file, expression, vec4(positions), **_uploads(asset))[:, :3]
+        weights, _ = receiver_weights(asset, light, positions)
+        strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)
+        bound = np.einsum("knc,nk->nc", _sizes(asset), weights * strength[:, None]) * light.color
+        np.testing.assert_array_less(np.abs(found - linear_response(asset, [light])[0]), SUM * bound)
+
+
+@pytest.mark.parametrize("file", FUNCTIONS)
+def test_the_shader_function_equals_its_twin(file: str, evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    assert file in TWINS, f"{file} has no twin test: register one here"
+    TWINS[file](evaluate, make_asset)
+
+
+def test_every_twin_test_has_its_file() -> None:
+    assert set(TWINS) <= set(FUNCTIONS)
+    assert len(FUNCTIONS) >= 12
+
+
+@pytest.mark.parametrize("file", FUNCTIONS)
+def test_the_header_names_its_function_and_an_importable_twin(file: str) -> None:
+    text = (ROOT / file).read_text()
+    header = HEADER.match(text)
+    assert header is not None, f"{file}: expected a header with use, domain, twin, cite in this order"
+    names = header["names"].split(", ")
+    body = text[header.end() :]
+    defined = re.findall(r"^(?:float|vec\d|int|void|mat\d)\s+(\w+)\(", body, re.MULTILINE)
+    assert defined == names
+    for name in names:
+        assert f" {name}(" in header["use"]
+    if not file.startswith("methods/"):
+        snake = re.sub(r"(?<!^)(?=[A-Z])", "_", names[0].removeprefix("srbf")).lower()
+        assert len(names) == 1
+        assert snake in (file.split("/")[1].removesuffix(".glsl"), "combine_" + file.split("/")[1].removesuffix(".glsl"))
+    assert callable(_import(header["twin"]))
+
+
+def _import(dotted: str) -> Any:
+    parts = dotted.split(".")
+    for split in range(len(parts) - 1, 0, -1):
+        try:
+            found: Any = importlib.import_module(".".join(parts[:split]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[split:]:
+            found = getattr(found, part)
+        return found
+    raise AssertionError(f"no module of {dotted} imports")
