@@ -1,0 +1,152 @@
+"""Rebinning made visible: the images of a capture as tiles, each an ABRDF over the light directions [Wong2005, fig. 1, 4].
+
+A tile belongs to one receiver or to the mean over a block of them; a sparse `(G, P)` matrix says which. Its pixels are light
+directions: a disc looked down on from +z with x to the right and y up, or the whole sphere by latitude and longitude.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy import ndarray
+from scipy.sparse import csr_array
+from scipy.spatial import KDTree
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.basis.gaussian import lookup
+from srbf.capture import COVERED, Capture
+from srbf.errors import InputError
+
+Projection = Literal["equal-area", "orthographic", "latitude-longitude"]
+CHUNK = 1 << 16  # receivers whose coefficients are decoded at a time
+
+
+def tile_directions(size: int, projection: Projection) -> Float64[ndarray, "h w 3"]:
+    """Unit light direction of every pixel of a tile, row 0 at the top; NaN outside the disc.
+
+    `equal-area` (Lambert's azimuthal, every solid angle keeps its share) and `orthographic` show the hemisphere z > 0 on
+    (size, size) pixels; `latitude-longitude` the sphere on (size, 2 size), u = 1/2 - atan2(y, x) / 2 pi and +z on top, as
+    environment maps have it. InputError on another projection or a size below 1.
+    """
+    if size < 1:
+        raise InputError(f"expected a tile of 1 pixel or more, found {size}")
+    if projection == "latitude-longitude":
+        polar = (np.arange(size) + 0.5) * (np.pi / size)
+        azimuth = (0.5 - (np.arange(2 * size) + 0.5) / (2 * size)) * (2 * np.pi)
+        sine = np.sin(polar)[:, None]
+        z = np.repeat(np.cos(polar)[:, None], 2 * size, axis=1)
+        return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), z], axis=2)
+    x = (2 * np.arange(size) + 1) / size - 1
+    x, y = np.meshgrid(x, -x)
+    square = np.where(x * x + y * y <= 1, x * x + y * y, np.nan)
+    if projection == "orthographic":
+        return np.stack([x + 0 * square, y + 0 * square, np.sqrt(1 - square)], axis=2)
+    if projection == "equal-area":
+        stretch = np.sqrt(2 - square)
+        return np.stack([x * stretch, y * stretch, 1 - square], axis=2)
+    raise InputError(f"expected a projection of equal-area, orthographic, latitude-longitude, found {projection!r}")
+
+
+def disc_points(directions: Float64[ndarray, "N 3"]) -> Float64[ndarray, "N 2"]:
+    """Where directions fall on the equal-area disc of radius 1; what lies below the horizon is mirrored up first."""
+    directions = np.asarray(directions, np.float64)
+    return directions[:, :2] / np.sqrt(1 + np.abs(directions[:, 2:]))
+
+
+def grid_for(height: int, width: int, tiles: int = 432) -> tuple[int, int]:
+    """(rows, columns) of about `tiles` nearly square blocks, never more than there are receivers."""
+    columns = max(1, round(np.sqrt(tiles * width / height)))
+    rows = max(1, round(tiles / columns))
+    return min(rows, height), min(columns, width)
+
+
+def block_means(coverage: Float32[ndarray, "H W"], grid: tuple[int, int]) -> csr_array:
+    """(G, P) matrix that averages each of grid = (rows, columns) blocks over its covered receivers, weighted by coverage.
+
+    Block edges fall on whole texels. A block without covered receivers is an empty row. A grid of (H, W) is one tile a receiver.
+    InputError where a block would hold no texel.
+    """
+    height, width = coverage.shape
+    if not (1 <= grid[0] <= height and 1 <= grid[1] <= width):
+        raise InputError(f"expected a grid of 1 to {height} rows and 1 to {width} columns, found {grid[0]}x{grid[1]}")
+    row = np.arange(height) * grid[0] // height
+    column = np.arange(width) * grid[1] // width
+    block = (row[:, None] * grid[1] + column).ravel()
+    share = np.where(coverage >= COVERED, coverage, 0).ravel().astype(np.float64)
+    total = np.bincount(block, share, grid[0] * grid[1])
+    receivers = np.flatnonzero(share)
+    values = (share[receivers] / total[block[receivers]]).astype(np.float32)
+    return csr_array((values, (block[receivers], receivers)), shape=(grid[0] * grid[1], height * width))
+
+
+def single_receivers(receivers: Sequence[int] | ndarray, count: int) -> csr_array:
+    """(G, P) matrix that picks single receivers by their flat index among `count`."""
+    receivers = np.asarray(receivers, np.int64)
+    return csr_array((np.ones(len(receivers), np.float32), (np.arange(len(receivers)), receivers)), shape=(len(receivers), count))
+
+
+def tile_count(tiles: csr_array) -> int:
+    """G, the rows of a matrix from receivers to tiles."""
+    return len(tiles.indptr) - 1
+
+
+def rebin(capture: Capture, indices: Sequence[int], tiles: csr_array) -> Float32[ndarray, "L G 3"]:
+    """What each tile answers to each of the lights `indices`: (G, P) times T, read in blocks of images, never held whole.
+
+    NaN for a tile of no receivers.
+    """
+    answers = np.empty((len(indices), tile_count(tiles), 3), np.float32)
+    for first, block in capture.blocks(indices):
+        for i, image in enumerate(block):
+            answers[first + i] = tiles @ image
+    answers[:, _empty(tiles)] = np.nan
+    return answers
+
+
+def captured_tiles(
+    answers: Float32[ndarray, "L G 3"], lights: Float64[ndarray, "L 3"], directions: Float64[ndarray, "h w 3"]
+) -> Float32[ndarray, "G h w 3"]:
+    """Tiles whose pixel holds the answer to the nearest light; NaN where `directions` are, outside the disc [Wong2005, fig. 1]."""
+    inside = np.isfinite(directions[..., 0])
+    nearest = KDTree(lights).query(directions[inside])[1]  # the nearest chord is the nearest angle
+    result = np.full((answers.shape[1], *inside.shape, 3), np.nan, np.float32)
+    result[:, inside] = answers[nearest].transpose(1, 0, 2)
+    return result
+
+
+def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h w 3"]) -> Float32[ndarray, "G h w 3"]:
+    """The same tiles from the fit: sum of c_i R_i at each pixel's own direction, signed, before the clamp [Wong2005, eq. 1, fig. 4].
+
+    The sum is linear in c, so a block's coefficients are averaged once and K (not P) numbers make a tile.
+    """
+    columns = tiles.tocsc()
+    means = np.zeros((tile_count(tiles), asset.k * 3), np.float32)
+    rows_at_a_time = max(1, CHUNK // asset.width)
+    for start in range(0, asset.height, rows_at_a_time):
+        c = asset.coefficients(slice(start, start + rows_at_a_time))  # (K, h, W, 3)
+        receivers = slice(start * asset.width, start * asset.width + c.shape[1] * c.shape[2])
+        means += columns[:, receivers] @ c.transpose(1, 2, 0, 3).reshape(-1, asset.k * 3)
+    means[_empty(tiles)] = np.nan
+    inside = np.isfinite(directions[..., 0])
+    weights = lookup(asset.table, directions[inside] @ asset.basis.centers.T).astype(np.float32)  # (N, K)
+    result = np.full((tile_count(tiles), *inside.shape, 3), np.nan, np.float32)
+    result[:, inside] = weights @ means.reshape(-1, asset.k, 3)
+    return result
+
+
+def mosaic(tiles: Float32[ndarray, "G h w 3"], grid: tuple[int, int], gap: int = 1) -> Float32[ndarray, "H W 3"]:
+    """Tiles laid out as their blocks lie in the image, `gap` pixels of NaN between them."""
+    rows, columns = grid
+    _, h, w, _ = tiles.shape
+    sheet = np.full((rows, h + gap, columns, w + gap, 3), np.nan, np.float32)
+    sheet[:, :h, :, :w] = tiles.reshape(rows, columns, h, w, 3).transpose(0, 2, 1, 3, 4)
+    return np.ascontiguousarray(
+        sheet.reshape(rows * (h + gap), columns * (w + gap), 3)[: rows * (h + gap) - gap, : columns * (w + gap) - gap]
+    )
+
+
+def _empty(tiles: csr_array) -> ndarray:
+    return np.diff(tiles.indptr) == 0

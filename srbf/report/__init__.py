@@ -1,0 +1,86 @@
+"""A report on an asset against the capture that it came from: pictures to look at, and a page that holds them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.errors import InputError, MissingLibraryError
+from srbf.lights import Light
+from srbf.report.contact_sheet import contact_sheet
+from srbf.report.maps import sum_of_maps
+from srbf.report.page import write_page
+from srbf.report.point_light import point_light
+from srbf.report.sphere import centers, error_by_light, r_curve
+from srbf.report.strips import animation, point_strip, spot_strip
+from srbf.report.subject import Picture, Subject, gather
+from srbf.report.tiles import abrdf_tiles
+
+MAPS, POSITION = "maps", "position"  # what a picture needs of the asset
+Draw = Callable[[Subject, Path], Picture]
+WITHOUT = {
+    MAPS: "Not drawn: this picture shows the terms of a relighting map, and the asset is of another method.",
+    POSITION: "Not drawn: the asset has no position map (photographs never have one), and a lamp needs to know where receivers are.",
+}
+DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, how, what it needs
+    ("contact_sheet.png", "Reference against relit", contact_sheet, ()),
+    ("animation.webp", "In motion", animation, ()),
+    ("sum_of_maps.png", "A sum of maps", sum_of_maps, (MAPS,)),
+    ("point_light.png", "A point light", point_light, (MAPS, POSITION)),
+    ("point_strip.png", "Point lights", point_strip, (POSITION,)),
+    ("spot_strip.png", "Spot lights", spot_strip, (POSITION,)),
+    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, (MAPS,)),
+    ("error_by_light.png", "Error by light", error_by_light, ()),
+    ("centers.png", "Centers and lights", centers, (MAPS,)),
+    ("r_curve.png", "The curve R", r_curve, (MAPS,)),
+)
+WRITTEN = (*(file for file, *_ in DRAWN), "animation.gif", "report.md", "index.html")
+
+
+def write_report(
+    asset: Asset,
+    capture: Capture,
+    folder: Path | str,
+    *,
+    evaluation: dict[str, Any],
+    timings: Mapping[str, float] | None = None,
+    demo_lights: Sequence[Light] | None = None,
+    asset_folder: Path | None = None,
+) -> Path:
+    """Write pictures, report.md and index.html into `folder`, and return the path of index.html.
+
+    `evaluation` is what `srbf.evaluation.evaluate` gave for this asset and capture; `timings` are seconds by step;
+    `demo_lights` the point and spot lights to show instead of derived ones (lights of other kinds are not drawn);
+    `asset_folder` is where the asset was saved, for its size. Files of an earlier report in `folder` are replaced.
+    What an asset lacks is left out with a sentence on the page. InputError where sizes or lights do not match,
+    MissingLibraryError without matplotlib.
+    """
+    folder = Path(folder)
+    if (asset.width, asset.height) != (capture.width, capture.height):
+        found = f"{capture.width}x{capture.height}"
+        raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {found}")
+    if {entry["file"] for entry in evaluation.get("lights", [])} != {light.file for light in capture.lights}:
+        raise InputError(f"expected an evaluation of the {len(capture.lights)} lights of {capture.folder}, found another's; evaluate again")
+    files.make_folder(folder)
+    for name in WRITTEN:
+        (folder / name).unlink(missing_ok=True)
+    subject = gather(asset, capture, evaluation, demo_lights)
+    pictures = [_draw(subject, folder, *entry) for entry in DRAWN]
+    return write_page(subject, folder, pictures, timings, asset_folder)
+
+
+def _draw(subject: Subject, folder: Path, file: str, title: str, draw: Draw, needs: tuple[str, ...]) -> Picture:
+    has = {MAPS: subject.asset.method == "relighting-map", POSITION: bool(subject.points)}
+    for need in needs:
+        if not has[need]:
+            return Picture(file, title, WITHOUT[need], omitted=True)
+    if draw is animation:
+        try:
+            return draw(subject, folder)
+        except MissingLibraryError as error:
+            return Picture(file, title, f"Not drawn: {error}.", omitted=True)
+    return draw(subject, folder)

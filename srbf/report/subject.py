@@ -1,0 +1,93 @@
+"""What a report is about, gathered once: the lights to compare at, their references, one exposure and the demonstration lamps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float, Float32, Float64
+from srbf.asset import Asset
+from srbf.capture import ROLES, Capture, Role
+from srbf.evaluation import COVERED, psnr
+from srbf.lights import Light, PointLight, SpotLight
+from srbf.methods import directional_responses
+from srbf.report.lamps import demonstration_lamps
+
+SHOWN = 6  # unseen directions compared
+EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # that quantile of the references is shown at this linear level
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture of the report and its caption; `omitted` where the caption says why there is none."""
+
+    file: str
+    title: str
+    caption: str
+    omitted: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """Asset, capture and evaluation; `covered` (H, W) bool; the `shown` lights of `role`, their references, and `gain`."""
+
+    asset: Asset
+    capture: Capture
+    evaluation: dict[str, Any]
+    covered: ndarray
+    role: Role
+    shown: tuple[int, ...]
+    references: Float32[ndarray, "S H W 3"]
+    relit: Float32[ndarray, "S H W 3"]
+    gain: float
+    points: tuple[PointLight, ...]
+    spots: tuple[SpotLight, ...]
+
+    def direction(self, row: int) -> Float64[ndarray, " 3"]:
+        """Unit direction of the row-th shown light."""
+        return np.array(self.capture.lights[self.shown[row]].direction)
+
+    def psnr_of(self, index: int) -> float:
+        """PSNR (dB) of one light, with the evaluation's peak."""
+        light = self.capture.lights[index]
+        rmse = next(entry["rmse"] for entry in self.evaluation["lights"] if entry["file"] == light.file)
+        return psnr(self.evaluation[light.role]["peak"], rmse)
+
+    @property
+    def role_words(self) -> str:
+        """What the compared directions are, for captions."""
+        return {
+            "holdout": "unseen (holdout) directions",
+            "validation": "validation directions (this capture has no holdout lights)",
+            "train": "train directions, which the fit has seen (this capture has neither holdout nor validation lights)",
+        }[self.role]
+
+
+def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_lights: Sequence[Light] | None) -> Subject:
+    """Choose spread-out lights of the least seen role there is, read their references and relight them without ambient."""
+    role: Role = next(r for r in ROLES[::-1] if capture.indices(r))
+    indices = capture.indices(role)
+    directions = capture.directions(indices)
+    chosen = [indices[i] for i in farthest_points(directions, SHOWN)]
+    chosen.sort(key=lambda i: -capture.lights[i].direction[2])
+    covered = capture.coverage() >= COVERED
+    references = np.stack([capture.image(i) for i in chosen])
+    relit = np.maximum(directional_responses(asset, capture.directions(chosen)), 0)
+    level = float(np.quantile(references[:, covered], EXPOSURE_QUANTILE)) if covered.any() else 0.0
+    gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
+    points, spots = demonstration_lamps(asset, covered, demo_lights)
+    return Subject(asset, capture, evaluation, covered, role, tuple(chosen), references, relit, gain, points, spots)
+
+
+def farthest_points(points: Float[ndarray, "N D"], count: int) -> list[int]:
+    """At most `count` indices, greedily the farthest from those taken; starts at the largest last coordinate. N x count work."""
+    taken = [int(np.argmax(points[:, -1]))]
+    distance = np.linalg.norm(points - points[taken[0]], axis=1)
+    while len(taken) < min(count, len(points)):
+        taken.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[taken[-1]], axis=1))
+    return taken
