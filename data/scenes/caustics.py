@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A table with glass on it: two glass rings and a tinted, half transparent angel, beside one opaque pawn.
+
+The lightmap of the object `Table` (one quad, top at z = 0, UV layer = [0, 1]², u along +x, v along +y) answers a sun
+with caustics, coloured shadows and one crisp shadow, after the scene "caustics" of [Wong2005, fig. 7].
+
+    python data/scenes/caustics.py OUT.blend
+"""
+
+import sys
+from math import cos, pi, radians, sin
+
+import bpy
+from mathutils import Euler, Matrix, Vector
+
+TABLE_SIDE = 2.0  # m
+TABLE_HEIGHT = 0.74  # m, the floor lies this far below the table's top
+
+# ---- shapes: every one is a list of rings of points, skinned with quads -----------------------------------------
+
+
+def circle(radius, z, segments, fold=0.0, folds=0):
+    """Points on a circle about the z axis whose radius swings by ±fold, `folds` times a turn."""
+    angles = (2 * pi * i / segments for i in range(segments))
+    return [Vector((cos(a), sin(a), 0)) * (radius + fold * cos(folds * a)) + Vector((0, 0, z)) for a in angles]
+
+
+def outline(text):
+    """Points (radius, height) in metres from "radius height, ..." in centimetres."""
+    return [tuple(float(n) / 100 for n in pair.split()) for pair in text.split(",")]
+
+
+def lathe(profile, segments):
+    """Rings of a profile of (radius, z) turned about the z axis."""
+    return [circle(radius, z, segments) for radius, z in profile]
+
+
+def ball(radius, segments=24):
+    """Rings of a sphere about the origin; the poles are tiny caps."""
+    steps = segments // 2
+    angles = [pi * (i + 0.02) / (steps + 0.04) for i in range(steps + 1)]
+    return lathe([(radius * sin(a), -radius * cos(a)) for a in angles], segments)
+
+
+def torus(major, minor, segments=96, sides=32):
+    """Rings of a torus about the z axis, faces out (glass inside out refracts wrong); skin it `closed`."""
+    rings = []
+    for i in range(segments):
+        turn = Matrix.Rotation(2 * pi * i / segments, 3, "Z")
+        angles = (2 * pi * j / sides for j in range(sides))
+        rings.append([turn @ Vector((major + minor * cos(a), 0, -minor * sin(a))) for a in angles])
+    return rings
+
+
+def tube(path, radii, segments=12):
+    """Rings of a tube along a path of points."""
+    rings = []
+    for i, (point, radius) in enumerate(zip(path, radii, strict=True)):
+        along = path[min(i + 1, len(path) - 1)] - path[max(i - 1, 0)]
+        turn = along.to_track_quat("Z", "Y")
+        rings.append([point + turn @ p for p in circle(radius, 0, segments)])
+    return rings
+
+
+def moved(rings, matrix):
+    return [[matrix @ p for p in ring] for ring in rings]
+
+
+def mesh_object(name, parts, material, closed=False, smooth=True):
+    """One mesh object of several skinned parts. `closed`: the last ring joins the first, else both ends are capped."""
+    points, faces = [], []
+    for rings in parts:
+        base, n = len(points), len(rings[0])
+        points += [p for ring in rings for p in ring]
+        for i in range(len(rings) if closed else len(rings) - 1):
+            a, b = base + i * n, base + (i + 1) % len(rings) * n
+            faces += [(a + j, a + (j + 1) % n, b + (j + 1) % n, b + j) for j in range(n)]
+        if not closed:
+            faces += [tuple(range(base + n - 1, base - 1, -1)), tuple(range(len(points) - n, len(points)))]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata([tuple(p) for p in points], [], faces)
+    mesh.polygons.foreach_set("use_smooth", [smooth] * len(faces))
+    mesh.materials.append(material)
+    thing = bpy.data.objects.new(name, mesh)
+    bpy.context.scene.collection.objects.link(thing)
+    return thing
+
+
+# ---- materials --------------------------------------------------------------------------------------------------
+
+
+def new_material(name):
+    """An empty material with its output: (material, tree, the output's surface socket)."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:  # always there from Blender 5.0 on
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    return material, tree, tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"]
+
+
+def node(tree, kind, **inputs):
+    """A node whose named inputs are values, or sockets to link."""
+    made = tree.nodes.new(f"ShaderNode{kind}")
+    for name, value in inputs.items():
+        socket = made.inputs[name]
+        if isinstance(value, bpy.types.NodeSocket):
+            tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+    return made
+
+
+def glass(name, color, ior, blur, clear=0.0):
+    """Glass; the share `clear` lets light through unbent, so that it tints shadows without noise.
+
+    Smooth to the eye, of roughness `blur` (alpha = its square) behind a diffuse bounce: rough glass is what next event
+    estimation can connect to a sun of angle 0. Filter Glossy means the same, but blurs so far (alpha ≥ 0.4) that the
+    foci drown.
+    """
+    material, tree, surface = new_material(name)
+    roughness = node(tree, "Math")
+    roughness.operation = "MINIMUM"
+    roughness.inputs[1].default_value = blur
+    tree.links.new(node(tree, "LightPath").outputs["Diffuse Depth"], roughness.inputs[0])
+    bent = node(tree, "BsdfGlass", Color=(*color, 1), Roughness=roughness.outputs[0], IOR=ior)
+    unbent = node(tree, "BsdfTransparent", Color=(*color, 1))
+    mix = node(tree, "MixShader", Fac=clear)
+    tree.links.new(bent.outputs[0], mix.inputs[1])
+    tree.links.new(unbent.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], surface)
+    return material
+
+
+def solid(name, color, roughness, metallic=0.0):
+    material, tree, surface = new_material(name)
+    looks = {"Base Color": (*color, 1), "Roughness": roughness, "Metallic": metallic}
+    tree.links.new(node(tree, "BsdfPrincipled", **looks).outputs[0], surface)
+    return material
+
+
+def grained(name, light, dark, stretch, diffuse=False):
+    """Wood: noise stretched along y in object space, as a diffuse or a slightly glossy surface."""
+    material, tree, surface = new_material(name)
+    place = node(tree, "Mapping", Vector=node(tree, "TexCoord").outputs["Object"], Scale=stretch)
+    noise = node(tree, "TexNoise", Vector=place.outputs[0], Scale=2.0, Detail=5.0, Distortion=0.6)
+    ramp = node(tree, "ValToRGB", Fac=noise.outputs[0])
+    ramp.color_ramp.elements[0].position, ramp.color_ramp.elements[0].color = 0.3, (*dark, 1)
+    ramp.color_ramp.elements[1].position, ramp.color_ramp.elements[1].color = 0.7, (*light, 1)
+    if diffuse:
+        shader = node(tree, "BsdfDiffuse", Color=ramp.outputs[0])
+    else:
+        shader = node(tree, "BsdfPrincipled", **{"Base Color": ramp.outputs[0], "Roughness": 0.4})
+    tree.links.new(shader.outputs[0], surface)
+    return material
+
+
+# ---- the things -------------------------------------------------------------------------------------------------
+
+
+def add_table():
+    """The receiver: one quad. Its border and legs are another object, flush below it."""
+    h = TABLE_SIDE / 2
+    mesh = bpy.data.meshes.new("Table")
+    mesh.from_pydata([(-h, -h, 0), (h, -h, 0), (h, h, 0), (-h, h, 0)], [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new(name="lightmap").data.foreach_set("uv", [0, 0, 1, 0, 1, 1, 0, 1])
+    mesh.materials.append(grained("Maple", (0.80, 0.74, 0.64), (0.72, 0.63, 0.51), (9, 0.8, 1), diffuse=True))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Table", mesh))
+
+    walnut = grained("Walnut", (0.20, 0.10, 0.05), (0.10, 0.045, 0.02), (6, 1, 6))
+    rim = [(h, -0.002), (h + 0.03, -0.002), (h + 0.04, -0.015), (h + 0.03, -0.035), (h - 0.02, -0.06), (h - 0.1, -0.06)]
+    square = [Vector((x, y, 0)) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    slab = [[p * r + Vector((0, 0, z)) for p in square] for r, z in reversed(rim)]
+    mesh_object("TableSlab", [slab], walnut, smooth=False)
+    bottom = 0.01 - TABLE_HEIGHT
+    turned = [(0.028, bottom), *outline("4 -60, 3 -57, 4.5 -54, 5.5 -25, 3.5 -20, 5.5 -17, 5.5 -5")]
+    corners = [Matrix.Translation(p * (h - 0.12)) for p in square]
+    mesh_object("TableLegs", [moved(lathe(turned, 16), m) for m in corners], walnut)
+
+
+def add_rings():
+    """One glass ring lies flat, another stands and leans."""
+    clear = glass("ClearGlass", (0.97, 0.99, 0.98), 1.5, blur=0.38)
+    flat = mesh_object("Ring", [torus(0.30, 0.075)], clear, closed=True)
+    flat.location = (0.36, -0.38, 0.0755)
+    aqua = glass("AquaGlass", (0.76, 0.96, 0.97), 1.5, blur=0.38)
+    tilted = mesh_object("LeaningRing", [torus(0.17, 0.045, 80, 24)], aqua, closed=True)
+    tilted.rotation_euler = Euler((radians(68), 0, radians(35)))
+    tilted.location = (-0.52, -0.40, 0.17 * sin(radians(68)) + 0.0455)
+
+
+def feather(angle, length, side):
+    """A long flat ellipsoid from the shoulder, `angle` above the horizon."""
+    lobe = moved(ball(0.5, 16), Matrix.Diagonal((length, 0.03, 0.13, 1)) @ Matrix.Rotation(pi / 2, 4, "Y"))
+    out = Matrix.Rotation(-angle, 4, "Y") @ Matrix.Translation((length / 2, 0, 0))
+    sweep = Matrix.Rotation(radians(22), 4, "Z")
+    wing = moved(lobe, Matrix.Translation((0.03, 0.05, 0.50)) @ sweep @ out)
+    return wing if side > 0 else [ring[::-1] for ring in moved(wing, Matrix.Diagonal((-1, 1, 1, 1)))]  # normals out
+
+
+def add_angel(place):
+    """A robed figure 0.75 m high with two fanned wings, a halo and a pedestal."""
+    amber = glass("AmberGlass", (0.98, 0.62, 0.30), 1.35, blur=0.55, clear=0.5)
+    azure = glass("AzureGlass", (0.55, 0.68, 0.98), 1.25, blur=0.55, clear=0.6)
+    gold = solid("Gold", (0.95, 0.68, 0.28), 0.25, metallic=1.0)
+    profile = outline("15.5 5, 15 10, 12.5 20, 9.8 30, 7.8 38, 7.4 42, 8.6 48, 8.8 52")
+    robe = [circle(r, z, 72, 0.016 * max(0, 1 - z / 0.42), 9) for r, z in profile]
+    robe += lathe(outline("7 55.5, 3.2 57.5, 2.8 60"), 72)
+    head = moved(ball(0.062), Matrix.Translation((0, -0.006, 0.655)) @ Matrix.Diagonal((0.9, 1, 1.12, 1)))
+    parts = [robe, head]
+    for side in (-1, 1):
+        shoulder, elbow, wrist, hand = (
+            (0.08, 0.0, 0.515),
+            (0.118, -0.05, 0.42),
+            (0.06, -0.12, 0.42),
+            (0.012, -0.13, 0.47),
+        )
+        path = [Vector((side * x, y, z)) for x, y, z in (shoulder, elbow, wrist, hand)]
+        parts.append(tube(path, (0.03, 0.036, 0.026, 0.016)))
+    body = mesh_object("Angel", parts, amber)
+    fan = [(radians(62 - 21 * i), 0.46 - 0.045 * abs(i - 1)) for i in range(6)]
+    wings = mesh_object("AngelWings", [feather(a, length, s) for s in (-1, 1) for a, length in fan], azure)
+    halo = mesh_object("AngelHalo", [torus(0.075, 0.008, 48, 10)], gold, closed=True)
+    halo.matrix_basis = Matrix.Translation((0, 0.02, 0.765)) @ Matrix.Rotation(radians(12), 4, "X")
+    foot = mesh_object("AngelFoot", [lathe(outline("19 0.05, 19 2, 18 3, 17.5 4.8"), 48)], gold)
+    for part in (body, wings, halo, foot):
+        part.matrix_basis = place @ part.matrix_basis
+
+
+def add_crystal_ball():
+    """Solid glass: a sun 30° to 90° high comes to a focus on the table right beside it."""
+    ball_object = mesh_object("CrystalBall", [ball(0.17, 56)], glass("Crystal", (0.99, 0.985, 0.96), 1.5, blur=0.4))
+    ball_object.location = (0.56, 0.38, 0.1705)
+
+
+def add_pawn():
+    """The opaque thing: a dark pawn with a crisp shadow."""
+    profile = outline("8.5 0.05, 8.8 2, 7.5 3.5, 5.5 5, 4 9, 3.2 15, 3.4 17.5, 5.8 18.5, 3 20")
+    top = moved(ball(0.056), Matrix.Translation((0, 0, 0.245)))
+    pawn = mesh_object("Pawn", [lathe(profile, 40), top], solid("Ebony", (0.035, 0.02, 0.022), 0.25))
+    pawn.location = (-0.10, -0.62, 0)
+
+
+# ---- the scene --------------------------------------------------------------------------------------------------
+
+
+def add_camera(location, target, lens):
+    data = bpy.data.cameras.new("Camera")
+    data.lens = lens
+    camera = bpy.data.objects.new("Camera", data)
+    camera.location = location
+    camera.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+
+
+def add_daylight(direction, strength):
+    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy, data.angle, data.color = strength, radians(0.5), (1.0, 0.93, 0.82)
+    sun = bpy.data.objects.new("Sun", data)
+    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
+    bpy.context.scene.collection.objects.link(sun)
+    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    if world.node_tree is None:
+        world.use_nodes = True
+    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (0.30, 0.38, 0.50, 1)
+    background.inputs["Strength"].default_value = 0.35
+
+
+def set_cycles(scene):
+    """What a bake of caustics stands on: both caustics, enough bounces, no clamp, no Filter Glossy (see `glass`)."""
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = 800, 600
+    cycles = scene.cycles
+    cycles.samples, cycles.use_adaptive_sampling = 64, False
+    cycles.caustics_reflective = cycles.caustics_refractive = True
+    cycles.blur_glossy = 0.0
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 8, 2, 4
+    cycles.transmission_bounces, cycles.transparent_max_bounces = 8, 24
+
+
+def build():
+    """Fill the current, empty scene."""
+    add_table()
+    add_rings()
+    add_angel(Matrix.Translation((-0.22, 0.26, 0)) @ Matrix.Rotation(radians(14), 4, "Z"))
+    add_crystal_ball()
+    add_pawn()
+    corners = ((-5, -5), (5, -5), (5, 5), (-5, 5))
+    floor = [[Vector((x, y, z)) for x, y in corners] for z in (-TABLE_HEIGHT - 0.02, -TABLE_HEIGHT)]
+    mesh_object("Floor", [floor], solid("Stone", (0.16, 0.15, 0.15), 0.6), smooth=False)
+    add_camera((1.15, -2.35, 1.75), (0.0, -0.08, 0.12), 42)
+    add_daylight((-0.55, 0.35, 0.75), 3.0)
+    set_cycles(bpy.context.scene)
+
+
+def main(arguments):
+    if len(arguments) != 1 or not arguments[0].endswith(".blend"):
+        print("usage: python data/scenes/caustics.py OUT.blend", file=sys.stderr)
+        return 2
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    build()
+    bpy.ops.wm.save_as_mainfile(filepath=arguments[0], check_existing=False)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

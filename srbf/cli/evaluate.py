@@ -1,0 +1,57 @@
+"""`srbf evaluate`: an asset against its capture's images, or against true lamps inside its scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from srbf.asset import Asset
+from srbf.bake.point_reference import compare_with_lamps
+from srbf.capture import Capture
+from srbf.cli.parameters import AssetFolder, Blender, Json
+from srbf.cli.terminal import note, print_json, progress_bar
+from srbf.evaluation import evaluate as evaluate_capture
+
+
+def evaluate(
+    asset: AssetFolder,
+    reference: Annotated[
+        Path, typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False)
+    ],
+    point_reference: Annotated[
+        int | None, typer.Option(help="Compare with N true Cycles lamps inside the scene.", show_default=False)
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
+    seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
+    blender: Blender = None,
+    json: Json = False,
+) -> None:
+    """Print the error by role, or by distance from true lamps."""
+    opened = Asset.open(asset)
+    if point_reference is not None:
+        with progress_bar("lamps") as update:
+            lamps = compare_with_lamps(opened, reference, point_reference, samples, seed, update, note, blender)
+        if json:
+            print_json(lamps)
+            return
+        typer.echo(f"{point_reference} true lamps against the point relighter, relative RMSE (at the best scale of each falloff)")
+        typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")
+        for row in lamps["by_distance"]:
+            cells = [f"{row[name]['relative_rmse']:.3f} ({row[name]['scaled']:.3f})" for name in ("inverse-square", "linear")]
+            typer.echo(f"{row['from']:7.2f} – {row['to']:6.2f} {cells[0]:>18} {cells[1]:>18} {row['texels']:>10}")
+        return
+    with progress_bar("evaluate") as update:
+        result = evaluate_capture(opened, Capture.open(reference), update)
+    if json:
+        print_json(result)
+        return
+    typer.echo(f"{'role':<12}{'lights':>7}{'rmse':>12}{'relative':>10}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
+    for role, error in result.items():
+        if role != "lights":
+            count = sum(light["role"] == role for light in result["lights"])
+            typer.echo(
+                f"{role:<12}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{error['psnr']:>10.2f}"
+                f"{error['psnr_pooled']:>8.2f}{error['peak']:>8.3g}"
+            )

@@ -1,0 +1,31 @@
+"""`srbf import`: photographs or renders with a light list become a capture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from srbf.cli.parameters import Force, Output
+from srbf.cli.terminal import note, progress_bar
+from srbf.importing import LightListImport
+
+
+def import_capture(
+    lp: Annotated[Path, typer.Option("--lp", help="Light list: a count, then `name x y z` a line.", show_default=False)],
+    output: Output,
+    transfer: Annotated[
+        Literal["srgb", "linear"], typer.Option(help="srgb: decode the curve; linear: stored values as they are.", show_default=False)
+    ],
+    holdout_lp: Annotated[
+        Path | None, typer.Option("--holdout-lp", help="Light list of images to test by, not to fit.", show_default=False)
+    ] = None,
+    mask: Annotated[Path | None, typer.Option(help="Image that becomes coverage: white is real.", show_default=False)] = None,
+    quantity: Annotated[Literal["radiance", "irradiance"], typer.Option(help="What the images measure.")] = "radiance",
+    force: Force = False,
+) -> None:
+    """Pair images with the directions of a light list by name, and write a capture."""
+    with progress_bar("import") as update:
+        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity).write(output, force, update)
+    note(f"imported {len(manifest['lights'])} images of {manifest['width']}x{manifest['height']} into {output}")

@@ -1,0 +1,31 @@
+"""`srbf info`: what a capture or an asset holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from srbf.cli.parameters import Json
+from srbf.cli.terminal import print_json
+from srbf.facts import describe
+
+
+def info(
+    path: Annotated[Path, typer.Argument(help="Folder of a capture or an asset.", show_default=False)],
+    json: Json = False,
+) -> None:
+    """Print size, lights, fit, error and memory; checks every file on the way."""
+    facts = describe(path)
+    if json:
+        print_json(facts)
+        return
+    for name, value in facts.items():
+        typer.echo(f"{name.replace('_', ' '):<18}{_shown(value)}")
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_shown(part)}" for key, part in value.items())
+    return f"{value:.5g}" if isinstance(value, float) else str(value)

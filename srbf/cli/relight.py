@@ -1,0 +1,80 @@
+"""`srbf relight`: an asset under lights becomes an image, or a folder of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import typer
+
+from srbf import methods
+from srbf.asset import Asset
+from srbf.cli.parameters import AssetFolder, Force
+from srbf.cli.terminal import note, progress_bar
+from srbf.errors import InputError
+from srbf.files import atomic_folder, check_replaceable
+from srbf.gl.relighter import Relighter
+from srbf.image import write_image, write_picture
+from srbf.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
+from srbf.lights import Light
+from srbf.methods.relighting_map import outside_domain
+
+FRAMES_MARKER = "0000.exr"
+
+
+def relight(
+    asset: AssetFolder,
+    output: Annotated[Path, typer.Option("-o", "--output", help="OUT.exr, OUT.png, or with --lights a folder.", show_default=False)],
+    directional: Annotated[list[str] | None, typer.Option(help="X,Y,Z[,R,G,B] towards the light. Repeats.", show_default=False)] = None,
+    point: Annotated[list[str] | None, typer.Option(help="X,Y,Z[,R,G,B] position. Repeats.", show_default=False)] = None,
+    spot: Annotated[list[str] | None, typer.Option(help="X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]. Repeats.", show_default=False)] = None,
+    environment: Annotated[list[Path] | None, typer.Option(help="Equirectangular image. Repeats.", show_default=False)] = None,
+    a0: Annotated[float, typer.Option(help="Distance (m) at which a point or spot light has its colour.")] = 1.0,
+    falloff: Annotated[Literal["linear", "inverse-square"], typer.Option(help="Of point and spot lights.")] = "linear",
+    lights: Annotated[Path | None, typer.Option(help="FRAMES.json: a folder of images, one a frame.", show_default=False)] = None,
+    renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
+    exposure: Annotated[float, typer.Option(help="Stops, for PNG.")] = 0.0,
+    force: Force = False,
+) -> None:
+    """Relight by any number of lights at once: max(0, their sum) + ambient. EXR is linear float, PNG is sRGB."""
+    flags: list[Light] = [
+        *map(parse_directional, directional or []),
+        *(parse_point(text, a0, falloff) for text in point or []),
+        *(parse_spot(text, a0, falloff) for text in spot or []),
+        *map(read_environment, environment or []),
+    ]
+    if lights is not None:
+        if flags:
+            raise InputError("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
+        frames = read_frames(lights)
+        opened = Asset.open(asset)
+        with atomic_folder(output, force, FRAMES_MARKER) as folder, progress_bar("relight") as update:
+            for number, image in enumerate(_render(opened, frames, renderer)):
+                write_image(folder / f"{number:04d}.exr", image, "float")
+                update(number + 1, len(frames))
+        return
+    if output.suffix.lower() not in (".exr", ".png"):
+        raise InputError(f"expected an output named .exr or .png, found {output.name!r}")
+    check_image_output(output, force)
+    opened = Asset.open(asset)
+    for line in outside_domain(opened, flags):
+        note(line)
+    (image,) = _render(opened, [flags], renderer)
+    if output.suffix.lower() == ".png":
+        write_picture(output, image, exposure)
+    else:
+        write_image(output, image, "float")
+
+
+def check_image_output(path: Path, force: bool) -> None:
+    """Refuse an image that exists, without --force."""
+    if not (force and path.is_file()):
+        check_replaceable(path, False, "")
+
+
+def _render(asset: Asset, frames: list[list[Light]], renderer: str) -> list[np.ndarray]:
+    if renderer == "numpy":
+        return [methods.relight(asset, lights) for lights in frames]
+    with Relighter(asset) as relighter:
+        return [relighter.relight(lights) for lights in frames]

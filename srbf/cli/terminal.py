@@ -1,0 +1,73 @@
+"""What all commands share of the terminal: errors as one line and exit 1, notes and progress on stderr, JSON alone on stdout."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from srbf.errors import SrbfError
+
+STDERR = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class Commands(typer.core.TyperGroup):
+    """A command group that turns the project's errors into one line on stderr and exit 1; wrong usage exits 2 as click has it."""
+
+    def invoke(self, ctx: Any) -> Any:
+        warnings.showwarning = lambda message, *_args, **_kwargs: note(str(message))
+        try:
+            return super().invoke(ctx)
+        except SrbfError as error:
+            fail(str(error))
+        except MemoryError:
+            fail("expected enough memory, found none left; use fewer maps or smaller images")
+        except KeyboardInterrupt:
+            fail("stopped; the same command goes on with a bake, other outputs were not written")
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise typer.Exit(1) from None
+
+
+def fail(message: str) -> None:
+    """Say it in one line, exit 1."""
+    STDERR.print("srbf: " + " ".join(message.split()), style="bold red", markup=False)
+    raise typer.Exit(1)
+
+
+def note(message: str) -> None:
+    """A line on stderr."""
+    STDERR.print("srbf: " + message, markup=False)
+
+
+def print_json(value: Any) -> None:
+    """One JSON object on stdout."""
+    sys.stdout.write(json.dumps(value, allow_nan=False) + "\n")
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[..., None]]:
+    """A bar with the time left on stderr (nothing where stderr is no terminal); yields update(done, total, text)."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=STDERR, transient=True, disable=not STDERR.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+
+        def update(done: float, total: float, text: str = what) -> None:
+            bar.update(task, completed=done, total=total, description=text)
+
+        yield update
