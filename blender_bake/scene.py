@@ -81,7 +81,7 @@ def configure(scene: bpy.types.Scene) -> None:
     render.use_border = False
     render.use_multiview = False
     render.use_freestyle = False
-    render.use_persistent_data = False  # in 4.5 a render that keeps data leaves the next bake all zero; views switch it on
+    render.use_persistent_data = False  # it would keep the samples, seed and filter of the render before
     if hasattr(render, "use_bake_multires"):
         render.use_bake_multires = False
     elif hasattr(render.bake, "use_multires"):  # Blender 5

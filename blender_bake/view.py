@@ -75,7 +75,6 @@ class ViewReceiver:
         self._scene.camera = self._camera
         render.resolution_x, render.resolution_y, render.resolution_percentage = width, height, 100
         render.film_transparent = True
-        render.use_persistent_data = True  # half of a small render's time is otherwise spent on handing the scene over again
         render.filepath = str(self._file)
         settings = render.image_settings
         if hasattr(settings, "media_type"):  # Blender 5

@@ -14,6 +14,7 @@ from srbf.files import atomic_path
 
 Encoding = Literal["half", "float", "uint8"]
 HALF_MAX = 65504.0
+NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO stamps the time otherwise, and equal pixels would give unequal files
 
 
 def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W C"]:
@@ -96,6 +97,7 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
     spec = oiio.ImageSpec(width, height, channels, {"half": oiio.HALF, "float": oiio.FLOAT, "uint8": oiio.UINT8}[encoding])
     if encoding != "uint8":
         spec.attribute("compression", "zip")
+        spec.attribute("DateTime", NO_DATE)
     with atomic_path(path) as temporary:
         target = oiio.ImageOutput.create(str(path))
         if target is None or not target.open(str(temporary), spec):

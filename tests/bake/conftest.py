@@ -1,0 +1,62 @@
+"""Scenes built once a session by Blender, and bakes of them through the library."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from srbf.bake.run import Bake, Reporter
+from srbf.bake.settings import BakeSettings, Receiver
+from srbf.capture import Capture
+
+SCENES = Path(__file__).with_name("scenes.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Where this Python has no bpy at all, say so and skip what needs it."""
+    if importlib.util.find_spec("bpy") is None:
+        for item in items:
+            if item.get_closest_marker("blender"):
+                item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
+
+
+@pytest.fixture(scope="session")
+def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The .blend of a named scene of scenes.py."""
+    folder = tmp_path_factory.mktemp("scenes")
+
+    def build(name: str) -> Path:
+        path = folder / f"{name}.blend"
+        if not path.exists():
+            subprocess.run([sys.executable, str(SCENES), name, str(path)], check=True, capture_output=True, timeout=120)
+        return path
+
+    return build
+
+
+class Baked:
+    """A finished bake and what it told the user."""
+
+    def __init__(self, scene: Path, folder: Path, settings: BakeSettings) -> None:
+        self.said: list[str] = []
+        self.job = Bake(scene, folder, settings)
+        self.job.run(Reporter(say=self.said.append))
+        self.capture = Capture.open(folder)
+
+
+@pytest.fixture
+def bake(blend: Callable[[str], Path], tmp_path: Path) -> Callable[..., Baked]:
+    """Bake a scene small and quick; keyword arguments are BakeSettings."""
+
+    def run(scene: str, receiver: str, name: str = "capture", uv_layer: str | None = None, **settings: object) -> Baked:
+        parsed = Receiver.parse(receiver, uv_layer)
+        small = {"width": 32, "height": 32, "lights": 8, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 4}
+        small["quantity"] = "irradiance" if parsed.kind == "lightmap" else "radiance"
+        return Baked(blend(scene), tmp_path / name, BakeSettings(parsed, **{**small, **settings}))
+
+    return run

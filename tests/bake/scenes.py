@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small scenes with known answers: `python scenes.py NAME OUT.blend`, or `python scenes.py hdri IN.blend SKY.exr OUT.npy`."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+SQUARE = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+UNIT_UV = [(0, 0), (1, 0), (1, 1), (0, 1)]
+
+
+def quad(name, corners=SQUARE, uv=UNIT_UV, color=(1, 1, 1), location=(0, 0, 0)):
+    """A quad with a diffuse material; uv None leaves it without a layer."""
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+    if uv is not None:
+        add_uv(mesh, "UV", uv)
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location = location
+    bpy.context.scene.collection.objects.link(obj)
+    mesh.materials.append(material(name, color))
+    return obj
+
+
+def add_uv(mesh, name, uv):
+    layer = mesh.uv_layers.new(name=name, do_init=False)
+    for loop, coordinates in zip(layer.uv, uv, strict=True):
+        loop.vector = coordinates
+
+
+def material(name, color=(1, 1, 1), shader="ShaderNodeBsdfDiffuse", strength=None):
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    nodes = made.node_tree.nodes
+    nodes.clear()
+    node = nodes.new(shader)
+    node.inputs["Color"].default_value = (*color, 1)
+    if strength is not None:
+        node.inputs["Strength"].default_value = strength
+    made.node_tree.links.new(node.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return made
+
+
+def camera(kind="PERSP", location=(0, -4, 3)):
+    data = bpy.data.cameras.new("Camera")
+    obj = bpy.data.objects.new("Camera", data)
+    obj.location = location
+    obj.rotation_euler = (math.atan2(4, 3), 0, 0)
+    data.type = kind
+    if kind == "PANO":
+        target = data if hasattr(data, "panorama_type") else data.cycles
+        target.panorama_type = "EQUIRECTANGULAR"
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.scene.camera = obj
+    return obj
+
+
+def lamp(name="Lamp", energy=500, location=(0, 0, 2)):
+    obj = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
+    obj.data.energy = energy
+    obj.location = location
+    bpy.context.scene.collection.objects.link(obj)
+
+
+def plane():
+    """A white square, z = 0, moved to (10, 5, 0), with a bright lamp and world that a bake must switch off."""
+    quad("Plane", location=(10, 5, 0))
+    lamp(location=(10, 5, 2))
+    camera()
+    world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Strength"].default_value = 3
+    bpy.context.scene.world = world
+
+
+def occluder():
+    """The square with a black wall 0.5 m high standing on x = 0, from y = 0 to y = 1: nothing is symmetric."""
+    quad("Plane")
+    quad("Wall", corners=[(0, 0, 0), (0, 1, 0), (0, 1, 0.5), (0, 0, 0.5)], color=(0, 0, 0))
+    camera()
+
+
+def view(kind="PERSP"):
+    """A coloured plane before a camera, empty sky around it."""
+    quad("Plane", color=(0.8, 0.4, 0.2))
+    camera(kind)
+
+
+def emissive():
+    """A white square under a small glowing one."""
+    quad("Plane")
+    glow = quad("Glow", corners=[(-0.2, -0.2, 1), (-0.2, 0.2, 1), (0.2, 0.2, 1), (0.2, -0.2, 1)])
+    glow.data.materials[0] = material("glow", (1, 0.5, 0.25), "ShaderNodeEmission", 5)
+    lamp(energy=100, location=(0.5, 0, 1.5))
+    camera()
+
+
+def metal():
+    """Two faces: the left one metal, the right one diffuse."""
+    mesh = bpy.data.meshes.new("Plane")
+    corners = [(-1, -1, 0), (0, -1, 0), (1, -1, 0), (-1, 1, 0), (0, 1, 0), (1, 1, 0)]
+    mesh.from_pydata(corners, [], [(0, 1, 4, 3), (1, 2, 5, 4)])
+    add_uv(mesh, "UV", [((x + 1) / 2, (y + 1) / 2) for face in ((0, 1, 4, 3), (1, 2, 5, 4)) for x, y, _ in (corners[i] for i in face)])
+    mesh.materials.append(material("steel", (0.9, 0.9, 0.9), "ShaderNodeBsdfAnisotropic"))
+    mesh.materials.append(material("paint", (0.5, 0.5, 0.5)))
+    mesh.polygons[1].material_index = 1
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Plane", mesh))
+    camera()
+
+
+def layers():
+    """Objects whose UVs do not fit: none, overlapping, out of range, eight bad ones; and a mesh without faces."""
+    quad("NoUV", uv=None)
+    quad("Tiled", uv=[(0, 0), (3, 0), (3, 3), (0, 3)], location=(3, 0, 0))
+    full = quad("Full", uv=None, location=(6, 0, 0))
+    for i in range(8):
+        add_uv(full.data, f"bad {i}", [(0, 0)] * 4)
+    second = quad("Second", uv=[(0, 0), (3, 0), (3, 3), (0, 3)], location=(9, 0, 0))
+    add_uv(second.data, "fits", UNIT_UV)
+    hidden = quad("Hidden", location=(12, 0, 0))
+    hidden.hide_render = True
+    empty = bpy.data.objects.new("Empty mesh", bpy.data.meshes.new("empty"))
+    bpy.context.scene.collection.objects.link(empty)
+
+
+def hostile():
+    """A plane, a missing texture, a text that would write a file on load, and a driver that would."""
+    obj = quad("Plane")
+    camera()
+    marker = Path(sys.argv[2]).with_suffix(".pwned")
+    text = bpy.data.texts.new("run.py")
+    text.write(f"open({str(marker)!r}, 'w').close()")
+    text.use_module = True
+    driver = obj.driver_add("location", 2).driver
+    driver.type = "SCRIPTED"
+    driver.expression = f"__import__('pathlib').Path({str(marker)!r}).touch() or 0"
+    node = obj.data.materials[0].node_tree.nodes.new("ShaderNodeTexImage")
+    image = bpy.data.images.new("brick", 4, 4)
+    image.source = "FILE"
+    image.filepath = "//textures/brick.png"
+    node.image = image
+
+
+def subdivided():
+    """A cube-like dome: a plane with a displace-free subdivision modifier, sharing its mesh with a second object."""
+    obj = quad("Plane")
+    modifier = obj.modifiers.new("Subdivision", "SUBSURF")
+    modifier.subdivision_type = "SIMPLE"
+    modifier.levels, modifier.render_levels = 0, 3
+    twin = bpy.data.objects.new("Twin", obj.data)
+    twin.location = (5, 0, 0)
+    bpy.context.scene.collection.objects.link(twin)
+    camera()
+
+
+def bake_under_hdri(blend, sky, out):
+    """Irradiance of Plane under an equirectangular sky, straight from Cycles, (32, 32, 3), row 0 at the top."""
+    bpy.ops.wm.open_mainfile(filepath=blend)
+    scene = bpy.context.scene
+    world = bpy.data.worlds.new("Sky")
+    world.use_nodes = True
+    nodes = world.node_tree.nodes
+    texture = nodes.new("ShaderNodeTexEnvironment")
+    texture.image = bpy.data.images.load(sky)
+    texture.image.colorspace_settings.name = "Non-Color"
+    world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
+    scene.world = world
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 1024
+    scene.cycles.use_adaptive_sampling = False
+    image = bpy.data.images.new("bake", 32, 32, alpha=True, float_buffer=True)
+    obj = scene.objects["Plane"]
+    target = obj.data.materials[0].node_tree.nodes.new("ShaderNodeTexImage")
+    target.image = image
+    obj.data.materials[0].node_tree.nodes.active = target
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=0, use_clear=True)
+    pixels = np.empty(32 * 32 * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    np.save(out, pixels.reshape(32, 32, 4)[::-1, :, :3] * math.pi)
+
+
+SCENES = {
+    "plane": plane,
+    "occluder": occluder,
+    "view": view,
+    "ortho": lambda: view("ORTHO"),
+    "pano": lambda: view("PANO"),
+    "emissive": emissive,
+    "metal": metal,
+    "layers": layers,
+    "hostile": hostile,
+    "subdivided": subdivided,
+    "no camera": lambda: quad("Plane"),
+}
+
+if __name__ == "__main__":
+    if sys.argv[1] == "hdri":
+        bake_under_hdri(*sys.argv[2:5])
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        SCENES[sys.argv[1]]()
+        bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2], check_existing=False)
+    os._exit(0)  # after a driver that failed, Blender can hang in its own shutdown

@@ -1,0 +1,127 @@
+"""Stopping and going on: kill -9 of host or worker, other settings, a second process; bit for bit the same in the end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from srbf.bake.run import Bake, Reporter
+from srbf.bake.settings import BakeSettings, Receiver
+from srbf.errors import BakeError, OutputExistsError
+from srbf.image import write_image
+
+pytestmark = pytest.mark.blender
+
+SETTINGS = ["--size", "24", "--lights", "60", "--samples", "40", "--validation", "1", "--holdout", "1", "--holdout-samples", "8"]
+
+
+def command(scene: Path, folder: Path) -> list[str]:
+    return [sys.executable, "-m", "srbf", "bake", str(scene), "-o", str(folder), "--receiver", "lightmap:Plane", *SETTINGS]
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a capture but the log, which holds wall times."""
+    return {
+        str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file() and p.name not in ("bake.log", ".lock")
+    }
+
+
+def wait_for_lights(folder: Path, count: int, process: subprocess.Popen) -> None:
+    deadline = time.monotonic() + 60
+    while len(list(folder.glob("lights/[0-9]*.exr"))) < count:
+        assert process.poll() is None, "the bake ended before it could be killed"
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def workers_of(folder: Path) -> list[int]:
+    """Processes whose command line names this capture's job."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            line = (entry / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if b"blender_bake" in line and str(folder.resolve()).encode() in line:
+            found.append(int(entry.name))
+    return found
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(blend, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("whole") / "capture"
+    subprocess.run(command(blend("emissive"), folder), check=True, capture_output=True)
+    return contents(folder)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for orphans in /proc")
+@pytest.mark.parametrize("victim", ["host", "worker", "interrupt"])
+@pytest.mark.parametrize("after", [1, 17])
+def test_killed_bakes_go_on_to_the_same_bits(blend, tmp_path: Path, uninterrupted: dict[str, bytes], victim: str, after: int) -> None:
+    folder = tmp_path / "capture"
+    process = subprocess.Popen(command(blend("emissive"), folder), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    wait_for_lights(folder, after, process)
+    (worker,) = workers_of(folder)
+    os.kill(worker if victim == "worker" else process.pid, signal.SIGINT if victim == "interrupt" else signal.SIGKILL)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode != 0 and out == ""
+    if victim != "host":
+        assert process.returncode == 1
+        assert len(err.strip().splitlines()[-1:]) == 1 and "Traceback" not in err
+        assert "go on" in err or "goes on" in err
+    deadline = time.monotonic() + 20
+    while workers_of(folder):
+        assert time.monotonic() < deadline, "the worker outlived its host"
+        time.sleep(0.05)
+    assert not (folder / "capture.json").exists()
+    (folder / "lights" / ".0003.1234.partial.exr").write_bytes(b"half written")
+    done = len(list(folder.glob("lights/[0-9]*.exr")))
+    assert after <= done < 62
+    again = subprocess.run(command(blend("emissive"), folder), capture_output=True, text=True, check=True)
+    assert f"{done} of 62 lights are done" in again.stderr
+    assert contents(folder) == uninterrupted
+
+
+def job(blend, folder: Path, **changes: object) -> Bake:
+    settings = {"width": 8, "height": 8, "lights": 4, "samples": 1, "validation": 0, "holdout": 0, **changes}
+    return Bake(blend("occluder"), folder, BakeSettings(Receiver("lightmap", "Plane"), **settings))
+
+
+def test_other_settings_are_refused_and_named(blend, tmp_path: Path) -> None:
+    folder = tmp_path / "capture"
+    assert job(blend, folder).run(Reporter())
+    before = contents(folder)
+    assert not job(blend, folder).run(Reporter())  # complete already
+    with pytest.raises(OutputExistsError, match="samples.*--force"):
+        job(blend, folder, samples=2).run(Reporter())
+    assert contents(folder) == before
+    (folder / "capture.json").rename(tmp_path / "manifest")
+    (folder / "bake.json").write_text((tmp_path / "manifest").read_text().replace('"srbf-capture"', '"x"'))
+    with pytest.raises(OutputExistsError, match="scene"):
+        job(blend, folder, samples=2).run(Reporter())
+    assert job(blend, folder, samples=2).run(Reporter(), restart=True)
+    assert job(blend, folder).run(Reporter(), force=True)
+    assert contents(folder) == before
+
+
+def test_a_second_process_is_refused(blend, tmp_path: Path) -> None:
+    import filelock
+
+    folder = tmp_path / "capture"
+    folder.mkdir()
+    with filelock.FileLock(folder / ".lock"), pytest.raises(BakeError, match="another process"):
+        job(blend, folder).run(Reporter())
+    assert job(blend, folder).run(Reporter())
+
+
+def test_a_folder_of_other_things_is_left_alone(blend, tmp_path: Path) -> None:
+    write_image(tmp_path / "holiday.png", __import__("numpy").zeros((2, 2, 3), "uint8"), "uint8")
+    with pytest.raises(OutputExistsError, match="other files"):
+        job(blend, tmp_path).run(Reporter(), force=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["holiday.png"]

@@ -1,0 +1,259 @@
+"""The command line as a user has it: every verb, what it prints, and bad input as one line and exit 1."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from srbf import methods
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.cli import app
+from srbf.image import encode_srgb, read_image, write_image
+from srbf.light_arguments import read_frames
+from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
+
+
+def srbf(*arguments: object) -> Result:
+    """The command in this process: a process each would cost the suite a minute. `test_a_real_process` has one."""
+    return CliRunner().invoke(app, list(map(str, arguments)))
+
+
+def ok(*arguments: object) -> str:
+    done = srbf(*arguments)
+    assert done.exit_code == 0, done.stderr
+    return done.stdout
+
+
+def refused(*arguments: object) -> str:
+    """One line on stderr that starts with srbf:, nothing on stdout, exit 1."""
+    done = srbf(*arguments)
+    lines = done.stderr.strip().splitlines()
+    assert done.exit_code == 1 and done.stdout == "" and len(lines) == 1 and lines[0].startswith("srbf: "), done
+    return lines[0]
+
+
+@pytest.fixture
+def capture(make_capture, plane_positions) -> Capture:
+    return make_capture(lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+
+
+@pytest.fixture
+def asset(capture: Capture, tmp_path: Path) -> Path:
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9)
+    return tmp_path / "asset"
+
+
+def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
+    opened = Asset.open(asset)
+    assert opened.k == 9 and set(opened.manifest["error"]) == {"train", "holdout"}
+    result = json.loads(ok("evaluate", asset, capture.folder, "--json"))
+    assert set(result) == {"train", "holdout", "lights"}
+    assert set(result["train"]) == {"rmse", "relative_rmse", "psnr", "psnr_pooled", "peak"}
+    assert set(result["lights"][0]) == {"file", "role", "rmse"} and len(result["lights"]) == 128
+    assert result["holdout"] == opened.manifest["error"]["holdout"]
+    assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
+    assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 120
+    assert "holdout" in ok("evaluate", asset, capture.folder) and "k" in ok("info", asset)
+
+
+@pytest.mark.parametrize(
+    "flags", [[], ["--centers", "hammersley3", "--spread", "min"], ["--domain", "sphere", "--ridge", "0.1", "--spread", "0.7"]]
+)
+@pytest.mark.parametrize("encoding", ["half", "float", "uint8"])
+def test_fit_flags_reach_the_asset(capture: Capture, tmp_path: Path, flags: list[str], encoding: str) -> None:
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 12, "--encoding", encoding, *flags)
+    asset = Asset.open(tmp_path / "asset")
+    settings = asset.manifest["source"]["settings"]
+    assert asset.encoding == encoding
+    for flag, value in zip(flags[::2], flags[1::2], strict=True):
+        assert str(settings[flag[2:]]) == value
+    assert all((tmp_path / "asset" / f"map_{i:02d}.{'png' if encoding == 'uint8' else 'exr'}").is_file() for i in range(12))
+
+
+@pytest.mark.parametrize("renderer", ["numpy", "gl"])
+def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, renderer: str) -> None:
+    sky = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "sky.exr", sky, "float")
+    flags = [
+        "--directional",
+        "-1,0,1,1,0.5,0.2",
+        "--directional",
+        "0,0,1",
+        "--point",
+        "-0.2,0.1,0.8",
+        "--environment",
+        tmp_path / "sky.exr",
+    ]
+    flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--a0", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
+    ok("relight", asset, "-o", tmp_path / "out.exr", *flags)
+    lights = [
+        DirectionalLight((-1, 0, 1), (1, 0.5, 0.2)),
+        DirectionalLight((0, 0, 1)),
+        PointLight((-0.2, 0.1, 0.8), a0=0.7, falloff="inverse-square"),
+        EnvironmentLight(sky),
+        SpotLight((0, 0, 1), (2, 2, 2), direction=(0, 0, -1), inner=0.2, outer=0.5, a0=0.7, falloff="inverse-square"),
+    ]
+    expected = methods.relight(Asset.open(asset), lights)
+    np.testing.assert_allclose(read_image(tmp_path / "out.exr"), expected, atol=1e-5 * 60)  # 1e-5 of the sum of |c R|, below 60 here
+    ok("relight", asset, "-o", tmp_path / "out.png", *flags, "--exposure", -2)
+    picture = np.round(encode_srgb(np.clip(expected / 4, 0, 1)) * 255)
+    assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
+
+
+def test_frames(asset: Path, tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
+    spot = {"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, -1], "inner": 0.1, "outer": 0.4}
+    point = {"kind": "point", "position": [0, 0, 1], "color": [1, 2, 3], "a0": 2, "falloff": "inverse-square"}
+    frames = [
+        [{"kind": "directional", "direction": [0, 0, 3], "color": [1, 1, 1]}, point],
+        [spot, {"kind": "environment", "file": "sky.exr"}],
+        [],
+    ]
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": lights} for lights in frames]}))
+    ok("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "out")
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["0000.exr", "0001.exr", "0002.exr"]
+    opened = Asset.open(asset)
+    for number, lights in enumerate(read_frames(tmp_path / "frames.json")):
+        np.testing.assert_array_equal(read_image(tmp_path / "out" / f"{number:04d}.exr"), methods.relight(opened, lights))
+    assert not read_image(tmp_path / "out" / "0002.exr").any()
+
+
+@pytest.mark.parametrize(
+    ("lights", "words"),
+    [
+        ([{"kind": "laser"}], "laser"),
+        ([{"kind": "point"}], "position"),
+        ([{"kind": "directional", "direction": [0, 0, 0]}], "direction"),
+        ([{"kind": "point", "position": [0, 0, 1], "a_o": 1}], "a_o"),
+        ([{"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, 1], "inner": 1, "outer": 0.5}], "inner"),
+        ([{"kind": "environment", "file": "nowhere.exr"}], "nowhere.exr"),
+    ],
+)
+def test_bad_frames(asset: Path, tmp_path: Path, lights: list, words: str) -> None:
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": lights}]}))
+    assert words in refused("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_import_to_relight(tmp_path: Path) -> None:
+    for i, level in enumerate((40, 80, 120, 160)):
+        write_image(tmp_path / f"{i}.png", np.full((4, 5, 3), level, np.uint8), "uint8")
+    (tmp_path / "l.lp").write_text("4\n0.png 0 0 1\n1.png 0.6 0 0.8\n2.png -0.6 0 0.8\n3.png 0 0.6 0.8\n")
+    ok("import", "--lp", tmp_path / "l.lp", "-o", tmp_path / "capture", "--transfer", "srgb", "--holdout-lp", tmp_path / "l.lp")
+    ok("fit", tmp_path / "capture", "-o", tmp_path / "asset", "-k", 4)
+    result = json.loads(ok("evaluate", tmp_path / "asset", tmp_path / "capture", "--json"))
+    assert result["holdout"]["psnr"] > 55 and result["holdout"]["peak"] == 1  # four maps interpolate four lights, up to half floats
+    assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
+
+
+def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path) -> None:
+    ok("report", asset, capture.folder, "-o", tmp_path / "report")
+    assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
+
+
+def test_outputs_that_exist_are_refused_unless_forced(asset: Path, capture: Capture, tmp_path: Path) -> None:
+    before = (asset / "asset.json").read_bytes()
+    assert "--force" in refused("fit", capture.folder, "-o", asset, "-k", 4)
+    assert (asset / "asset.json").read_bytes() == before
+    ok("fit", capture.folder, "-o", asset, "-k", 4, "--force")
+    assert Asset.open(asset).k == 4 and not list(asset.glob("map_05*"))
+    ok("relight", asset, "-o", tmp_path / "a.exr")
+    assert "--force" in refused("relight", asset, "-o", tmp_path / "a.exr")
+    ok("relight", asset, "-o", tmp_path / "a.exr", "--force")
+
+
+def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tmp_path: Path) -> None:
+    out = tmp_path / "new"
+    assert "capture.json" in refused("fit", tmp_path, "-o", out)
+    (tmp_path / "file").write_text("")
+    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset")
+    assert "120 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200)
+    light = capture.folder / capture.lights[3].file
+    pixels = capture.image(3).copy()
+    pixels[1, 2] = np.nan
+    import OpenImageIO as oiio
+
+    target = oiio.ImageOutput.create(str(light))
+    target.open(str(light), oiio.ImageSpec(14, 10, 3, oiio.FLOAT))
+    target.write_image(pixels)
+    target.close()
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    light.write_bytes(light.read_bytes()[:200])
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    assert "0003.exr" in refused("evaluate", asset, capture.folder, "--json")
+    light.unlink()
+    assert "0003.exr" in refused("info", capture.folder)
+    assert not out.exists() and not list(tmp_path.glob(".*partial*"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--directional", "0,0,0"], "direction"),
+        (["--directional", "0,0"], "X,Y,Z"),
+        (["--directional", "a,b,c"], "X,Y,Z"),
+        (["--point", "0,0,1", "--a0", "0"], "a0"),
+        (["--spot", "0,0,1,0,0,-1,0.5,0.2"], "inner"),
+        (["--environment", "nowhere.exr"], "nowhere.exr"),
+    ],
+)
+def test_bad_lights(asset: Path, tmp_path: Path, arguments: list[str], words: str) -> None:
+    assert words in refused("relight", asset, "-o", tmp_path / "x.exr", *arguments)
+    assert not (tmp_path / "x.exr").exists()
+
+
+def test_a_full_or_read_only_target(asset: Path) -> None:
+    assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr")
+
+
+def test_gl_missing(asset: Path, tmp_path: Path) -> None:
+    code = "import sys; sys.modules['moderngl'] = None; from srbf.cli import app; app()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "relight", str(asset), "-o", str(tmp_path / "x.exr"), "--renderer", "gl"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 1 and "moderngl" in done.stderr and len(done.stderr.strip().splitlines()) == 1
+
+
+def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
+    assert ok("--version").startswith("srbf 0.")
+    for arguments in (["fit"], ["nonsense"], ["relight", "x"], ["bake", "x.blend", "-o", "y", "--receiver", "view", "--size", "large"]):
+        assert srbf(*arguments).exit_code == 2
+    assert "receiver" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "mirror")
+    assert "x.blend" in refused("bake", tmp_path / "x.blend", "-o", tmp_path / "y", "--receiver", "view")
+    assert not (tmp_path / "y").exists()
+
+
+def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run([sys.executable, "-m", "srbf", *map(str, arguments)], capture_output=True, text=True)
+
+    done = run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 5)
+    assert done.returncode == 0 and done.stdout == "" and "holdout: PSNR" in done.stderr
+    again = run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 5)
+    assert again.returncode == 1 and len(again.stderr.strip().splitlines()) == 1
+    assert json.loads(run("info", tmp_path / "asset", "--json").stdout)["k"] == 5
+
+
+def test_the_library_needs_numpy_and_scipy_alone() -> None:
+    code = (
+        "import sys, pkgutil, importlib\n"
+        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL'):\n"
+        "    sys.modules[name] = None\n"
+        "import srbf\n"
+        "names = [m.name for m in pkgutil.walk_packages(srbf.__path__, 'srbf.') if '.cli' not in m.name and '__main__' not in m.name]\n"
+        "[importlib.import_module(name) for name in names]\n"
+        "print(len(names))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 30

@@ -1,0 +1,82 @@
+"""Run-time checks of every annotation in srbf, and captures with known answers."""
+
+from __future__ import annotations
+
+import pkgutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from jaxtyping import install_import_hook
+
+# Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process.
+# Not the commands: typer reads their annotations its own way.
+ROOT = Path(__file__).parent.parent / "srbf"
+CHECKED = [f"srbf.{module.name}" for module in pkgutil.iter_modules([str(ROOT)]) if module.name not in ("cli", "__main__")]
+install_import_hook(CHECKED, "annotation_checks.check")
+
+from srbf import files  # noqa: E402
+from srbf.capture import Capture  # noqa: E402
+from srbf.image import write_image  # noqa: E402
+from srbf.sphere import point_set, random_directions  # noqa: E402
+
+Answer = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
+
+
+@pytest.fixture
+def make_capture(tmp_path: Path) -> Callable[..., Capture]:
+    """Write a capture whose images are given by a function of the light direction."""
+
+    def make(
+        answer: Answer,
+        lights: int = 120,
+        holdout: int = 8,
+        domain: str = "hemisphere",
+        encoding: str = "float",
+        name: str = "capture",
+        directions: np.ndarray | None = None,
+        **images: np.ndarray,
+    ) -> Capture:
+        folder = tmp_path / name
+        (folder / "lights").mkdir(parents=True)
+        train = point_set("hammersley", lights, domain) if directions is None else directions
+        groups = [("train", train), ("holdout", random_directions(holdout, domain, np.random.default_rng(7)))]
+        entries = []
+        for role, chosen in groups:
+            for direction in chosen:
+                file = f"lights/{len(entries):04d}.exr"
+                pixels = answer(direction).astype(np.float32)
+                write_image(folder / file, pixels, encoding)
+                entries.append({"kind": "directional", "direction": direction.tolist(), "role": role, "file": file})
+        for image, values in images.items():
+            write_image(folder / f"{image}.exr", values, "float")
+        height, width = pixels.shape[:2]
+        manifest = {
+            "format": "srbf-capture",
+            "version": 1,
+            "quantity": "irradiance",
+            "width": width,
+            "height": height,
+            "lights": entries,
+            **{image: f"{image}.exr" for image in images},
+        }
+        files.write_json(folder / "capture.json", manifest)
+        return Capture.open(folder)
+
+    return make
+
+
+@pytest.fixture
+def plane_positions() -> np.ndarray:
+    """World positions of a 10 x 14 lightmap of the square [-1, 1]^2 at z = 0, row 0 at y = +1."""
+    height, width = 10, 14
+    x = -1 + 2 * (np.arange(width) + 0.5) / width
+    y = 1 - 2 * (np.arange(height) + 0.5) / height
+    positions = np.zeros((height, width, 3), np.float32)
+    positions[..., 0], positions[..., 1] = x[None, :], y[:, None]
+    return positions

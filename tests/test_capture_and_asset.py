@@ -1,0 +1,135 @@
+"""Manifests: what a reader asks for, ignores and refuses, in one line each."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from srbf.asset import Asset
+from srbf.capture import BLOCK_BYTES, Capture
+from srbf.errors import ImageError, ManifestError, SrbfError
+from srbf.facts import describe
+from srbf.image import write_image
+from srbf.methods.relighting_map import RelightingMap
+
+
+@pytest.fixture
+def capture(make_capture) -> Capture:
+    return make_capture(lambda d: np.full((6, 8, 3), max(0, d[2])), lights=20, holdout=3)
+
+
+def edit(folder: Path, **changes: object) -> None:
+    """Change top-level keys of the folder's manifest; None removes one."""
+    path = next(folder.glob("*.json"))
+    manifest = {**json.loads(path.read_text()), **changes}
+    path.write_text(json.dumps({key: value for key, value in manifest.items() if value is not None}))
+
+
+def test_a_minimal_manifest_with_unknown_keys_is_read(capture: Capture) -> None:
+    edit(capture.folder, maker="another renderer", shutter=[1, 2])
+    again = Capture.open(capture.folder)
+    assert (again.width, again.height, len(again.lights)) == (8, 6, 23)
+    assert again.transport == "combined" and (again.coverage() == 1).all() and again.ambient() is None
+
+
+def test_blocks_are_the_images_in_order(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.capture.BLOCK_BYTES", 3 * 6 * 8 * 12)
+    indices = capture.indices("train")
+    seen = [(first, block.copy()) for first, block in capture.blocks(indices)]
+    assert [first for first, _ in seen] == list(range(0, 20, 3))
+    np.testing.assert_array_equal(np.concatenate([b for _, b in seen]).reshape(20, 6, 8, 3), [capture.image(i) for i in indices])
+    assert BLOCK_BYTES < 1 << 28
+
+
+def bad_light(**changes: object) -> list[dict[str, object]]:
+    return [{"kind": "directional", "direction": [0, 0, 1], "role": "train", "file": "lights/0000.exr", **changes}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"version": 2}, "version 1"),
+        ({"format": "srbf-asset"}, "format"),
+        ({"quantity": "luminance"}, "quantity"),
+        ({"width": 0}, "width"),
+        ({"lights": None}, "lights"),
+        ({"lights": []}, "lights"),
+        ({"lights": bad_light(direction=[0, 0, 0])}, "unit direction"),
+        ({"lights": bad_light(direction=[0, 0, 1.01])}, "unit direction"),
+        ({"lights": bad_light(role="test")}, "role"),
+        ({"lights": bad_light(file="../secret.exr")}, "inside"),
+        ({"position": "/etc/passwd"}, "inside"),
+    ],
+)
+def test_broken_captures_are_refused_in_one_line(capture: Capture, changes: dict, words: str) -> None:
+    edit(capture.folder, **changes)
+    with pytest.raises(ManifestError, match=words) as caught:
+        Capture.open(capture.folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_bad_images_are_named(capture: Capture) -> None:
+    path = capture.folder / capture.lights[2].file
+    write_image(path, np.zeros((6, 9, 3), np.float32), "half")
+    with pytest.raises(ImageError, match=r"8x6.*0002\.exr.*9x6"):
+        capture.image(2)
+    path.unlink()
+    with pytest.raises(ImageError, match=r"0002\.exr"):
+        RelightingMap(k=3).encode(capture)
+
+
+def test_no_manifest_and_no_json(tmp_path: Path) -> None:
+    for opener in (Capture.open, Asset.open, describe):
+        with pytest.raises(ManifestError, match=r"\.json"):
+            opener(tmp_path)
+    (tmp_path / "capture.json").write_text("{")
+    with pytest.raises(ManifestError, match="syntax"):
+        Capture.open(tmp_path)
+
+
+@pytest.fixture
+def saved(capture: Capture, tmp_path: Path) -> Path:
+    RelightingMap(k=4).encode(capture).save(tmp_path / "asset")
+    return tmp_path / "asset"
+
+
+def test_damage_to_an_asset_is_noticed(saved: Path) -> None:
+    data = bytearray((saved / "map_01.exr").read_bytes())
+    data[-1] ^= 1
+    (saved / "map_01.exr").write_bytes(data)
+    with pytest.raises(ImageError, match=r"map_01\.exr.*checksum"):
+        Asset.open(saved)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"version": 7}, "version"),
+        ({"method": "magic"}, "method"),
+        ({"basis": {"kind": "gaussian", "centers": [[0, 0, 1]], "spread": 0.5}}, "as many centers as maps"),
+        ({"basis": {"kind": "gaussian", "centers": [[0, 0, 2]] * 4, "spread": 0.5}}, "unit centers"),
+        ({"r_table": {"file": "../r.exr", "size": 64}}, "inside"),
+        ({"position": "../p.exr"}, "inside"),
+    ],
+)
+def test_broken_assets_are_refused(saved: Path, changes: dict, words: str) -> None:
+    edit(saved, **changes)
+    with pytest.raises(SrbfError, match=words):
+        Asset.open(saved)
+
+
+def test_a_table_of_another_spread_is_refused(saved: Path) -> None:
+    basis = json.loads((saved / "asset.json").read_text())["basis"]
+    edit(saved, basis={**basis, "spread": basis["spread"] * 1.1})
+    with pytest.raises(ManifestError, match="R table"):
+        Asset.open(saved)
+
+
+def test_facts(saved: Path, capture: Capture) -> None:
+    asset = describe(saved)
+    assert asset["bytes_per_texel"]["directional"] == 4 * 4 * 2  # four maps, RGB counted as RGBA, half
+    assert asset["resident_bytes"] == 48 * 32 + Asset.open(saved).table.nbytes
+    assert describe(capture.folder)["lights"] == {"train": 20, "validation": 0, "holdout": 3}

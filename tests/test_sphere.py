@@ -1,0 +1,80 @@
+"""Point sets: closed forms, uniformity, and the hemisphere's rejection."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from srbf.errors import InputError
+from srbf.sphere import (
+    domain_of,
+    fibonacci,
+    hammersley,
+    nearest_neighbour_angles,
+    normalize,
+    point_set,
+    random_directions,
+    van_der_corput,
+)
+
+ROUNDING = 1e-12  # float64 arithmetic on unit vectors
+
+
+def test_van_der_corput_mirrors_digits() -> None:
+    assert van_der_corput(8, 2).tolist() == [0, 0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]
+    np.testing.assert_allclose(van_der_corput(6, 3), [0, 1 / 3, 2 / 3, 1 / 9, 4 / 9, 7 / 9], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("base", [2, 3])
+def test_hammersley_is_its_formula(base: int) -> None:
+    points = hammersley(30, base)
+    np.testing.assert_allclose(points[:, 2], 2 * van_der_corput(30, base) - 1, atol=ROUNDING)
+    azimuth = np.arctan2(points[1:, 1], points[1:, 0]) % (2 * np.pi)  # point 0 is the pole
+    np.testing.assert_allclose(azimuth, 2 * np.pi * (np.arange(1, 30) + 0.5) / 30, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("kind", ["hammersley", "hammersley3", "fibonacci"])
+@pytest.mark.parametrize("k", [1, 2, 7, 25, 400])
+def test_hemisphere_holds_exactly_k_of_the_smallest_sphere_set(kind: str, k: int) -> None:
+    from srbf.sphere import POINT_SETS
+
+    points = point_set(kind, k, "hemisphere")
+    assert points.shape == (k, 3)
+    assert (points[:, 2] > 0).all()
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1, atol=ROUNDING)
+    smaller = [n for n in range(k, 3 * k + 16) if (POINT_SETS[kind](n)[:, 2] > 0).sum() == k]
+    np.testing.assert_array_equal(points, POINT_SETS[kind](smaller[0])[POINT_SETS[kind](smaller[0])[:, 2] > 0])
+
+
+@pytest.mark.parametrize("points", [hammersley(512), hammersley(512, 3), fibonacci(512)])
+def test_sets_are_uniform(points: np.ndarray) -> None:
+    # A uniform set integrates the first spherical harmonics to zero; 512 low-discrepancy points do so to about 1/512.
+    assert np.abs(points.mean(axis=0)).max() < 0.01
+    np.testing.assert_allclose(points.T @ points / 512, np.eye(3) / 3, atol=0.01)
+
+
+def test_random_directions_are_uniform_and_above() -> None:
+    points = random_directions(20000, "hemisphere", np.random.default_rng(0))
+    assert (points[:, 2] > 0).all()
+    # Archimedes: z is uniform on (0, 1], so its mean is 1/2 with a standard error of 0.29 / sqrt(20000) = 0.002.
+    assert abs(points[:, 2].mean() - 0.5) < 0.01
+    assert abs(random_directions(20000, "sphere", np.random.default_rng(0))[:, 2].mean()) < 0.02
+
+
+def test_nearest_neighbour_angles_of_an_octahedron() -> None:
+    corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    np.testing.assert_allclose(nearest_neighbour_angles(corners), np.pi / 2, atol=ROUNDING)
+    assert nearest_neighbour_angles(corners[:1]).tolist() == [np.pi]
+    close = normalize(np.array([[0, 0, 1], [1e-6, 0, 1]]))
+    np.testing.assert_allclose(nearest_neighbour_angles(close), 1e-6, rtol=1e-6)
+
+
+def test_domain_of() -> None:
+    assert domain_of(np.array([[0, 0, 1.0], [0.6, 0, 0.8]])) == "hemisphere"
+    assert domain_of(np.array([[0, 0, 1.0], [1, 0, 0]])) == "sphere"  # the horizon itself is not above it
+
+
+@pytest.mark.parametrize("bad", [[0, 0, 0], [np.nan, 0, 1], [np.inf, 0, 0]])
+def test_normalize_refuses(bad: list[float]) -> None:
+    with pytest.raises(InputError, match="direction"):
+        normalize(np.array(bad, float))
