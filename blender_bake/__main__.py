@@ -43,6 +43,7 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
     geometry (bool), ambient {samples, seed} or null, lights [{index, kind, direction | position, samples, seed}].
     """
+    from blender_bake import emission
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
@@ -51,7 +52,7 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     scratch = Path(job["scratch"])
     scene = scenes.open_scene(job["scene"], channel)
     scenes.configure(scene)
-    own_light = scenes.silence(scene)
+    own_light = scenes.OwnLight(scene)
     kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
     receiver = kind(scene, job, channel)
     channel.emit("scene", blender=scenes.version(), receiver=receiver.description(), **receiver.facts())
@@ -62,14 +63,17 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     if job["geometry"]:
         for name, array in receiver.geometry().items():
             image(name, array, time.perf_counter())
-    if job["ambient"]:
-        started = time.perf_counter()
-        image("emission", receiver.answer(job["ambient"]["samples"], job["ambient"]["seed"]), started)
+    ambient = job["ambient"]
+    started = time.perf_counter()
+    if ambient:
         if job["keep_lamps"]:
             own_light.restore()
-            started = time.perf_counter()
-            image("ambient", receiver.answer(job["ambient"]["samples"], job["ambient"]["seed"]), started)
-            own_light.off()
+        image("ambient", receiver.answer(ambient["samples"], ambient["seed"]), started)
+        own_light.off()
+    emission.switch_off()
+    if ambient:
+        started = time.perf_counter()
+        image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
     illuminant = Illuminant(scene, job["sun_angle"])
     for light in job["lights"]:
         started = time.perf_counter()

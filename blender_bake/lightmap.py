@@ -29,11 +29,13 @@ class LightmapReceiver:
         apply_modifiers(self._object)
         _only_selected(self._object)
         self._image = bpy.data.images.new("srbf bake", self._width, self._height, alpha=True, float_buffer=True)
+        self._material_names = [slot.material.name if slot.material else "(none)" for slot in self._object.material_slots]
         materials.bakeable_slots(self._object, self._image)
         self._uv_layer, made = unwrap.choose_layer(self._object, job["receiver"].get("uv_layer"), min(self._width, self._height), channel)
         self._albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
         self._coverage = self._albedo[:, :, 3:]
         self._check_coverage(made or job["receiver"].get("uv_layer") is not None)
+        self._readable, self._albedo_read = self._coverage, self._albedo
         if self._irradiance:
             self._whiten_what_is_not_diffuse()
         self._made_layer = made
@@ -65,6 +67,7 @@ class LightmapReceiver:
             "normal": normal * covered,
             "albedo": self._albedo[:, :, :3],
             "coverage": covered,
+            "readable": self._readable,
             "hit": covered,
         }
 
@@ -118,14 +121,18 @@ class LightmapReceiver:
         for i, albedo in largest.items():
             if albedo < NOT_DIFFUSE:
                 slot = self._object.material_slots[i]
-                names.append(repr(slot.material.name))
+                names.append(repr(self._material_names[i]))
                 slot.material = materials.lambert((1, 1, 1))
                 materials.add_target(slot.material, self._image)
         if names:
             self._channel.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
-        black = int(((self._albedo[:, :, :3].max(axis=2) < NOT_DIFFUSE) & (self._coverage[:, :, 0] > 0)).sum())
-        if black and not names:
-            self._channel.warn(f"{black} texels have a black albedo: Cycles has no irradiance there, they hold 0")
+            self._albedo_read = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
+        black = (self._albedo_read[:, :, :3].max(axis=2) < NOT_DIFFUSE) & (self._coverage[:, :, 0] > 0)
+        if black.any():
+            self._readable = self._coverage * ~black[:, :, None]
+            self._channel.warn(
+                f"{int(black.sum())} texels are black between diffuse ones: they take the irradiance of the nearest that is not"
+            )
 
 
 def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
@@ -156,6 +163,7 @@ def apply_modifiers(obj: bpy.types.Object) -> None:
         if modifier.type in {"SUBSURF", "MULTIRES"}:
             modifier.levels = modifier.render_levels
     depsgraph = bpy.context.evaluated_depsgraph_get()
+    _realise_instances(obj, depsgraph)
     mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
     if obj.type != "MESH":
         raise WorkerError(
@@ -165,6 +173,21 @@ def apply_modifiers(obj: bpy.types.Object) -> None:
     obj.data = mesh
     if not mesh.polygons:
         raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any")
+
+
+def _realise_instances(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Objects that the modifiers or particles of `obj` scatter stay as objects of their own when those are gone."""
+    meshes: dict[str, bpy.types.Mesh] = {}
+    for instance in depsgraph.object_instances:
+        source = instance.object
+        if not (instance.is_instance and instance.parent and instance.parent.original == obj and source.type == "MESH"):
+            continue
+        key = source.data.name_full
+        if key not in meshes:
+            meshes[key] = bpy.data.meshes.new_from_object(source, preserve_all_data_layers=True, depsgraph=depsgraph)
+        copy = bpy.data.objects.new(f"{obj.name} instance", meshes[key])
+        copy.matrix_world = instance.matrix_world.copy()
+        bpy.context.scene.collection.objects.link(copy)
 
 
 def _only_selected(obj: bpy.types.Object) -> None:

@@ -42,10 +42,11 @@ def missing_files() -> list[str]:
         if not Path(path).is_file():
             lines.append(f"missing library {path}: what it holds is not in the picture")
     for image in bpy.data.images:
-        if image.source not in {"FILE", "SEQUENCE", "MOVIE"} or image.packed_file or image.users == 0:
+        if image.source not in {"FILE", "SEQUENCE", "MOVIE", "TILED"} or image.packed_file or image.users == 0:
             continue
         path = bpy.path.abspath(image.filepath, library=image.library)
-        if not Path(path).is_file():
+        tiles = [path.replace("<UDIM>", str(tile.number)) for tile in image.tiles] if image.source == "TILED" else [path]
+        if not all(Path(tile).is_file() for tile in tiles):
             lines.append(f"missing texture {path or image.name} (image {image.name!r}): Blender renders it magenta")
     return lines
 
@@ -90,15 +91,18 @@ def configure(scene: bpy.types.Scene) -> None:
     render.use_overwrite = True
     render.use_file_extension = True
     render.threads_mode = "AUTO"
+    for layer in scene.view_layers:
+        layer.samples = 0  # a layer's own count would win over ours
 
 
 class OwnLight:
-    """The scene's own lamps and world, switched off, and on again for `--keep-lamps`."""
+    """The scene's own lamps and world, switched off when this is made, and on again for `--keep-lamps`."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene
         self._world = scene.world
         self._black = black_world()
+        self._overrides = [(layer, layer.world_override) for layer in scene.view_layers if hasattr(layer, "world_override")]
         self._lamps = [(data, data.energy) for data in bpy.data.lights]
         for data, _ in self._lamps:
             data.animation_data_clear()
@@ -107,19 +111,18 @@ class OwnLight:
     def off(self) -> None:
         """No lamp, a black world."""
         self._scene.world = self._black
+        for layer, _ in self._overrides:
+            layer.world_override = None
         for data, _ in self._lamps:
             data.energy = 0.0
 
     def restore(self) -> None:
         """The scene as its author lit it."""
         self._scene.world = self._world
+        for layer, world in self._overrides:
+            layer.world_override = world
         for data, energy in self._lamps:
             data.energy = energy
-
-
-def silence(scene: bpy.types.Scene) -> OwnLight:
-    """Switch off every lamp and the world; emissive materials stay and become ambient."""
-    return OwnLight(scene)
 
 
 def black_world() -> bpy.types.World:

@@ -17,12 +17,16 @@ SMALLEST_AREA = 1e-6  # of the unit square: less is degenerate
 OVERLAP_LIMIT = 0.1  # of the layer's area: below, texel rounding at small charts explains it
 OVERLAP_GRID = 512
 GUTTER_TEXELS = 4
+LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be all gutter
 
 
 def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, channel: Channel) -> tuple[str, bool]:
     """(layer, whether it was made): the layer asked for, else the active one if it fits, else another that fits, else a new one."""
     mesh = obj.data
     layers = mesh.uv_layers
+    if name == MADE_LAYER and name not in layers:  # an earlier bake made it: the same layer comes out again
+        make_layer(obj, texels)
+        return name, True
     if name is not None:
         if name not in layers:
             found = ", ".join(repr(layer.name) for layer in layers) or "none"
@@ -80,7 +84,10 @@ def make_layer(obj: bpy.types.Object, texels: int) -> None:
     bpy.ops.mesh.reveal()
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.uv.smart_project(
-        angle_limit=math.radians(66), margin_method="FRACTION", island_margin=GUTTER_TEXELS / texels, correct_aspect=False
+        angle_limit=math.radians(66),
+        margin_method="FRACTION",
+        island_margin=min(GUTTER_TEXELS / texels, LARGEST_GUTTER),
+        correct_aspect=False,
     )
     bpy.ops.object.mode_set(mode="OBJECT")
     if render_layer is not None:
@@ -113,7 +120,7 @@ def overlap_on_grid(corners: np.ndarray) -> float:
     area = np.abs(triangle_areas(corners))
     covered = np.zeros((OVERLAP_GRID, OVERLAP_GRID), bool)
     for triangle in corners[area > 0]:
-        rows, columns = _cells(triangle)
+        rows, columns = _cells(triangle, OVERLAP_GRID, OVERLAP_GRID)
         covered[rows, columns] = True
     total = float(area.sum()) * OVERLAP_GRID**2
     return max(0.0, 1 - float(covered.sum()) / total) if total else 0.0
@@ -126,30 +133,32 @@ def overlap(mesh: bpy.types.Mesh, layer: str, coverage: np.ndarray) -> float:
 
 
 def slot_maximum(obj: bpy.types.Object, layer: str, image: np.ndarray) -> dict[int, float]:
-    """The largest value that each used material slot shows in `image` (H, W, 4), over the texels at its triangles' centroids."""
+    """The largest value that each used material slot shows in `image` (H, W, 4), over the texels that its triangles cover."""
     mesh = obj.data
     loops = triangle_loops(mesh)
     slots = np.empty(len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("material_index", slots)
     slots = np.clip(slots, 0, len(obj.material_slots) - 1)
-    uv = layer_coordinates(mesh, layer)[loops].mean(axis=1)
+    corners = layer_coordinates(mesh, layer)[loops]
     height, width = image.shape[:2]
-    columns = np.clip((uv[:, 0] * width).astype(int), 0, width - 1)
-    rows = np.clip(((1 - uv[:, 1]) * height).astype(int), 0, height - 1)
-    seen = image[rows, columns]
     largest: dict[int, float] = {}
-    for slot in np.unique(slots):
-        real = (slots == slot) & (seen[:, 3] > 0)
+    for slot, triangle in zip(slots, corners, strict=True):
+        rows, columns = _cells(triangle, width, height)
+        if len(rows) == 0:  # smaller than a texel: the one that holds its centroid
+            u, v = np.clip(triangle.mean(axis=0), 0, 1 - 1e-6)
+            rows, columns = np.array([int(v * height)]), np.array([int(u * width)])
+        seen = image[height - 1 - rows, columns]
+        real = seen[:, 3] > 0
         if real.any():
-            largest[int(slot)] = float(seen[real, :3].max())
+            largest[int(slot)] = max(largest.get(int(slot), 0.0), float(seen[real, :3].max()))
     return largest
 
 
-def _cells(triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Grid cells whose centres lie in a (3, 2) UV triangle."""
-    scaled = triangle * OVERLAP_GRID - 0.5
+def _cells(triangle: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
+    """(rows from the bottom, columns) of the grid cells whose centres lie in a (3, 2) UV triangle."""
+    scaled = triangle * np.array([width, height]) - 0.5
     low = np.maximum(np.ceil(scaled.min(axis=0)), 0).astype(int)
-    high = np.minimum(np.floor(scaled.max(axis=0)), OVERLAP_GRID - 1).astype(int)
+    high = np.minimum(np.floor(scaled.max(axis=0)), [width - 1, height - 1]).astype(int)
     if (high < low).any():
         return np.empty(0, int), np.empty(0, int)
     columns, rows = np.meshgrid(np.arange(low[0], high[0] + 1), np.arange(low[1], high[1] + 1))

@@ -52,14 +52,23 @@ class ViewReceiver:
         """World position and normal at pixel centres, with `hit` where there is one; albedo and coverage over the whole pixel."""
         cycles = self._scene.cycles
         filter_type, filter_width = cycles.pixel_filter_type, cycles.filter_width
-        cycles.pixel_filter_type, cycles.filter_width = "BLACKMAN_HARRIS", GEOMETRY_FILTER
+        lens = self._camera.data.dof
+        blurred = lens.use_dof
+        cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
         centre = self._render(1, 0, ("Combined", "Position", "Normal"))
-        cycles.pixel_filter_type, cycles.filter_width = filter_type, filter_width
+        cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
         whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
         hit, coverage = (centre["Combined"][:, :, 3:] > 0).astype(np.float32), np.clip(whole["Combined"][:, :, 3:], 0, 1)
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
-        return {"position": centre["Position"] * hit, "normal": normal * hit, "albedo": albedo, "coverage": coverage, "hit": hit}
+        return {
+            "position": centre["Position"] * hit,
+            "normal": normal * hit,
+            "albedo": albedo,
+            "coverage": coverage,
+            "readable": coverage,
+            "hit": hit,
+        }
 
     def answer(self, samples: int, seed: int) -> np.ndarray:
         """Radiance over coverage (COMBINED, unpremultiplied), or irradiance E = pi x (diffuse direct + indirect, without colour)."""

@@ -13,7 +13,7 @@ import srbf
 from srbf import files
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.capture import Capture
+from srbf.capture import Capture, Quantity
 from srbf.errors import BakeError, InputError
 from srbf.evaluation import evaluate
 from srbf.methods.relighting_map import RelightingMap
@@ -26,10 +26,11 @@ class DemoScene:
 
     receiver: Receiver
     size: tuple[int, int]
-    quantity: str
+    quantity: Quantity
     k: int
 
 
+HOLDOUT_SAMPLES = 24  # fewer than a bake's default: both scenes are clean by then, and the demo is to take minutes
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", 25),
     "house": DemoScene(Receiver("view"), (256, 192), "radiance", 20),
@@ -68,7 +69,7 @@ def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress:
     if not blend.is_file():
         reporter.say(f"building {blend}")
         build_scene(name, blend)
-    settings = BakeSettings(scene.receiver, *scene.size, lights=lights, quantity=scene.quantity)  # type: ignore[arg-type]
+    settings = BakeSettings(scene.receiver, *scene.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=scene.quantity)
     reporter.say(f"baking {lights} directions at {scene.size[0]}x{scene.size[1]} with Cycles")
     Bake(blend, capture_folder, settings).run(reporter)
     timings["bake"] = clock() - started

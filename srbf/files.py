@@ -7,7 +7,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -28,7 +28,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
             os.fsync(file.fileno())
         temporary.replace(path)
     except (OSError, SrbfError) as error:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
         if isinstance(error, SrbfError) and not isinstance(error, ImageError):
             raise
         raise WriteError(f"cannot write {path}: {_reason(error, path)}") from error
@@ -38,8 +39,10 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def _reason(error: Exception, path: Path) -> str:
+    if not path.parent.is_dir():
+        return f"there is no folder {path.parent}; make it first"
     if isinstance(error, SrbfError):
-        free = shutil.disk_usage(path.parent).free if path.parent.is_dir() else 0
+        free = shutil.disk_usage(path.parent).free
         text = str(error)
         return f"no space left on the disk ({free} bytes free); free some and run again" if free < 1 << 20 else text
     if isinstance(error, OSError) and error.strerror:
@@ -84,7 +87,10 @@ def make_folder(path: Path) -> None:
 def inside(folder: Path, name: str, manifest: Path) -> Path:
     """The file `name` of a manifest under its folder; ManifestError where it would leave the folder."""
     pure = PurePosixPath(name)
-    resolved = (folder / pure).resolve()
+    try:
+        resolved = (folder / pure).resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a loop of links, a null byte
+        raise ManifestError(f"expected a path that can be followed in {manifest.name}, found {name!r}") from error
     if not name or "\\" in name or pure.is_absolute() or ".." in pure.parts or not resolved.is_relative_to(folder.resolve()):
         raise ManifestError(f"expected a relative path inside {folder}, found {name!r} in {manifest.name}")
     return folder / pure

@@ -24,7 +24,9 @@ def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W
     are: `require_finite` names the file. ImageError on a missing, damaged or truncated file.
     """
     oiio = _oiio()
-    source = oiio.ImageInput.open(str(path)) if path.is_file() else None
+    stored = oiio.ImageSpec()
+    stored.attribute("oiio:UnassociatedAlpha", 1)  # colours as the file holds them, not multiplied by its alpha
+    source = oiio.ImageInput.open(str(path), stored) if path.is_file() else None
     if source is None:
         reason = _first_line(oiio.geterror()) if path.is_file() else "no such file"
         raise ImageError(f"cannot read image {path}: {reason}")

@@ -96,15 +96,26 @@ def paired(light_list: Path) -> list[tuple[Path, LightListEntry]]:
     for path in sorted(folder.iterdir()):
         if path.is_file() and path.suffix.lower() in (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr"):
             stems.setdefault(path.stem.lower(), []).append(path)
-    pairs = []
+    pairs: list[tuple[Path, LightListEntry]] = []
+    taken: dict[Path, str] = {}
     for entry in entries:
-        last = PureWindowsPath(entry.name).name  # splits at both kinds of slash
+        written = PureWindowsPath(entry.name)  # splits at both kinds of slash
+        last = written.name
         alike = stems.get(Path(last).stem.lower(), [])
-        if (folder / last).is_file():
-            pairs.append((folder / last, entry))
+        as_written = folder / written.as_posix()
+        if as_written.is_file() and as_written.resolve().is_relative_to(folder.resolve()):
+            path = as_written
+        elif (folder / last).is_file():
+            path = folder / last
         elif len(alike) == 1:
-            pairs.append((alike[0], entry))
+            path = alike[0]
         else:
             found = f"several with that stem ({', '.join(p.name for p in alike)})" if alike else "none"
             raise ImageError(f"expected the image {last!r} of {light_list.name} in {folder}, found {found}")
+        if path in taken:
+            raise ImageError(
+                f"expected an image of its own for {entry.name!r} in {light_list.name}, found {path.name} taken by {taken[path]!r}"
+            )
+        taken[path] = entry.name
+        pairs.append((path, entry))
     return pairs

@@ -50,7 +50,7 @@ def read_frames(path: Path) -> list[list[Light]]:
 
 
 def _light(entry: dict[str, Any], folder: Path) -> Light:
-    fields = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
+    fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
     if entry["kind"] == "environment":
         image = read_image(folder / fields.pop("file"), 3)
         return EnvironmentLight(image, **fields)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from srbf.errors import ManifestError
+from srbf.sphere import normalize
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ def read_light_list(path: Path) -> list[LightListEntry]:
         reason = error.strerror if isinstance(error, OSError) else "it is not text"
         raise ManifestError(f"expected a light list (.lp) at {path}, found none to read: {reason}") from error
     rows = [(number, line) for number, line in enumerate(lines, 1) if line]
-    if not rows or not rows[0][1].isdigit():
+    if not rows or not (rows[0][1].isascii() and rows[0][1].isdecimal()):
         raise ManifestError(f"expected the number of lights on the first line of {path}, found {rows[0][1] if rows else 'nothing'!r}")
     count, rows = int(rows[0][1]), rows[1:]
     if count != len(rows) or count == 0:
@@ -40,12 +41,11 @@ def read_light_list(path: Path) -> list[LightListEntry]:
             name, vector = "", np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all():
             raise ManifestError(f"expected `name x y z` on line {number} of {path}, found {line!r}")
-        length = float(np.linalg.norm(vector))
-        if length < 1e-12:
+        if np.abs(vector).max() < 1e-12:
             raise ManifestError(f"expected a direction on line {number} of {path}, found the zero vector")
         if name in seen:
             raise ManifestError(f"expected each image once in {path}, found {name!r} again on line {number}")
         seen.add(name)
-        x, y, z = vector / length
+        x, y, z = normalize(vector)
         entries.append(LightListEntry(name, (float(x), float(y), float(z))))
     return entries

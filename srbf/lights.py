@@ -154,7 +154,10 @@ def environment_samples(
 
 
 def _triple(value: object, name: str) -> Triple:
-    array = np.asarray(value, np.float64)
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"expected {name} as three finite numbers, found {value!r}") from error
     if array.shape != (3,) or not np.isfinite(array).all():
         raise InputError(f"expected {name} as three finite numbers, found {value!r}")
     return (float(array[0]), float(array[1]), float(array[2]))

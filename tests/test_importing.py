@@ -86,6 +86,27 @@ def test_bad_lists_name_their_line(tmp_path: Path, text: str, words: str) -> Non
         read_light_list(tmp_path / "l.lp")
 
 
+def test_names_with_folders_and_an_image_taken_twice(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    for name, level in (("a.png", 10), ("sub/a.png", 200)):
+        write_image(tmp_path / name, np.full((2, 2, 3), level, np.uint8), "uint8")
+    (tmp_path / "l.lp").write_text("2\nsub/a.png 0 0 1\na.png 1 0 1\n")
+    LightListImport(tmp_path / "l.lp", "linear").write(tmp_path / "capture")
+    assert Capture.open(tmp_path / "capture").image(0)[0, 0, 0] == pytest.approx(200 / 255, rel=1e-3)
+    (tmp_path / "l.lp").write_text("2\nx/a.png 0 0 1\na.png 1 0 1\n")
+    with pytest.raises(ImageError, match="taken by"):
+        LightListImport(tmp_path / "l.lp", "linear").write(tmp_path / "again")
+
+
+def test_alpha_does_not_darken_colour(tmp_path: Path) -> None:
+    from PIL import Image  # OpenImageIO would divide by alpha when it writes
+
+    Image.fromarray(np.full((2, 2, 4), 128, np.uint8)).save(tmp_path / "a.png")
+    (tmp_path / "l.lp").write_text("1\na.png 0 0 1\n")
+    LightListImport(tmp_path / "l.lp", "linear").write(tmp_path / "capture")
+    assert Capture.open(tmp_path / "capture").image(0)[0, 0, 0] == pytest.approx(128 / 255, rel=1e-3)
+
+
 def test_missing_and_mismatched_images_leave_nothing(photographs: Path, tmp_path: Path) -> None:
     write_image(tmp_path / "a.png", np.zeros((4, 7, 3), np.uint8), "uint8")
     with pytest.raises(ImageError, match=r"6x4.*a\.png.*7x4"):

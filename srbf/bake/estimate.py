@@ -48,8 +48,8 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     fixed = max(0.0, seconds[1] - per_sample)
     time = len(lights) * fixed + sum(light.samples for light in lights) * per_sample
     disk = len(lights) * image_bytes + settings.width * settings.height * 40
-    where = bake.folder if bake.folder.exists() else bake.folder.resolve().parent
-    free = shutil.disk_usage(where).free if where.exists() else 0
+    where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
+    free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
     train_from = settings.domain if settings.light_list is None else "from the light list"
     receiver = ", ".join(f"{key} {value}" for key, value in facts["receiver"].items() if key != "kind")

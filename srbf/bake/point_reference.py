@@ -90,7 +90,7 @@ def _render(
         for i, lamp in enumerate(lamps)
     ]
     images: list[np.ndarray] = []
-    emission: np.ndarray | float = 0.0
+    left: np.ndarray | float = 0.0
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
         job = {
@@ -106,10 +106,10 @@ def _render(
                 elif event["event"] == "image":
                     array = np.load(scratch / event["file"])
                     if "light" in event:
-                        images.append(np.maximum(array - emission, 0))
+                        images.append(np.maximum(array - left, 0))
                         progress(len(images), len(lights))
-                    else:
-                        emission = array
+                    elif event["name"] == "left":
+                        left = array
     return images
 
 

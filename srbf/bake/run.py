@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ LOCK = ".lock"
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
 GEOMETRY = ("position", "normal", "albedo", "coverage")
+OURS = {LOCK, SCRATCH, LOG, "lights", "uv.json", "ambient.exr", *(f"{name}.exr" for name in GEOMETRY)}
 
 
 @dataclass
@@ -54,33 +55,45 @@ class Bake:
         BakeError where Blender fails or another process bakes here; OutputExistsError where the folder holds something else.
         """
         identity = self._identity()
-        self._check_folder(identity, force, restart)
-        files.make_folder(self.folder / "lights")
+        existed = self.folder.exists()
+        with self._lock():
+            try:
+                self._check_folder(identity, force, restart)
+                if (self.folder / MANIFEST).is_file():
+                    (self.folder / STATE).unlink(missing_ok=True)
+                    return False
+                self._sweep()
+                scratch = self.folder / SCRATCH
+                files.make_folder(scratch)
+                files.make_folder(self.folder / "lights")
+                manifest = self._bake(identity, scratch, reporter)
+                files.write_json(self.folder / MANIFEST, manifest)
+                (self.folder / STATE).unlink()
+                return True
+            finally:
+                shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
+                if not (existed or (self.folder / STATE).exists() or (self.folder / MANIFEST).exists()):
+                    shutil.rmtree(self.folder, ignore_errors=True)  # Blender never came as far as the first image
+
+    @contextmanager
+    def _lock(self) -> Iterator[None]:
+        """Hold the folder; the system lets go of it however this process ends."""
         import filelock
 
-        lock = filelock.FileLock(str(self.folder / LOCK))
+        if self.folder.exists() and not self.folder.is_dir():
+            raise OutputExistsError(f"expected a folder or nothing at {self.folder}, found a file; choose another -o")
+        files.make_folder(self.folder)
         try:
-            lock.acquire(timeout=0)
+            with filelock.FileLock(str(self.folder / LOCK), timeout=0):
+                try:
+                    yield
+                finally:
+                    if self.folder.exists() and not any((self.folder / name).exists() for name in (STATE, MANIFEST)):
+                        (self.folder / LOCK).unlink(missing_ok=True)
         except filelock.Timeout as error:
             raise BakeError(f"another process is baking into {self.folder}; wait for it, or choose another -o") from error
-        except OSError as error:
+        except PermissionError as error:
             raise files.WriteError(f"cannot write into {self.folder}: {error.strerror}; choose a folder that can be written") from error
-        scratch = self.folder / SCRATCH
-        try:
-            if (self.folder / MANIFEST).is_file():
-                return False
-            if not (self.folder / STATE).is_file():
-                files.write_json(self.folder / STATE, identity)
-            shutil.rmtree(scratch, ignore_errors=True)
-            files.make_folder(scratch)
-            self._sweep()
-            manifest = self._bake(scratch, reporter)
-            files.write_json(self.folder / MANIFEST, manifest)
-            (self.folder / STATE).unlink()
-            return True
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)
-            lock.release()
 
     def check_scene(self) -> None:
         """InputError where there is no scene to bake."""
@@ -93,13 +106,9 @@ class Bake:
 
     def _check_folder(self, identity: dict[str, Any], force: bool, restart: bool) -> None:
         """Refuse a folder that this bake can neither go on with nor replace; empty it where the user said so."""
-        if not self.folder.exists():
-            return
-        if not self.folder.is_dir():
-            raise OutputExistsError(f"expected a folder or nothing at {self.folder}, found a file; choose another -o")
         done, begun = self.folder / MANIFEST, self.folder / STATE
         if not done.is_file() and not begun.is_file():
-            if any(p.name not in (LOCK, SCRATCH, LOG, "lights") for p in self.folder.iterdir()):
+            if any(p.name not in OURS and ".partial" not in p.name for p in self.folder.iterdir()):
                 raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
             return
         recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
@@ -122,10 +131,11 @@ class Bake:
 
     def _sweep(self) -> None:
         """Remove what a killed process left half-written."""
+        shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
         for partial in [*self.folder.glob(".*.partial*"), *(self.folder / "lights").glob(".*.partial*")]:
             partial.unlink()
 
-    def _bake(self, scratch: Path, reporter: Reporter) -> dict[str, Any]:
+    def _bake(self, identity: dict[str, Any], scratch: Path, reporter: Reporter) -> dict[str, Any]:
         lights = plan_lights(self.settings)
         missing = [light for light in lights if not self._is_done(self.folder / light.file)]
         images = _Images(self.folder, self.settings, reporter)
@@ -144,7 +154,7 @@ class Bake:
                     reporter.say(event["message"])
                 elif event["event"] == "scene":
                     facts = event
-                    self._check_version(event["blender"])
+                    self._record(identity, event["blender"])
                     self._write_uv(event)
                 elif event["event"] == "image":
                     array = np.load(scratch / event["file"])
@@ -184,12 +194,13 @@ class Bake:
             return path.is_file() and size_of(path) == (self.settings.height, self.settings.width)
         return False
 
-    def _check_version(self, blender: str) -> None:
-        """Record which Blender bakes; another version would not give the bits that an uninterrupted bake has."""
-        state = files.read_json(self.folder / STATE)
-        if state.setdefault("blender", blender) != blender:
-            raise BakeError(f"expected Blender {state['blender']}, which began {self.folder}, found {blender}; use it, or add --restart")
-        files.write_json(self.folder / STATE, state)
+    def _record(self, identity: dict[str, Any], blender: str) -> None:
+        """The receiver is good: from here on the folder is a bake begun. Another Blender would not give the same bits."""
+        path = self.folder / STATE
+        began = files.read_json(path).get("blender", blender) if path.is_file() else blender
+        if began != blender:
+            raise BakeError(f"expected Blender {began}, which began {self.folder}, found {blender}; use it, or add --restart")
+        files.write_json(path, {**identity, "blender": blender})
 
     def _write_uv(self, event: dict[str, Any]) -> None:
         if "uv" in event:
@@ -234,46 +245,45 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
 
 
 class _Images:
-    """The capture's images as they arrive: geometry, what the scene emits, then the lights with that subtracted."""
+    """The capture's images as they arrive: geometry, ambient, what is left of it, then the lights with that subtracted."""
 
     def __init__(self, folder: Path, settings: BakeSettings, reporter: Reporter) -> None:
         self._folder = folder
         self._settings = settings
         self._reporter = reporter
-        self._emission: np.ndarray | None = None
+        self._left: np.ndarray | None = None
         self._raw: dict[str, np.ndarray] = {}
         self._nearest: np.ndarray | None = None
         self.has_ambient = False
         self._brightest = 0.0
 
     def take(self, name: str, array: np.ndarray) -> None:
-        """Geometry is kept until `hit`, its last image, tells where it is real; then all of it is dilated and written."""
-        if name == "emission":
-            self._emission = dilate(array, self._nearest) if array.any() else None
-            if self._emission is not None and not self._settings.keep_lamps:
-                self._write_ambient(self._emission)
+        """Geometry is kept until `hit`, its last image: where position and normal are real. `readable` says where light is."""
+        if name == "left":  # what still shines with every lamp and emission off: subtracted from the lights, mostly nothing
+            self._left = dilate(array, self._nearest) if array.any() else None
         elif name == "ambient":
-            if array.any():
-                self._write_ambient(dilate(array, self._nearest))
+            self.has_ambient = bool(array.any())
+            if self.has_ambient:
+                write_image(self._folder / "ambient.exr", dilate(array, self._nearest), "float")
         elif name == "hit":
-            coverage = self._raw["coverage"]
-            self._nearest = nearest_covered(coverage[:, :, 0])
+            self._nearest = nearest_covered(self._raw.pop("readable")[:, :, 0])
+            nearest = nearest_covered(self._raw["coverage"][:, :, 0])
             of_hits = nearest_covered(array[:, :, 0])
             for geometry, image in self._raw.items():
                 if geometry != "coverage":
-                    image = dilate(image, self._nearest if geometry == "albedo" else of_hits)
+                    image = dilate(image, nearest if geometry == "albedo" else of_hits)
                 write_image(self._folder / f"{geometry}.exr", image, "float")
             self._raw.clear()
         else:
             self._raw[name] = array
 
     def take_light(self, light: PlannedLight, array: np.ndarray) -> None:
-        """Write one light's answer: finite, what the scene emits subtracted, dilated, half float (fireflies clipped, and said)."""
+        """Write one light's answer: finite, freed of what is left of the scene's own light, half float (fireflies clipped, and said)."""
         if not np.isfinite(array).all():
             raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
         array = dilate(array, self._nearest)
-        if self._emission is not None:
-            array = array - self._emission
+        if self._left is not None:
+            array = array - self._left
         beyond = int((np.abs(array) > HALF_MAX).sum())
         if beyond:
             self._reporter.say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
@@ -286,10 +296,6 @@ class _Images:
         if self._brightest > 0:
             return False
         return all(float(read_image(self._folder / light.file, 3).max()) <= 0 for light in lights)
-
-    def _write_ambient(self, image: np.ndarray) -> None:
-        self.has_ambient = True
-        write_image(self._folder / "ambient.exr", image, "float")
 
 
 def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:

@@ -64,7 +64,7 @@ class BakeSettings:
             if getattr(self, name) < 1:
                 raise InputError(f"expected {name.replace('_', ' ')} of 1 or more, found {getattr(self, name)}")
         for name in ("validation", "holdout", "seed", "sun_angle"):
-            if getattr(self, name) < 0:
+            if not getattr(self, name) >= 0:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
         if max(self.width, self.height) > 16384:
             raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
@@ -75,6 +75,7 @@ class BakeSettings:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
         record = asdict(self)
         if self.light_list is not None:
+            read_light_list(self.light_list)
             record["light_list"] = hashlib.sha256(self.light_list.read_bytes()).hexdigest()
         return record
 

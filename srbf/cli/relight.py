@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -38,6 +39,8 @@ def relight(
     force: Force = False,
 ) -> None:
     """Relight by any number of lights at once: max(0, their sum) + ambient. EXR is linear float, PNG is sRGB."""
+    if not abs(exposure) <= 100:
+        raise InputError(f"expected an exposure within ±100 stops, found {exposure:g}")
     flags: list[Light] = [
         *map(parse_directional, directional or []),
         *(parse_point(text, a0, falloff) for text in point or []),
@@ -50,6 +53,9 @@ def relight(
         frames = read_frames(lights)
         opened = Asset.open(asset)
         with atomic_folder(output, force, FRAMES_MARKER) as folder, progress_bar("relight") as update:
+            for number, frame in enumerate(frames):
+                for line in outside_domain(opened, frame):
+                    note(f"frame {number}: {line}")
             for number, image in enumerate(_render(opened, frames, renderer)):
                 write_image(folder / f"{number:04d}.exr", image, "float")
                 update(number + 1, len(frames))
@@ -73,8 +79,9 @@ def check_image_output(path: Path, force: bool) -> None:
         check_replaceable(path, False, "")
 
 
-def _render(asset: Asset, frames: list[list[Light]], renderer: str) -> list[np.ndarray]:
+def _render(asset: Asset, frames: list[list[Light]], renderer: str) -> Iterator[np.ndarray]:
     if renderer == "numpy":
-        return [methods.relight(asset, lights) for lights in frames]
-    with Relighter(asset) as relighter:
-        return [relighter.relight(lights) for lights in frames]
+        yield from (methods.relight(asset, lights) for lights in frames)
+    else:
+        with Relighter(asset) as relighter:
+            yield from (relighter.relight(lights) for lights in frames)

@@ -32,6 +32,7 @@ from srbf.lights import (
 from srbf.solve.least_squares import StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, domain_of, normalize, point_set
 
+HALF_DIM = 2.0**-6  # below it a hundredth of a map's largest value is already a subnormal half
 CHUNK = 1 << 16  # receivers, or environment texels, weighed at a time: (CHUNK, K) float64 stays in cache-sized memory
 
 
@@ -136,7 +137,8 @@ def quantize(
 ) -> tuple[ndarray, Float32[ndarray, "K 3"], Float32[ndarray, "K 3"]]:
     """(stored, scale, bias) with coefficients ~ stored * scale + bias; a uint8 counts as byte / 255.
 
-    float and half keep scale 1 and bias 0, unless a half would overflow: then that map's channel is scaled down, with a warning.
+    float and half keep scale 1 and bias 0, unless a half would overflow (then that map's channel is scaled down, with a warning) or
+    is so dim that half floats thin out.
     """
     k = len(coefficients)
     scale, bias = np.ones((k, 3), np.float32), np.zeros((k, 3), np.float32)
@@ -144,6 +146,8 @@ def quantize(
         return coefficients, scale, bias
     if encoding == "half":
         largest = np.abs(coefficients).max(axis=(1, 2))  # (K, 3)
+        dim = (largest > 0) & (largest < HALF_DIM)
+        scale[dim] = largest[dim]
         too_large = largest > HALF_MAX
         if too_large.any():
             scale[too_large] = (largest[too_large] / (HALF_MAX * 0.999)).astype(np.float32)

@@ -29,9 +29,10 @@ def _validator(name: SchemaName) -> Any:
 
 def check(value: dict[str, Any], name: SchemaName, where: str) -> None:
     """ManifestError, in one line, where `value` breaks the schema; `where` names the file."""
+    validator = _validator(name)
     from jsonschema.exceptions import best_match
 
-    error = best_match(_validator(name).iter_errors(value))
+    error = best_match(validator.iter_errors(value))
     if error is not None:
         place = "/".join(str(p) for p in error.absolute_path) or "its top level"
         message = error.message if len(error.message) <= 200 else error.message[:197] + "..."

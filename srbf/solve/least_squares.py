@@ -55,8 +55,7 @@ class StreamedLeastSquares:
             self._projected = part
         else:
             self._projected += part
-        flat = block.reshape(-1)
-        self._norm_squared += float(np.dot(flat, flat))
+        self._norm_squared += float(np.einsum("bm,bm->", block, block, dtype=np.float64))
 
     def solve(self, chunk: int = 1 << 18) -> Float32[ndarray, "K M"]:
         """X, once all rows are fed; formed in float64 by column chunks, kept in float32."""

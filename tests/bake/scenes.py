@@ -53,6 +53,7 @@ def camera(kind="PERSP", location=(0, -4, 3)):
     obj.location = location
     obj.rotation_euler = (math.atan2(4, 3), 0, 0)
     data.type = kind
+    data.dof.use_dof, data.dof.aperture_fstop = True, 8.0  # positions must not blur with the lens
     if kind == "PANO":
         target = data if hasattr(data, "panorama_type") else data.cycles
         target.panorama_type = "EQUIRECTANGULAR"
@@ -129,6 +130,37 @@ def layers():
     bpy.context.scene.collection.objects.link(empty)
 
 
+def scattered():
+    """The square with a geometry-nodes modifier that puts an instance of a black plate 0.3 m above its middle."""
+    obj = quad("Plane")
+    plate = quad(
+        "Plate", corners=[(-0.3, -0.3, 0.3), (0.3, -0.3, 0.3), (0.3, 0.3, 0.3), (-0.3, 0.3, 0.3)], color=(0, 0, 0), location=(50, 0, 0)
+    )
+    group = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    nodes = {
+        kind: group.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeJoinGeometry", "GeometryNodeObjectInfo")
+    }
+    info, join = nodes["GeometryNodeObjectInfo"], nodes["GeometryNodeJoinGeometry"]
+    info.inputs["Object"].default_value = plate
+    info.inputs["As Instance"].default_value = True
+    group.links.new(info.outputs["Geometry"], join.inputs[0])
+    group.links.new(nodes["NodeGroupInput"].outputs[0], join.inputs[0])
+    group.links.new(join.outputs[0], nodes["NodeGroupOutput"].inputs[0])
+    obj.modifiers.new("Scatter", "NODES").node_group = group
+    camera()
+
+
+def overriding():
+    """A view layer with a bright world and many samples of its own."""
+    plane()
+    layer = bpy.context.view_layer
+    layer.samples = 4096
+    if hasattr(layer, "world_override"):
+        layer.world_override = bpy.context.scene.world
+
+
 def hostile():
     """A plane, a missing texture, a text that would write a file on load, and a driver that would."""
     obj = quad("Plane")
@@ -198,6 +230,8 @@ SCENES = {
     "layers": layers,
     "hostile": hostile,
     "subdivided": subdivided,
+    "scattered": scattered,
+    "overriding": overriding,
     "no camera": lambda: quad("Plane"),
 }
 

@@ -115,7 +115,7 @@ def test_what_the_scene_emits_becomes_ambient(bake) -> None:
     np.testing.assert_allclose(centre, np.array([1, 0.5, 0.25]) * 5 * 0.16 / 1.07, rtol=0.1)
     for index, light in enumerate(capture.lights):
         corner = capture.image(index)[0, 0]  # far from the glowing square: the sun alone
-        np.testing.assert_allclose(corner, light.direction[2], atol=0.15)
+        np.testing.assert_allclose(corner, light.direction[2], rtol=HALF)  # and free of the glow's noise
     asset = RelightingMap(k=4).encode(capture)
     np.testing.assert_array_equal(relight(asset, []), asset.images["ambient"])
 
@@ -171,6 +171,24 @@ def test_receivers_that_cannot_be(bake, tmp_path: Path, receiver: str, layer: st
 def test_modifiers_are_applied_and_shared_meshes_left_alone(bake) -> None:
     baked = bake("subdivided", "lightmap:Plane")
     np.testing.assert_allclose(baked.capture.image(0), baked.capture.lights[0].direction[2], rtol=HALF)
+
+
+def test_what_modifiers_scatter_still_casts_shadows(bake) -> None:
+    capture = bake("scattered", "lightmap:Plane", lights=20).capture
+    index = int(capture.directions()[:, 2].argmax())
+    middle = capture.image(index)[15:17, 15:17]
+    assert middle.max() < 0.1 * capture.lights[index].direction[2]  # under the scattered plate
+    assert capture.image(index)[0, 0, 0] > 0.9 * capture.lights[index].direction[2]
+
+
+def test_a_view_layer_cannot_override_light_or_samples(bake) -> None:
+    capture = bake("overriding", "lightmap:Plane").capture
+    assert capture.ambient() is None
+
+
+def test_a_made_layer_is_found_again(bake) -> None:
+    again = bake("layers", "lightmap:NoUV", uv_layer="srbf lightmap").capture
+    assert again.manifest["receiver"]["uv_layer"] == "srbf lightmap" and again.coverage().any()
 
 
 def test_hostile_files_run_nothing_and_name_what_is_missing(bake, blend) -> None:

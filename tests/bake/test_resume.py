@@ -110,13 +110,24 @@ def test_other_settings_are_refused_and_named(blend, tmp_path: Path) -> None:
     assert contents(folder) == before
 
 
+def test_a_corrected_receiver_needs_no_flag(blend, tmp_path: Path) -> None:
+    folder = tmp_path / "capture"
+    wrong = Bake(blend("occluder"), folder, BakeSettings(Receiver("lightmap", "Plan"), 8, 8))
+    with pytest.raises(BakeError, match="'Plan'"):
+        wrong.run(Reporter())
+    assert not folder.exists()
+    assert job(blend, folder).run(Reporter())
+
+
 def test_a_second_process_is_refused(blend, tmp_path: Path) -> None:
     import filelock
 
     folder = tmp_path / "capture"
     folder.mkdir()
-    with filelock.FileLock(folder / ".lock"), pytest.raises(BakeError, match="another process"):
-        job(blend, folder).run(Reporter())
+    with filelock.FileLock(folder / ".lock"):
+        for restart in (False, True):
+            with pytest.raises(BakeError, match="another process"):
+                job(blend, folder).run(Reporter(), restart=restart)
     assert job(blend, folder).run(Reporter())
 
 

@@ -121,6 +121,9 @@ def test_frames(asset: Path, tmp_path: Path) -> None:
     ok("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "out")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["0000.exr", "0001.exr", "0002.exr"]
     opened = Asset.open(asset)
+    below = {"frames": [{"lights": [{"kind": "directional", "direction": [0, 0, -1]}]}]}
+    (tmp_path / "below.json").write_text(json.dumps(below))
+    assert "frame 0: light 0" in srbf("relight", asset, "--lights", tmp_path / "below.json", "-o", tmp_path / "below").stderr
     for number, lights in enumerate(read_frames(tmp_path / "frames.json")):
         np.testing.assert_array_equal(read_image(tmp_path / "out" / f"{number:04d}.exr"), methods.relight(opened, lights))
     assert not read_image(tmp_path / "out" / "0002.exr").any()
@@ -212,6 +215,8 @@ def test_bad_lights(asset: Path, tmp_path: Path, arguments: list[str], words: st
 
 def test_a_full_or_read_only_target(asset: Path) -> None:
     assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr")
+    assert "no folder" in refused("relight", asset, "-o", asset / "none" / "x.exr")
+    assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr")
 
 
 def test_gl_missing(asset: Path, tmp_path: Path) -> None:
@@ -226,8 +231,9 @@ def test_gl_missing(asset: Path, tmp_path: Path) -> None:
 
 def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
     assert ok("--version").startswith("srbf 0.")
-    for arguments in (["fit"], ["nonsense"], ["relight", "x"], ["bake", "x.blend", "-o", "y", "--receiver", "view", "--size", "large"]):
+    for arguments in (["fit"], ["nonsense"], ["relight", "x"], ["fit", "x", "-o", "y", "--encoding", "jpeg"]):
         assert srbf(*arguments).exit_code == 2
+    assert "--size" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "view", "--size", "large")
     assert "receiver" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "mirror")
     assert "x.blend" in refused("bake", tmp_path / "x.blend", "-o", tmp_path / "y", "--receiver", "view")
     assert not (tmp_path / "y").exists()
