@@ -19,7 +19,8 @@ from srbf.lights import Falloff, PointLight
 
 FALLOFFS: tuple[Falloff, ...] = ("inverse-square", "linear")
 DISTANCE_BINS = 6
-HEIGHT_ABOVE = (0.15, 1.0)  # lamps stand this far above the receivers' middle, in units of their largest extent
+MIDDLE = (0.1, 0.9)  # quantiles of the receivers' positions that bound the scene proper
+DISTANCE = (0.1, 0.6)  # from a lamp to the receiver that it stands before, in extents of that box
 
 
 def compare_with_lamps(
@@ -48,7 +49,7 @@ def compare_with_lamps(
         raise InputError(f"expected a .blend at {scene}, found no such file")
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
-    lamps = lamp_positions(positions, count, seed)
+    lamps = lamp_positions(asset, count, seed)
     references = _render(asset, receiver, scene, lamps, samples, seed, progress, say, blender)
     distances: list[np.ndarray] = []
     errors: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]] = {falloff: [] for falloff in FALLOFFS}
@@ -62,14 +63,21 @@ def compare_with_lamps(
     return _by_distance(np.concatenate(distances), errors, lamps)
 
 
-def lamp_positions(positions: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """(count, 3) places over the receivers: uniform in their horizontal box, above their middle height."""
+def lamp_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
+    """(count, 3) places inside the scene: before a random receiver, along its normal, by a random part of the scene's extent.
+
+    The extent, and the receivers to choose from, are the box that holds the middle four fifths of the receivers on each axis: a
+    view's horizon is not the room.
+    """
     rng = np.random.default_rng(seed)
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    extent = float((high - low).max())
-    places = rng.uniform(low, high, (count, 3))
-    places[:, 2] = np.median(positions[:, 2]) + extent * rng.uniform(*HEIGHT_ABOVE, count)
-    return places
+    covered = asset.covered
+    positions = asset.images["position"][covered].astype(np.float64)
+    normals = asset.images["normal"][covered] if "normal" in asset.images else np.broadcast_to([0, 0, 1], positions.shape)
+    low, high = np.quantile(positions, MIDDLE, axis=0)
+    near = np.flatnonzero(((positions >= low) & (positions <= high)).all(axis=1))
+    chosen = rng.choice(near if len(near) else np.arange(len(positions)), count)
+    distance = float((high - low).max()) * rng.uniform(*DISTANCE, count)
+    return positions[chosen] + normals[chosen] * distance[:, None]
 
 
 def _render(
