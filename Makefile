@@ -23,7 +23,7 @@ test: setup
 	$(BIN)/pytest
 
 test-fast: setup
-	$(BIN)/pytest -m "not blender"
+	$(BIN)/pytest -m "not blender" -n 2
 
 check: setup
 	$(BIN)/ruff format --check .

@@ -21,7 +21,8 @@ Domain = Literal["sphere", "hemisphere"]
 def normalize(vectors: Float[ndarray, "*shape 3"]) -> Float64[ndarray, "*shape 3"]:
     """Unit vectors of `vectors`; InputError on one that is zero or not finite."""
     v = np.asarray(vectors, np.float64)
-    v = v / np.maximum(np.abs(v).max(axis=-1, keepdims=True), 1e-300)  # so that no square over- or underflows
+    with np.errstate(invalid="ignore"):  # an infinite one becomes NaN, and is refused
+        v = v / np.maximum(np.abs(v).max(axis=-1, keepdims=True), 1e-300)  # so that no square over- or underflows
     length = np.linalg.norm(v, axis=-1, keepdims=True)
     if not np.isfinite(length).all() or (length < 1e-12).any():
         raise InputError(f"expected a direction of non-zero, finite length, found {np.asarray(vectors).tolist()}; give x,y,z not all zero")

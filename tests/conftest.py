@@ -34,7 +34,7 @@ def make_capture(tmp_path: Path) -> Callable[..., Capture]:
 
     def make(
         answer: Answer,
-        lights: int = 120,
+        lights: int = 60,
         holdout: int = 8,
         domain: str = "hemisphere",
         encoding: str = "float",
