@@ -1,6 +1,17 @@
-"""`python -m srbf`."""
+"""`srbf`, and `python -m srbf`."""
 
-from srbf.cli import app
+import sys
+
+
+def main() -> None:
+    """Run the command line; Ctrl-C while its libraries still load is one line, too."""
+    try:
+        from srbf.cli import app
+
+        app()
+    except KeyboardInterrupt:
+        sys.exit("srbf: stopped before it began")
+
 
 if __name__ == "__main__":
-    app()
+    main()

@@ -11,7 +11,6 @@ import pytest
 
 from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
-from srbf.errors import MissingLibraryError, ShaderError
 from srbf.gl.context import compile_program, create_context
 from srbf.gl.includes import resolve, resolve_text
 from srbf.methods.relighting_map import quantize
@@ -63,10 +62,7 @@ def make_asset() -> Callable[..., Asset]:
 
 @pytest.fixture(scope="session")
 def context() -> Iterator[Any]:
-    try:
-        made = create_context()
-    except (ShaderError, MissingLibraryError) as error:
-        pytest.skip(str(error))
+    made = create_context()  # `make setup` sees to it: where there is none, these tests fail rather than pass unrun
     yield made
     made.release()
 

@@ -1,6 +1,0 @@
-"""`python -m srbf.cli`."""
-
-from srbf.cli import app
-
-if __name__ == "__main__":
-    app()
