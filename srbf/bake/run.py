@@ -28,7 +28,7 @@ LOCK = ".lock"
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
 GEOMETRY = ("position", "normal", "albedo", "coverage")
-OURS = {LOCK, SCRATCH, LOG, "lights", "uv.json", "ambient.exr", *(f"{name}.exr" for name in GEOMETRY)}
+BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights")  # what may be there of a bake that never wrote an image
 
 
 @dataclass
@@ -108,10 +108,13 @@ class Bake:
         """Refuse a folder that this bake can neither go on with nor replace; empty it where the user said so."""
         done, begun = self.folder / MANIFEST, self.folder / STATE
         if not done.is_file() and not begun.is_file():
-            if any(p.name not in OURS and ".partial" not in p.name for p in self.folder.iterdir()):
+            if any(p.name not in BEFORE_IMAGES or (p.name == "lights" and any(p.iterdir())) for p in self.folder.iterdir()):
                 raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
             return
         recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
+        if recorded.get("emptying"):
+            self._empty()
+            return
         changed = _differences(recorded, identity)
         if not changed and not restart and not (force and done.is_file()):
             return
@@ -122,12 +125,16 @@ class Bake:
                 f"expected {state} of the same scene and settings at {self.folder}, found another {', '.join(changed)}; "
                 f"choose another -o, or {flag} to bake anew"
             )
-        # The manifest first: a folder emptied half way is an unfinished bake, never a capture with holes.
-        done.unlink(missing_ok=True)
-        begun.unlink(missing_ok=True)
+        self._empty()
+
+    def _empty(self) -> None:
+        """Remove an old capture. Killed on the way, the next run goes on: no light of the old bake may pass for one of the new."""
+        files.write_json(self.folder / STATE, {"emptying": True})
+        (self.folder / MANIFEST).unlink(missing_ok=True)
         for path in self.folder.iterdir():
-            if path.name != LOCK:
+            if path.name not in (LOCK, STATE):
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
+        (self.folder / STATE).unlink()
 
     def _sweep(self) -> None:
         """Remove what a killed process left half-written."""
@@ -177,7 +184,7 @@ class Bake:
             )
         with open(log, "a", encoding="utf-8") as lines:
             lines.write(f"srbf: {len(missing)} lights in {time.perf_counter() - started:.1f} s\n")
-        return self._manifest(lights, facts, images)
+        return self._manifest(identity, lights, facts, images)
 
     def _job(self, missing: list[PlannedLight], scratch: Path) -> dict[str, Any]:
         settings = self.settings
@@ -206,8 +213,8 @@ class Bake:
         if "uv" in event:
             files.write_json(self.folder / "uv.json", {"uv_layer": event["made_uv_layer"], "per_loop": event["uv"]})
 
-    def _manifest(self, lights: list[PlannedLight], facts: dict[str, Any], images: _Images) -> dict[str, Any]:
-        source = {**self._identity(), "srbf": srbf.__version__, "blender": facts["blender"]}
+    def _manifest(self, identity: dict[str, Any], lights: list[PlannedLight], facts: dict[str, Any], images: _Images) -> dict[str, Any]:
+        source = {**identity, "srbf": srbf.__version__, "blender": facts["blender"]}
         if "camera" in facts:
             source["camera"] = facts["camera"]
         if "made_uv_layer" in facts:

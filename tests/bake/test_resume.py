@@ -119,6 +119,25 @@ def test_a_corrected_receiver_needs_no_flag(blend, tmp_path: Path) -> None:
     assert job(blend, folder).run(Reporter())
 
 
+def test_killed_while_emptying_no_old_light_survives(blend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """--restart dies after the first deletion: the next run, of yet other settings, must not take the old lights for its own."""
+    folder = tmp_path / "capture"
+    assert job(blend, folder, samples=1).run(Reporter())
+
+    def die(path: Path) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("srbf.bake.run.shutil.rmtree", lambda path, ignore_errors=False: None if ignore_errors else die(path))
+        with pytest.raises(KeyboardInterrupt):
+            job(blend, folder, samples=2).run(Reporter(), restart=True)
+    assert list(folder.glob("lights/*.exr"))
+    assert job(blend, folder, samples=4).run(Reporter())
+    fresh = tmp_path / "fresh"
+    job(blend, fresh, samples=4).run(Reporter())
+    assert contents(folder) == contents(fresh)
+
+
 def test_a_second_process_is_refused(blend, tmp_path: Path) -> None:
     import filelock
 
