@@ -3,8 +3,8 @@ PYTHON ?= python3.11
 NAME := $(notdir $(PYTHON))
 VENV ?= $(if $(filter python3.11,$(NAME)),.venv,.venv-$(NAME))
 BIN := $(VENV)/bin
-OUT ?= out/demo
 SCENE ?= caustics
+OUT ?= out/$(SCENE)
 
 .PHONY: setup demo test test-fast check bench clean
 setup: $(VENV)/.installed

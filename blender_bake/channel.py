@@ -38,7 +38,10 @@ class Channel:
 def hand_over(scratch: Path, name: str, array: np.ndarray) -> str:
     """Write a float32 array for the host to take; returns the file's name."""
     file = f"{name}.npy"
-    np.save(scratch / file, np.ascontiguousarray(array, np.float32))
+    try:
+        np.save(scratch / file, np.ascontiguousarray(array, np.float32))
+    except OSError as error:
+        raise WorkerError(f"cannot write into {scratch.parent}: {error}; is the disk full? Free some and run again") from error
     return file
 
 

@@ -12,12 +12,11 @@ STRENGTHS = {
 }
 
 
-def switch_off() -> int:
-    """Set every emission strength of every material and node group to 0; returns how many were above it.
+def switch_off() -> None:
+    """Set every emission strength of every material and node group to 0, drivers and animation included.
 
     What emits by other means (a blackbody in a volume, say) is left, and the host subtracts its image.
     """
-    count = 0
     trees = [material.node_tree for material in bpy.data.materials if material.node_tree]
     trees += [group for group in bpy.data.node_groups if group.bl_idname == "ShaderNodeTree"]
     for tree in trees:
@@ -25,8 +24,7 @@ def switch_off() -> int:
             socket = node.inputs.get(STRENGTHS.get(node.bl_idname, ""))
             if socket is None:
                 continue
-            count += socket.is_linked or socket.default_value != 0
             for link in list(socket.links):
                 tree.links.remove(link)
+            tree.animation_data_clear()  # a driver would bring the strength back
             socket.default_value = 0.0
-    return count

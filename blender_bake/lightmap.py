@@ -45,7 +45,7 @@ class LightmapReceiver:
         return {"kind": "lightmap", "object": self._object.name, "uv_layer": self._uv_layer}
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log; `mesh` where a layer was made, so that it can be carried into the user's own scene."""
+        """For the dry run and the log; where a layer was made, its name and its coordinates per loop, to carry into one's own scene."""
         facts: dict[str, Any] = {
             "polygons": len(self._object.data.polygons),
             "covered_texels": int((self._coverage > 0).sum()),
@@ -104,14 +104,14 @@ class LightmapReceiver:
         # Blender's row 0 is the bottom: this is the one flip.
         return pixels.reshape(self._height, self._width, 4)[::-1]
 
-    def _check_coverage(self, chosen_by_us_or_user: bool) -> None:
+    def _check_coverage(self, made_or_named: bool) -> None:
         if not self._coverage.any():
             raise WorkerError(
                 f"expected texels on UV layer {self._uv_layer!r} of {self._object.name!r}, found none at "
                 f"{self._width}x{self._height}; check its UVs, or bake larger"
             )
         overlap = unwrap.overlap(self._object.data, self._uv_layer, self._coverage[:, :, 0])
-        if overlap > unwrap.OVERLAP_LIMIT and chosen_by_us_or_user:
+        if overlap > unwrap.OVERLAP_LIMIT and made_or_named:
             self._channel.warn(f"UV layer {self._uv_layer!r}: about {overlap:.0%} of its area overlaps, and overlapping faces share light")
 
     def _whiten_what_is_not_diffuse(self) -> None:
@@ -142,8 +142,10 @@ def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
         meshes = sorted(o.name for o in scene.objects if o.type == "MESH")
         shown = ", ".join(repr(n) for n in meshes[:12]) + (", …" if len(meshes) > 12 else "")
         raise WorkerError(f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}")
-    if obj.type not in {"MESH", "CURVE", "SURFACE", "FONT", "META"}:
-        raise WorkerError(f"expected a mesh object to bake, found {name!r} of type {obj.type}")
+    if obj.type != "MESH":
+        raise WorkerError(
+            f"expected a mesh object, found {name!r} of type {obj.type}; a curve or text: Object > Convert > Mesh, and save the .blend"
+        )
     if obj.hide_render:
         raise WorkerError(f"expected {name!r} to be renderable, found it disabled in renders; enable its camera icon and save the .blend")
     if obj.library or obj.override_library:
@@ -165,10 +167,6 @@ def apply_modifiers(obj: bpy.types.Object) -> None:
     depsgraph = bpy.context.evaluated_depsgraph_get()
     _realise_instances(obj, depsgraph)
     mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
-    if obj.type != "MESH":
-        raise WorkerError(
-            f"expected a mesh, found {obj.name!r} of type {obj.type}; convert it to a mesh (Object > Convert) and save the .blend"
-        )
     obj.modifiers.clear()
     obj.data = mesh
     if not mesh.polygons:

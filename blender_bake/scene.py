@@ -65,6 +65,7 @@ def configure(scene: bpy.types.Scene) -> None:
         "use_light_tree": False,
         "use_guiding": False,
         "use_animated_seed": False,
+        "use_fast_gi": False,
         "sample_clamp_direct": 0.0,
         "sample_clamp_indirect": 0.0,
         "light_sampling_threshold": 0.0,
@@ -80,6 +81,7 @@ def configure(scene: bpy.types.Scene) -> None:
     render.use_sequencer = False
     render.use_motion_blur = False
     render.use_border = False
+    render.pixel_aspect_x = render.pixel_aspect_y = 1.0
     render.use_multiview = False
     render.use_freestyle = False
     render.use_persistent_data = False  # it would keep the samples, seed and filter of the render before

@@ -28,6 +28,7 @@ class ViewReceiver:
         self._camera = find_camera(scene, job["receiver"].get("camera"))
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
+        self._coverage: np.ndarray | None = None
         self._prepare(job["width"], job["height"])
         if self._irradiance:
             self._whiten_if_nothing_is_diffuse(channel)
@@ -45,6 +46,7 @@ class ViewReceiver:
                 "matrix_world": [list(row) for row in self._camera.matrix_world],
                 "angle_x": data.angle_x,
                 "ortho_scale": data.ortho_scale,
+                "shift": [data.shift_x, data.shift_y],
             }
         }
 
@@ -58,7 +60,8 @@ class ViewReceiver:
         centre = self._render(1, 0, ("Combined", "Position", "Normal"))
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
         whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
-        hit, coverage = (centre["Combined"][:, :, 3:] > 0).astype(np.float32), np.clip(whole["Combined"][:, :, 3:], 0, 1)
+        hit = (centre["Combined"][:, :, 3:] > 0).astype(np.float32)
+        coverage = self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1)
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
         return {
@@ -71,13 +74,18 @@ class ViewReceiver:
         }
 
     def answer(self, samples: int, seed: int) -> np.ndarray:
-        """Radiance over coverage (COMBINED, unpremultiplied), or irradiance E = pi x (diffuse direct + indirect, without colour)."""
+        """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without colour).
+
+        The coverage is that of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
+        """
         if self._irradiance:
             passes = self._render(samples, seed, ("Diffuse Direct", "Diffuse Indirect"))
             return (passes["Diffuse Direct"] + passes["Diffuse Indirect"])[:, :, :3] * np.float32(math.pi)
+        if self._coverage is None:
+            self._coverage = np.clip(self._render(self._coverage_samples, 0, ("Combined",))["Combined"][:, :, 3:], 0, 1)
         combined = self._render(samples, seed, ("Combined",))["Combined"]
-        alpha = combined[:, :, 3:]
-        return np.where(alpha > 0, combined[:, :, :3] / np.where(alpha > 0, alpha, 1), 0)
+        seen = self._coverage > 0
+        return np.where(seen, combined[:, :, :3] / np.where(seen, self._coverage, 1), 0)
 
     def _prepare(self, width: int, height: int) -> None:
         render = self._scene.render

@@ -14,7 +14,7 @@ from srbf import files
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture, Quantity
-from srbf.errors import BakeError, InputError
+from srbf.errors import BakeError, InputError, OutputExistsError
 from srbf.evaluation import evaluate
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
@@ -53,6 +53,7 @@ def build_scene(name: str, path: Path) -> None:
         [sys.executable, str(scene_script(name)), str(temporary)], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
     )
     if finished.returncode != 0 or not temporary.is_file():
+        temporary.unlink(missing_ok=True)
         lines = (finished.stderr or finished.stdout).strip().splitlines()
         raise BakeError(f"expected the scene {name} to build, found status {finished.returncode}: {lines[-1] if lines else 'no message'}")
     temporary.replace(path)
@@ -71,8 +72,14 @@ def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress:
         build_scene(name, blend)
     settings = BakeSettings(scene.receiver, *scene.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=scene.quantity)
     reporter.say(f"baking {lights} directions at {scene.size[0]}x{scene.size[1]} with Cycles")
-    Bake(blend, capture_folder, settings).run(reporter)
-    timings["bake"] = clock() - started
+    try:
+        baked = Bake(blend, capture_folder, settings).run(reporter)
+    except OutputExistsError as error:
+        raise OutputExistsError(
+            f"expected this demo's own capture at {capture_folder}, found another; choose another -o, or delete it"
+        ) from error
+    if baked:
+        timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
     asset = RelightingMap(k=scene.k).encode(capture, lambda done, total: progress(done, total, "fit"))

@@ -19,7 +19,7 @@ def describe(path: Path) -> dict[str, Any]:
         return describe_capture(Capture.open(path))
     if (path / assets.MANIFEST).is_file():
         return describe_asset(Asset.open(path), path)
-    raise ManifestError(f"expected a capture.json or an asset.json in {path}, found neither")
+    raise ManifestError(f"expected a folder with a capture.json or an asset.json at {path}, found neither")
 
 
 def describe_capture(capture: Capture) -> dict[str, Any]:

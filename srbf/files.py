@@ -41,6 +41,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def _reason(error: Exception, path: Path) -> str:
     if not path.parent.is_dir():
         return f"there is no folder {path.parent}; make it first"
+    if not os.access(path.parent, os.W_OK):
+        return f"{path.parent} is read-only; choose a folder that can be written"
     if isinstance(error, SrbfError):
         free = shutil.disk_usage(path.parent).free
         text = str(error)
@@ -57,7 +59,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON atomically: sorted as given, two spaces, NaN refused, so that equal values give equal bytes."""
+    """Write JSON atomically: keys in the order given, NaN refused, so that equal values give equal bytes."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
@@ -110,8 +112,10 @@ def atomic_folder(path: Path, force: bool, marker: str) -> Iterator[Path]:
     -o never deletes a folder that is not ours.
     """
     check_replaceable(path, force, marker)
+    path = path.resolve()  # "." has no name to put a temporary one beside, and a link's target is what is replaced
     make_folder(path.parent)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    shutil.rmtree(temporary, ignore_errors=True)  # of a killed process that had this number
     make_folder(temporary)
     try:
         yield temporary
@@ -134,3 +138,5 @@ def check_replaceable(path: Path, force: bool, marker: str) -> None:
         raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
     if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
         raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")
+    if others := [p.name for p in path.iterdir() if p.is_dir() and p.name != "lights"]:
+        raise OutputExistsError(f"--force would delete the folder {others[0]!r} inside {path}; move it, or choose another -o")

@@ -46,7 +46,8 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     # The first light also hands the scene to Cycles: the second and third tell what every other one costs.
     per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
     fixed = max(0.0, seconds[1] - per_sample)
-    time = len(lights) * fixed + sum(light.samples for light in lights) * per_sample
+    ambient = 2 * settings.holdout_samples  # as the scene emits, and with all of it off
+    time = (len(lights) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
     disk = len(lights) * image_bytes + settings.width * settings.height * 40
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from srbf import methods
+from srbf import files, methods
 from srbf.asset import Asset
 from srbf.bake.run import base_job
 from srbf.bake.settings import BakeSettings, Receiver, noise_seed
@@ -38,8 +38,10 @@ def compare_with_lamps(
     For each falloff and distance bin: relative RMSE as it stands (a0 = 1 m) and `scaled`, at the one global a0 that fits best.
     The asset's captured light is directional, so occluders beyond a lamp still cast: this measures that approximation.
     """
-    if count < 1:
-        raise InputError(f"expected at least 1 lamp, found {count}")
+    if count < 1 or samples < 1:
+        raise InputError(f"expected at least 1 lamp and 1 sample, found {count} and {samples}")
+    if not asset.covered.any():
+        raise InputError("expected covered texels in the asset, found none")
     if "position" not in asset.images:
         raise InputError("comparing with lamps needs a position map, and this asset has none")
     receiver = asset.manifest.get("source", {}).get("receiver")
@@ -47,6 +49,9 @@ def compare_with_lamps(
         raise InputError("expected an asset baked from a scene, found one that names no receiver")
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found no such file")
+    baked = asset.manifest["source"].get("scene_sha256")
+    if baked not in (None, files.sha256_of(scene)):
+        say(f"{scene.name} is not as it was when this asset's capture was baked: the figures mix two scenes")
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
     lamps = lamp_positions(asset, count, seed)

@@ -15,10 +15,10 @@ import numpy as np
 import srbf
 from srbf import files
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
-from srbf.bake.worker import Worker
+from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.capture import MANIFEST
 from srbf.dilation import dilate, nearest_covered
-from srbf.errors import BakeError, ImageError, InputError, OutputExistsError
+from srbf.errors import BakeError, ImageError, InputError, MissingLibraryError, OutputExistsError
 from srbf.image import HALF_MAX, read_image, size_of, write_image
 
 STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
@@ -29,6 +29,7 @@ AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
 GEOMETRY = ("position", "normal", "albedo", "coverage")
 BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights")  # what may be there of a bake that never wrote an image
+WRITTEN = ("lights", "ambient.exr", *(f"{name}.exr" for name in GEOMETRY), "uv.json", SCRATCH, LOG)  # all that a bake leaves
 
 
 @dataclass
@@ -66,7 +67,14 @@ class Bake:
                 scratch = self.folder / SCRATCH
                 files.make_folder(scratch)
                 files.make_folder(self.folder / "lights")
-                manifest = self._bake(identity, scratch, reporter)
+                try:
+                    manifest = self._bake(identity, scratch, reporter)
+                except WorkerDiedError as error:
+                    if not (self.folder / STATE).is_file():
+                        raise
+                    raise BakeError(
+                        f"{error}; its log is {self.folder / LOG}; finished lights are kept, run the same command to go on"
+                    ) from error
                 files.write_json(self.folder / MANIFEST, manifest)
                 (self.folder / STATE).unlink()
                 return True
@@ -78,27 +86,32 @@ class Bake:
     @contextmanager
     def _lock(self) -> Iterator[None]:
         """Hold the folder; the system lets go of it however this process ends."""
-        import filelock
-
+        try:
+            import filelock
+        except ImportError as error:
+            raise MissingLibraryError("baking needs filelock: pip install filelock") from error
         if self.folder.exists() and not self.folder.is_dir():
             raise OutputExistsError(f"expected a folder or nothing at {self.folder}, found a file; choose another -o")
         files.make_folder(self.folder)
+        lock = filelock.FileLock(str(self.folder / LOCK))
         try:
-            with filelock.FileLock(str(self.folder / LOCK), timeout=0):
-                try:
-                    yield
-                finally:
-                    if self.folder.exists() and not any((self.folder / name).exists() for name in (STATE, MANIFEST)):
-                        (self.folder / LOCK).unlink(missing_ok=True)
+            lock.acquire(timeout=0)
         except filelock.Timeout as error:
             raise BakeError(f"another process is baking into {self.folder}; wait for it, or choose another -o") from error
-        except PermissionError as error:
+        except OSError as error:
             raise files.WriteError(f"cannot write into {self.folder}: {error.strerror}; choose a folder that can be written") from error
+        try:
+            yield
+        finally:
+            if self.folder.exists() and not any((self.folder / name).exists() for name in (STATE, MANIFEST)):
+                (self.folder / LOCK).unlink(missing_ok=True)
+            lock.release()
 
     def check_scene(self) -> None:
         """InputError where there is no scene to bake."""
         if not self.scene.is_file():
-            raise InputError(f"expected a .blend at {self.scene}, found no such file")
+            found = "a folder" if self.scene.is_dir() else "no such file"
+            raise InputError(f"expected a .blend at {self.scene}, found {found}")
 
     def _identity(self) -> dict[str, Any]:
         self.check_scene()
@@ -108,7 +121,8 @@ class Bake:
         """Refuse a folder that this bake can neither go on with nor replace; empty it where the user said so."""
         done, begun = self.folder / MANIFEST, self.folder / STATE
         if not done.is_file() and not begun.is_file():
-            if any(p.name not in BEFORE_IMAGES or (p.name == "lights" and any(p.iterdir())) for p in self.folder.iterdir()):
+            others = [p for p in self.folder.iterdir() if p.name not in BEFORE_IMAGES and ".partial" not in p.name]
+            if others or any((self.folder / "lights").glob("*")):
                 raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
             return
         recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
@@ -118,7 +132,11 @@ class Bake:
         changed = _differences(recorded, identity)
         if not changed and not restart and not (force and done.is_file()):
             return
-        if not (force or restart):
+        if not (force or (restart and not done.is_file())):
+            if not changed:
+                raise OutputExistsError(
+                    f"expected an unfinished capture to restart at {self.folder}, found a finished one; --force replaces it"
+                )
             state = "a finished capture" if done.is_file() else "a capture half done"
             flag = "--force" if done.is_file() else "--restart"
             raise OutputExistsError(
@@ -131,9 +149,9 @@ class Bake:
         """Remove an old capture. Killed on the way, the next run goes on: no light of the old bake may pass for one of the new."""
         files.write_json(self.folder / STATE, {"emptying": True})
         (self.folder / MANIFEST).unlink(missing_ok=True)
-        for path in self.folder.iterdir():
-            if path.name not in (LOCK, STATE):
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
+        for name in WRITTEN:
+            path = self.folder / name
+            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
         (self.folder / STATE).unlink()
 
     def _sweep(self) -> None:
@@ -180,7 +198,7 @@ class Bake:
         if images.is_all_black(lights):
             raise BakeError(
                 f"every light image is black: does light reach {facts['receiver'].get('object') or 'the camera'} from the "
-                f"{self.settings.domain}? Delete {self.folder} after mending the scene"
+                f"{self.settings.domain}? Mend the scene and bake with --restart"
             )
         with open(log, "a", encoding="utf-8") as lines:
             lines.write(f"srbf: {len(missing)} lights in {time.perf_counter() - started:.1f} s\n")

@@ -31,6 +31,10 @@ def command(blender: Path | None, job: Path) -> list[str]:
     return [sys.executable, "-m", "blender_bake", str(job)]
 
 
+class WorkerDiedError(BakeError):
+    """The process ended without an error event: a crash, or a kill."""
+
+
 class Worker:
     """A running worker; iterate its events. As a context manager it is dead at the end, whatever happened."""
 
@@ -81,10 +85,7 @@ class Worker:
             yield event
         status = self._process.wait()
         cause = f"signal {-status}" if status < 0 else f"status {status}"
-        raise BakeError(
-            f"Blender's process ended unexpectedly ({cause}); finished lights are kept, run the same command to go on. "
-            f"Its last words are in {self._log_path}: {self._last_words()}"
-        )
+        raise WorkerDiedError(f"Blender's process ended unexpectedly ({cause}), its last words being {self._last_words()}")
 
     def _parse(self, line: str) -> dict[str, Any] | None:
         try:

@@ -63,7 +63,7 @@ def spread_of(centers: Float[ndarray, "K 3"], rule: SpreadRule | float) -> float
 def r_table(spread: float) -> Float32[ndarray, " n"]:
     """R as a table: entry j is R at cos theta = -1 + 2 j / (n - 1), the smallest power of two n within TABLE_TOLERANCE.
 
-    Below about 0.1 rad, and above about 1.1 rad where R has a square-root cusp at cos theta = -1, MAX_TABLE_SIZE entries do not
+    Below about 0.11 rad, and above about 1 rad where R has a square-root cusp at cos theta = -1, MAX_TABLE_SIZE entries do not
     reach the tolerance: they are used all the same, with a warning that says the error.
     """
     n = 16

@@ -23,7 +23,7 @@ Blender = Annotated[
 def parse_size(text: str) -> tuple[int, int]:
     """(width, height) of `256` or `640x480`; InputError on others."""
     words = text.lower().split("x")
-    if len(words) > 2 or not all(word.isdigit() for word in words):
+    if len(words) > 2 or not all(word.isascii() and word.isdecimal() for word in words):
         raise InputError(f"expected --size N or WxH, found {text!r}")
     return int(words[0]), int(words[-1])
 

@@ -59,6 +59,7 @@ def relight(
             for number, image in enumerate(_render(opened, frames, renderer)):
                 write_image(folder / f"{number:04d}.exr", image, "float")
                 update(number + 1, len(frames))
+        note(f"wrote {len(frames)} images into {output}")
         return
     if output.suffix.lower() not in (".exr", ".png"):
         raise InputError(f"expected an output named .exr or .png, found {output.name!r}")
@@ -71,6 +72,7 @@ def relight(
         write_picture(output, image, exposure)
     else:
         write_image(output, image, "float")
+    note(f"wrote {output}")
 
 
 def check_image_output(path: Path, force: bool) -> None:

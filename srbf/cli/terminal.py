@@ -28,13 +28,16 @@ class Commands(typer.core.TyperGroup):
             return super().invoke(ctx)
         except SrbfError as error:
             fail(str(error))
+        except OSError as error:
+            if isinstance(error, BrokenPipeError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                raise typer.Exit(1) from None
+            where = f" at {error.filename}" if error.filename else ""
+            fail(f"the system refused{where}: {error.strerror or error}; free space, or choose a place that can be read and written")
         except MemoryError:
             fail("expected enough memory, found none left; use fewer maps or smaller images")
         except KeyboardInterrupt:
             fail("stopped; the same command goes on with a bake, other outputs were not written")
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(1) from None
 
 
 def fail(message: str) -> None:

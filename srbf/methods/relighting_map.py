@@ -125,6 +125,7 @@ class RelightingMap:
             "source": {
                 "srbf": srbf.__version__,
                 **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
+                **{key: made[key] for key in ("scene_sha256",) if key in (made := capture.manifest.get("source", {}))},
                 "settings": asdict(self),
                 "fit": {"train_lights": len(train), **_finite(asdict(report))},
             },

@@ -120,7 +120,7 @@ def test_a_corrected_receiver_needs_no_flag(blend, tmp_path: Path) -> None:
 
 
 def test_killed_while_emptying_no_old_light_survives(blend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """--restart dies after the first deletion: the next run, of yet other settings, must not take the old lights for its own."""
+    """--force dies after the first deletion: the next run, of yet other settings, must not take the old lights for its own."""
     folder = tmp_path / "capture"
     assert job(blend, folder, samples=1).run(Reporter())
 
@@ -130,7 +130,7 @@ def test_killed_while_emptying_no_old_light_survives(blend, tmp_path: Path, monk
     with monkeypatch.context() as patch:
         patch.setattr("srbf.bake.run.shutil.rmtree", lambda path, ignore_errors=False: None if ignore_errors else die(path))
         with pytest.raises(KeyboardInterrupt):
-            job(blend, folder, samples=2).run(Reporter(), restart=True)
+            job(blend, folder, samples=2).run(Reporter(), force=True)
     assert list(folder.glob("lights/*.exr"))
     assert job(blend, folder, samples=4).run(Reporter())
     fresh = tmp_path / "fresh"
