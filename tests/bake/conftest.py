@@ -14,7 +14,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 
-SCENES = Path(__file__).with_name("scenes.py")
+SCENES = Path(__file__).parents[2] / "data" / "scenes" / "known_answers.py"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -27,7 +27,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The .blend of a named scene of scenes.py."""
+    """The .blend of a named scene of data/scenes/known_answers.py."""
     folder = tmp_path_factory.mktemp("scenes")
 
     def build(name: str) -> Path:

@@ -87,7 +87,7 @@ def test_cycles_under_a_sky_equals_the_environment_relight(bake, blend, tmp_path
     sky[3:5, 20:23] = [8, 6, 4]
     sky[8:] = 0  # below the horizon nothing was captured
     write_image(tmp_path / "sky.exr", sky, "float")
-    scenes = Path(__file__).with_name("scenes.py")
+    scenes = Path(__file__).parents[2] / "data" / "scenes" / "known_answers.py"
     scene = blend("occluder")
     subprocess.run(
         [sys.executable, str(scenes), "hdri", str(scene), str(tmp_path / "sky.exr"), str(tmp_path / "e.npy")],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small scenes with known answers: `python scenes.py NAME OUT.blend`, or `python scenes.py hdri IN.blend SKY.exr OUT.npy`."""
+"""Small scenes with known answers: `python known_answers.py NAME OUT.blend`, or `python known_answers.py hdri IN.blend SKY.exr OUT.npy`."""
 
 from __future__ import annotations
 
