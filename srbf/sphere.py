@@ -108,6 +108,24 @@ def nearest_neighbour_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, 
     return 2 * np.arcsin(np.clip(np.linalg.norm(points - nearest, axis=1) / 2, 0, 1))
 
 
+def mean_spacing(points: Float[ndarray, "n 3"]) -> float:
+    """How far apart (rad) points of a set stand: the mean geodesic distance of each to its four nearest others.
+
+    The pitch of a square lattice, and within 5 % of sqrt(area / n) for Hammersley and Fibonacci sets of some hundred points: 10.3
+    degrees for 400 on the sphere, 7.4 on the hemisphere. It needs no area, so it holds for a list that covers part of the sky. pi for
+    a lone point. n x n work.
+    """
+    points = np.asarray(points, np.float64)
+    others = min(4, len(points) - 1)
+    if others < 1:
+        return float(np.pi)
+    cosines = points @ points.T
+    np.fill_diagonal(cosines, -np.inf)
+    nearest = np.argpartition(-cosines, others - 1, axis=1)[:, :others]  # (n, 4)
+    chords = np.linalg.norm(points[:, None] - points[nearest], axis=-1)
+    return float((2 * np.arcsin(np.clip(chords / 2, 0, 1))).mean())
+
+
 def _from_z_and_azimuth(z: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
     r = np.sqrt(np.maximum(0, 1 - z**2))
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=1)

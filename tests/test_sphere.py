@@ -10,6 +10,7 @@ from srbf.sphere import (
     domain_of,
     fibonacci,
     hammersley,
+    mean_spacing,
     nearest_neighbour_angles,
     normalize,
     point_set,
@@ -78,3 +79,22 @@ def test_domain_of() -> None:
 def test_normalize_refuses(bad: list[float]) -> None:
     with pytest.raises(InputError, match="direction"):
         normalize(np.array(bad, float))
+
+
+def test_mean_spacing_is_the_pitch_of_a_lattice() -> None:
+    pitch = 0.01
+    x, y = np.meshgrid(np.arange(-40, 41) * pitch, np.arange(-40, 41) * pitch)
+    near_the_pole = normalize(np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3))
+    # Gnomonic projection shrinks distances by up to 1 + r^2 = 1.32 at the corners; points of the border look further.
+    assert mean_spacing(near_the_pole) == pytest.approx(pitch, rel=0.15)
+    octahedron = np.concatenate([np.eye(3), -np.eye(3)])
+    assert mean_spacing(octahedron) == pytest.approx(np.pi / 2)
+    assert mean_spacing(np.array([[0, 0, 1.0], [1, 0, 0]])) == pytest.approx(np.pi / 2)
+    assert mean_spacing(np.array([[0, 0, 1.0]])) == np.pi
+
+
+@pytest.mark.parametrize("kind", ["hammersley", "fibonacci"])
+@pytest.mark.parametrize(("domain", "area"), [("sphere", 4 * np.pi), ("hemisphere", 2 * np.pi)])
+def test_mean_spacing_of_a_set_is_the_root_of_a_points_area(kind: str, domain: str, area: float) -> None:
+    for n in (200, 400, 1000):
+        assert mean_spacing(point_set(kind, n, domain)) == pytest.approx(np.sqrt(area / n), rel=0.05)

@@ -59,7 +59,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
         f"scene      {bake.scene} (Blender {facts['blender']})",
         f"receiver   {facts['receiver']['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
         f"lights     {roles['train']} train at {settings.samples} samples, {roles['validation']} validation and "
-        f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
+        f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}, a sun of {np.degrees(settings.sun_angle):.3g} degrees",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
         f"time       about {_duration(time)} on this machine as busy as it is now",
     ]

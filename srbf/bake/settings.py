@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from srbf.capture import Quantity, Role
 from srbf.errors import InputError
 from srbf.light_list import read_light_list
-from srbf.sphere import Domain, domain_of, point_set, random_directions
+from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class BakeSettings:
     holdout_samples: int = 64
     quantity: Quantity = "irradiance"
     seed: int = 0
-    sun_angle: float = 0.0
+    sun_angle: float = 0.0  # angular diameter of the light
     keep_lamps: bool = False
     light_list: Path | None = None
 
@@ -70,6 +70,11 @@ class BakeSettings:
             raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
+
+    def with_matched_sun(self) -> BakeSettings:
+        """The same with a sun as large as the train lights stand apart: penumbrae as soft as that many lights can resolve."""
+        train = [light.direction for light in plan_lights(self) if light.role == "train"]
+        return replace(self, sun_angle=min(mean_spacing(np.array(train)), float(np.pi)))
 
     def record(self) -> dict[str, Any]:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import degrees
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +11,7 @@ import typer
 from srbf.bake.estimate import estimate
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.cli.parameters import Blender, Force, Output, parse_size
+from srbf.cli.parameters import Blender, Force, Output, parse_size, parse_sun_angle
 from srbf.cli.terminal import note, progress_bar
 
 
@@ -36,7 +37,9 @@ def bake(
     light_list: Annotated[
         Path | None, typer.Option(help="A .lp file of directions to fit, instead of --lights.", show_default=False)
     ] = None,
-    sun_angle: Annotated[float, typer.Option(help="Angular diameter of the light, rad.")] = 0.0,
+    sun_angle: Annotated[
+        str, typer.Option(help="Angular diameter of the light, rad; auto: as large as the fitted lights stand apart.")
+    ] = "0",
     keep_lamps: Annotated[bool, typer.Option("--keep-lamps", help="The scene's own lamps and world become ambient.")] = False,
     blender: Blender = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say receiver, lights, disk and time; bake nothing.")] = False,
@@ -45,7 +48,7 @@ def bake(
 ) -> None:
     """Bake SCENE under many directional lights. Stopped at any moment, the same command goes on."""
     width, height = parse_size(size)
-    parsed = Receiver.parse(receiver, uv_layer)
+    parsed, angle = Receiver.parse(receiver, uv_layer), parse_sun_angle(sun_angle)
     settings = BakeSettings(
         receiver=parsed,
         width=width,
@@ -58,10 +61,13 @@ def bake(
         holdout_samples=holdout_samples,
         quantity=quantity or ("irradiance" if parsed.kind == "lightmap" else "radiance"),
         seed=seed,
-        sun_angle=sun_angle,
+        sun_angle=0.0 if angle == "auto" else angle,
         keep_lamps=keep_lamps,
         light_list=light_list,
     )
+    if angle == "auto":
+        settings = settings.with_matched_sun()
+        note(f"a sun of {settings.sun_angle:.4g} rad ({degrees(settings.sun_angle):.1f} degrees), as far as the fitted lights stand apart")
     job = Bake(scene, output, settings, blender)
     if dry_run:
         for line in estimate(job, note):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, cast, get_args
+from typing import Annotated, Literal, cast, get_args
 
 import typer
 
@@ -36,3 +36,13 @@ def parse_spread(text: str) -> SpreadRule | float:
         return float(text)
     except ValueError as error:
         raise InputError(f"expected --spread mean, min or a number of radians, found {text!r}") from error
+
+
+def parse_sun_angle(text: str) -> Literal["auto"] | float:
+    """`auto` or radians."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"expected --sun-angle auto or a number of radians, found {text!r}") from error

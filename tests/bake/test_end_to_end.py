@@ -14,6 +14,7 @@ from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_lamps
 from srbf.capture import Capture
 from srbf.image import read_image
+from srbf.sphere import mean_spacing
 
 pytestmark = pytest.mark.blender
 
@@ -59,6 +60,25 @@ def test_a_user_light_list_and_the_sphere(blend, tmp_path: Path) -> None:
     assert (sphere.directions()[:, 2] < 0).any()
     below = [i for i, light in enumerate(sphere.lights) if light.direction[2] < 0]
     assert not sphere.image(below[0]).any()
+
+
+def test_a_sun_as_large_as_the_spacing_of_the_lights(blend, tmp_path: Path) -> None:
+    (tmp_path / "one.lp").write_text("3\na 1 0 1\nb 1 0.1 1\nc 1 -0.1 1\n")
+    common = ["--receiver", "lightmap:Plane", "--size", 64, "--samples", 64, "--validation", 0, "--holdout", 0, "--holdout-samples", 1]
+    common += ["--light-list", tmp_path / "one.lp"]
+    partly_lit = {}
+    for angle in ("0", "auto"):
+        done = srbf("bake", blend("occluder"), "-o", tmp_path / angle, *common, "--sun-angle", angle)
+        assert done.returncode == 0, done.stderr
+        assert ("as far as the fitted lights stand apart" in done.stderr) == (angle == "auto")
+        capture = Capture.open(tmp_path / angle)
+        lit = capture.image(0)[..., 0] / np.sqrt(0.5)
+        partly_lit[angle] = int(((lit > 0.2) & (lit < 0.8)).sum())
+        assert capture.manifest["source"]["settings"]["sun_angle"] == (mean_spacing(capture.directions()) if angle == "auto" else 0)
+    # The disc of 0.09 rad smears the top of the wall over 0.5 * 2 * 0.09 = 0.09 m, three texels, for its metre of width: 32 rows.
+    assert partly_lit["auto"] > partly_lit["0"] + 32
+    again = srbf("bake", blend("occluder"), "-o", tmp_path / "auto", *common, "--sun-angle", "auto")
+    assert again.returncode == 0 and "complete already" in again.stderr
 
 
 def test_true_lamps_over_an_empty_plane(blend, bake, tmp_path: Path) -> None:
