@@ -1,0 +1,146 @@
+"""How relit pictures move, by method: `python benchmarks/motion.py [CAPTURE…] [--fit "-k 25"]…`; without captures, on scenes of its own.
+
+A light sweeps over 240 frames of great circles between the captured directions. Two scenes have a closed form: an unshadowed Lambert
+plane, whose brightness must stay within 2 % of its cosine, and a plane with a pole whose shadow is that of a sun of given size. A capture
+given is compared with all its train images interpolated, which is what it knows of directions between them.
+Every `--fit` is the flags of one `srbf fit`. Exit status 1 where a bar is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import COVERED, Capture
+from srbf.image import write_image
+from srbf.motion import Motion, Reference, dense_reference, great_circles, sampled_texels, sweep
+from srbf.shadow_sampling import shadow_sampling
+from srbf.sphere import Domain, mean_spacing, point_set
+
+SIDE = 48  # texels of our scenes
+LAMBERT_BAR = 0.02
+POLE_RADIUS, POLE_HEIGHT = 0.08, 1.0  # on the square [-1, 1]^2
+Answer = Callable[[np.ndarray], np.ndarray]  # (3,) -> (H, W) answers of a white surface
+
+
+def lambert(direction: np.ndarray) -> np.ndarray:
+    """An unshadowed plane facing up."""
+    return np.full((SIDE, SIDE), max(0.0, direction[2]))
+
+
+@dataclass(frozen=True)
+class Pole:
+    """A plane facing up around a vertical cylinder, under a sun of angular diameter `sun_angle` (rad); exact but at the shadow's tip.
+
+    A vertical edge hides the part of the sun's disc beyond a great circle; the pole's top does the same by elevation, and the two
+    are multiplied.
+    """
+
+    sun_angle: float
+
+    def __call__(self, direction: np.ndarray) -> np.ndarray:
+        x = -1 + 2 * (np.arange(SIDE) + 0.5) / SIDE
+        x, y = np.meshgrid(x, -x)
+        distance = np.hypot(x, y)
+        half_width = np.arcsin(np.clip(POLE_RADIUS / distance, 0, 1))
+        elevation = np.arcsin(np.clip(direction[2], -1, 1))
+        off = np.arctan2(direction[1], direction[0]) - np.arctan2(-y, -x)
+        left, right = (np.arcsin(np.cos(elevation) * np.sin(off + side * half_width)) for side in (1, -1))
+        beside = self._beyond(left) * self._beyond(-right)
+        below = self._beyond(np.arctan(POLE_HEIGHT / distance) - elevation)
+        hidden = np.where(np.cos(off) > 0, beside * below, 0.0)
+        return np.where(distance > POLE_RADIUS, max(0.0, direction[2]) * (1 - hidden), 0.0)
+
+    def _beyond(self, angle: np.ndarray) -> np.ndarray:
+        """The part of the disc on the far side of a great circle that is `angle` from its centre."""
+        t = np.clip(angle / max(self.sun_angle / 2, 1e-9), -1, 1)
+        return 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
+
+
+def make_capture(folder: Path, answer: Answer, lights: int, domain: Domain) -> Capture:
+    """The answers to the Hammersley directions that a bake takes, as half floats."""
+    (folder / "lights").mkdir(parents=True)
+    entries = []
+    for i, direction in enumerate(point_set("hammersley", lights, domain)):
+        file = f"lights/{i:04d}.exr"
+        write_image(folder / file, np.repeat(answer(direction)[:, :, None], 3, axis=2), "half")
+        entries.append({"kind": "directional", "direction": direction.tolist(), "role": "train", "file": file})
+    manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": SIDE, "height": SIDE, "lights": entries}
+    files.write_json(folder / "capture.json", manifest)
+    return Capture.open(folder)
+
+
+def truth(answer: Answer, texels: np.ndarray) -> Reference:
+    """The closed form as a sweep's reference."""
+    return lambda directions: np.stack([np.repeat(answer(d).reshape(-1, 1)[texels], 3, axis=1) for d in directions]).astype(np.float32)
+
+
+def fitted(capture: Capture, flags: str, folder: Path) -> Asset | str:
+    """The asset of `srbf fit` with these flags, or the last line that it failed with."""
+    command = [sys.executable, "-m", "srbf", "fit", str(capture.folder), "-o", str(folder), *shlex.split(flags)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        return (done.stderr.strip().splitlines() or ["no message"])[-1]
+    return Asset.open(folder)
+
+
+def row(name: str, motion: Motion, bar: str = "") -> None:
+    print(
+        f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_ripple:>9.1%}"
+        f"{motion.ghosting:>10.2f}  {bar}"
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("captures", nargs="*", type=Path)
+    parser.add_argument("--fit", action="append", help="flags of one srbf fit; repeat for a table of methods")
+    parser.add_argument("--lights", type=int, default=400)
+    parser.add_argument("--domain", choices=("hemisphere", "sphere"), default="hemisphere")
+    parser.add_argument("--sun-angle", default="auto", help="of the pole's sun: rad, or auto for the spacing of the lights")
+    arguments = parser.parse_args()
+    methods = arguments.fit or ["-k 25"]
+    missed = False
+    with tempfile.TemporaryDirectory() as name:
+        temporary = Path(name)
+        scenes: list[tuple[str, Capture, Answer | None]] = [(str(path), Capture.open(path), None) for path in arguments.captures]
+        if not scenes:
+            spacing = mean_spacing(point_set("hammersley", arguments.lights, arguments.domain))
+            angle = spacing if arguments.sun_angle == "auto" else float(arguments.sun_angle)
+            pole = f"pole, a sun of {np.degrees(angle):.1f} degrees"
+            for title, answer in (("Lambert plane", lambert), (pole, Pole(angle))):
+                scenes.append(
+                    (title, make_capture(temporary / f"capture{len(scenes)}", answer, arguments.lights, arguments.domain), answer)
+                )
+        for number, (title, capture, answer) in enumerate(scenes):
+            print(f"\n{title}: {shadow_sampling(capture).sentence()}")
+            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}")
+            texels = sampled_texels(capture.coverage() >= COVERED)
+            reference = dense_reference(capture, texels) if answer is None else truth(answer, texels)
+            for index, flags in enumerate(methods):
+                asset = fitted(capture, flags, temporary / f"asset{number}-{index}")
+                if isinstance(asset, str):
+                    print(f"{flags:<34}  not fitted: {asset}")
+                    continue
+                motion = sweep(asset, reference, texels, great_circles(asset.domain))
+                bar = ""
+                if answer is lambert:
+                    within = motion.brightness_error <= LAMBERT_BAR
+                    bar = f"{'within' if within else 'misses'} {LAMBERT_BAR:.0%} of its cosine"
+                    missed |= not within
+                row(flags, motion, bar)
+    return int(missed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
