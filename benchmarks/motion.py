@@ -13,7 +13,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,9 +23,9 @@ from srbf import files
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.image import write_image
-from srbf.motion import Motion, Reference, dense_reference, great_circles, sampled_texels, sweep
+from srbf.motion import Motion, Reference, compare, dense_reference, great_circles, sampled_texels, sweep
 from srbf.shadow_sampling import shadow_sampling
-from srbf.sphere import Domain, mean_spacing, point_set
+from srbf.sphere import Domain, domain_of, mean_spacing, point_set
 
 SIDE = 48  # texels of our scenes
 LAMBERT_BAR = 0.02
@@ -94,10 +94,29 @@ def fitted(capture: Capture, flags: str, folder: Path) -> Asset | str:
     return Asset.open(folder)
 
 
+def nearest_image(capture: Capture, texels: np.ndarray) -> Reference:
+    """Each direction answered by the train image closest to it."""
+    train = capture.indices("train")
+    images = np.stack([capture.image(i).reshape(-1, 3)[texels] for i in train])
+    towards = capture.directions(train).T
+    return lambda directions: images[(directions @ towards).argmax(axis=1)]
+
+
+def baselines(capture: Capture, answer: Answer | None, texels: np.ndarray, reference: Reference) -> Iterator[tuple[str, Motion]]:
+    """What all train images show without any compression: the nearest one, and, where the truth is known, all of them interpolated."""
+    path = great_circles(domain_of(capture.directions(capture.indices("train"))))
+    relighters = {"(nearest image)": nearest_image}
+    if answer is not None:
+        relighters["(all images interpolated)"] = dense_reference
+    for name, relighter in relighters.items():
+        pictures = (f(path.reshape(-1, 3)).reshape(*path.shape[:2], -1, 3) for f in (relighter(capture, texels), reference))
+        yield name, compare(path, *pictures)
+
+
 def row(name: str, motion: Motion, bar: str = "") -> None:
     print(
         f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_ripple:>9.1%}"
-        f"{motion.ghosting:>10.2f}  {bar}"
+        f"{motion.ghosting:>10.2f}{motion.edge_kept:>7.2f}  {bar}"
     )
 
 
@@ -124,9 +143,11 @@ def main() -> int:
                 )
         for number, (title, capture, answer) in enumerate(scenes):
             print(f"\n{title}: {shadow_sampling(capture).sentence()}")
-            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}")
+            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}{'kept':>7}")
             texels = sampled_texels(capture.coverage() >= COVERED)
             reference = dense_reference(capture, texels) if answer is None else truth(answer, texels)
+            for baseline, motion in baselines(capture, answer, texels, reference):
+                row(baseline, motion)
             for index, flags in enumerate(methods):
                 asset = fitted(capture, flags, temporary / f"asset{number}-{index}")
                 if isinstance(asset, str):

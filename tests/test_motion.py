@@ -54,7 +54,13 @@ def test_a_perfect_relighter() -> None:
     motion = compare(PATH, shadowed(), shadowed())
     assert (motion.change_ratio, motion.largest_step) == (1, 1)
     assert (motion.brightness_error, motion.largest_ripple, motion.ghosting) == (0, 0, 0)
+    assert motion.edge_kept == pytest.approx(1, rel=ROUNDING)
     assert motion.edge_texels == 1 and motion.edge.sum() > 0
+
+
+def test_without_shadows_nothing_ghosts_and_nothing_is_kept() -> None:
+    motion = compare(PATH, curve(np.ones(100)), curve((np.arange(100) >= 50).astype(float)))
+    assert (motion.ghosting, motion.edge_kept, motion.change_ratio) == (0, 0, 0)
 
 
 def test_a_gain_is_no_ripple() -> None:
@@ -91,6 +97,7 @@ def test_cross_fading_ghosts_by_what_it_shows_outside_the_edge(fade: int) -> Non
     faded = np.clip((frame - 49.5 + fade / 2) / fade, 0, 1) if fade % 2 else np.clip((frame - 49 + fade / 2) / fade, 0, 1)
     motion = compare(PATH, curve(faded), curve(hard))
     assert motion.ghosting == pytest.approx((fade - 3) / fade, rel=1e-3)
+    assert motion.edge_kept == pytest.approx(1 / fade, rel=1e-3)
     assert motion.change_ratio == pytest.approx(1 / np.sqrt(fade), rel=1e-3)
 
 
@@ -154,6 +161,16 @@ def test_a_dense_reference_is_the_truth_where_lights_are_dense(make_capture) -> 
     inside = [i for i in holdout if capture.lights[i].direction[2] > 0.2]
     expected = np.stack([capture.image(i).reshape(-1, 3)[texels] for i in inside])
     np.testing.assert_allclose(dense_reference(capture, texels)(capture.directions(inside)), expected, atol=0.05)
+
+
+@pytest.mark.parametrize(("domain", "tolerance"), [("hemisphere", 0.015), ("sphere", 0.025)])
+def test_a_dense_reference_keeps_a_lambert_planes_brightness(make_capture, domain: str, tolerance: float) -> None:
+    capture = make_capture(lambda d: np.full((1, 2, 3), max(0, d[2])), lights=400, domain=domain)
+    path = great_circles(domain)
+    texels = np.array([0, 1])
+    got = dense_reference(capture, texels)(path.reshape(-1, 3)).reshape(*path.shape[:2], 2, 3)
+    truth = np.repeat(np.repeat(np.maximum(path[..., 2], 0)[:, :, None, None], 2, axis=2), 3, axis=3).astype(np.float32)
+    assert compare(path, got, truth).brightness_error < tolerance
 
 
 def test_nothing_covered_is_refused() -> None:
