@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +10,11 @@ import numpy as np
 from numpy import ndarray
 
 from srbf import files, schemas
-from srbf.arrays import Bool, Float32, Float64
+from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.basis.gaussian import GaussianBasis, weight
 from srbf.capture import COVERED, Quantity, check_version
 from srbf.errors import ImageError, ManifestError
-from srbf.image import Encoding, read_image, require_finite, write_image
+from srbf.image import Encoding, read_image, require_finite, write_images
 from srbf.sphere import Domain
 
 MANIFEST = "asset.json"
@@ -98,6 +98,11 @@ class Asset:
             return stored
         return stored * self.scale[:, None, None] + self.bias[:, None, None]
 
+    def at(self, texels: Int[ndarray, " n"]) -> Asset:
+        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to ask it for answers, not to save."""
+        stored = self.stored.reshape(len(self.stored), -1, 3)[:, texels]
+        return replace(self, manifest={**self.manifest, "height": 1, "width": len(texels)}, stored=stored[:, None], images={})
+
     def map_bytes_per_texel(self) -> int:
         """What a shader reads of a texel's own maps: three channels count as four, since no GPU keeps three."""
         return self.k * 4 * {"half": 2, "float": 4, "uint8": 1}[self.encoding]
@@ -111,11 +116,11 @@ class Asset:
     def save(self, folder: Path, force: bool = False) -> None:
         """Write the folder whole or not at all; fills in `sha256`."""
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
-            for entry, stored in zip(self.manifest["maps"], self.stored, strict=True):
-                write_image(temporary / entry["file"], stored, entry["encoding"])
-            write_image(temporary / self.manifest["r_table"]["file"], self.table[None, :, None], "float")
-            for name, image in self.images.items():
-                write_image(temporary / self.manifest[name], image, "float")
+            maps = zip(self.manifest["maps"], self.stored, strict=True)
+            images: list[tuple[Path, ndarray, Encoding]] = [(temporary / map["file"], stored, map["encoding"]) for map, stored in maps]
+            images.append((temporary / self.manifest["r_table"]["file"], self.table[None, :, None], "float"))
+            images += [(temporary / self.manifest[name], image, "float") for name, image in self.images.items()]
+            write_images(images)
             written = sorted(p.name for p in temporary.iterdir())
             self.manifest["sha256"] = {name: files.sha256_of(temporary / name) for name in written}
             schemas.check(self.manifest, "asset", MANIFEST)

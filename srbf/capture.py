@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -12,9 +13,11 @@ import numpy as np
 from numpy import ndarray
 
 from srbf import files, schemas
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Float, Float32, Float64, Int
 from srbf.errors import ImageError, ManifestError
-from srbf.image import read_image, require_finite, size_of
+from srbf.half import finite_to_float32
+from srbf.image import holds_half, read_image, read_stored, require_finite
+from srbf.parallel import cores, each
 
 Role = Literal["train", "validation", "holdout"]
 Quantity = Literal["irradiance", "radiance"]
@@ -22,7 +25,9 @@ ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
 MANIFEST = "capture.json"
 COVERED = 0.5  # a texel of at least this coverage counts in metrics and figures
 UNIT_TOLERANCE = 1e-3  # of a manifest's directions
-BLOCK_BYTES = 64 << 20  # images of one block: small beside the maps, large enough for a matrix product
+BLOCK_BYTES = 64 << 20  # float32 images of one block: small beside the maps, large enough for a matrix product
+STREAM_BYTES = 128 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
+Look = Callable[[int, ndarray], None]  # (position within the lights asked for, image (P, 3) as stored)
 
 
 @dataclass(frozen=True)
@@ -104,23 +109,69 @@ class Capture:
 
         Three blocks of at most BLOCK_BYTES (or one image) are in memory at a time, however many lights there are.
         """
-        texels = self.width * self.height
-        size = max(1, BLOCK_BYTES // (texels * 12))
-        spans = [indices[i : i + size] for i in range(0, len(indices), size)]
-        with ThreadPoolExecutor(max_workers=2) as readers:
+        size = max(1, BLOCK_BYTES // (self.width * self.height * 12))
+        return self._blocks(indices, size, np.dtype(np.float32), 0)
 
-            def read(span: Sequence[int]) -> np.ndarray:
-                block = np.empty((len(span), texels, 3), np.float32)
-                for row, index in zip(block, span, strict=True):
-                    row[:] = self.image(index).reshape(texels, 3)
-                return block
+    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+        """`blocks` as stored, for sums over many lights: float16 where all of `indices` are half floats, else float32; all finite.
 
-            pending = [readers.submit(read, span) for span in spans[:2]]
-            for number in range(len(spans)):
-                block = pending.pop(0).result()
-                if number + 2 < len(spans):
-                    pending.append(readers.submit(read, spans[number + 2]))
-                yield number * size, block
+        A block's memory is used again for the next but one: be done with it when the next is asked for. `look` sees every image
+        once, warm from its file, in whatever thread read it. Memory: two blocks of STREAM_BYTES (or one image) and an image a
+        core, however many lights there are.
+        """
+        with ThreadPoolExecutor(cores()) as readers:
+            half = all(readers.map(lambda index: holds_half(self.folder / self.lights[index].file), indices))
+        stored = np.dtype(np.float16 if half else np.float32)
+        size = max(1, STREAM_BYTES // (self.width * self.height * 3 * stored.itemsize))
+        return self._blocks(indices, size, stored, 2, look)
+
+    def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
+        """Rows of T: what receivers `texels` (flat) answer to each of `indices`. An image's ZIP is undone whole to pick from it."""
+        answers = np.empty((len(texels), len(indices), 3), np.float32)
+
+        def read(row: int) -> None:
+            answers[:, row] = self._stored(indices[row])[texels]
+
+        each(read, len(indices))
+        return answers
+
+    def _blocks(
+        self, indices: Sequence[int], size: int, stored: np.dtype, buffers: int, look: Look | None = None
+    ) -> Iterator[tuple[int, np.ndarray]]:
+        """Blocks of `size` images of type `stored`, a thread a core reading one block ahead; in `buffers` arrays, or new ones if 0."""
+        shape = (min(size, len(indices)), self.width * self.height, 3)
+        ring = [np.empty(shape, stored) for _ in range(buffers)]
+
+        def read(row: int, target: np.ndarray) -> None:
+            image = self._stored(indices[row])
+            if look is not None:
+                look(row, image)
+            if image.dtype == np.float16 and stored == np.float32:
+                finite_to_float32(image, target)
+            else:
+                target[...] = image
+
+        def start(first: int) -> tuple[int, np.ndarray, list[Future[None]]]:
+            block = ring[first // size % buffers] if ring else np.empty(shape, stored)
+            block = block[: len(indices) - first]
+            return first, block, [readers.submit(read, first + i, target) for i, target in enumerate(block)]
+
+        readers = ThreadPoolExecutor(cores())
+        try:
+            waiting = deque([start(0)] if len(indices) else [])
+            while waiting:
+                first, block, pending = waiting.popleft()
+                if first + size < len(indices):
+                    waiting.append(start(first + size))
+                for done in pending:
+                    done.result()
+                yield first, block
+        finally:
+            readers.shutdown(cancel_futures=True)
+
+    def _stored(self, index: int) -> Float[ndarray, "P 3"]:
+        """An image of T as its file has it, float16 or float32, of the right size and finite."""
+        return self._checked(self.lights[index].file, read_stored, 3).reshape(-1, 3)
 
     def geometry(self, name: Literal["position", "normal", "albedo"]) -> Float32[ndarray, "H W 3"] | None:
         """World position (m), unit normal or albedo of every receiver, where the capture has it."""
@@ -137,11 +188,13 @@ class Capture:
         return self._read(self.manifest["ambient"], 3) if "ambient" in self.manifest else None
 
     def _read(self, name: str, channels: int) -> np.ndarray:
+        return self._checked(name, read_image, channels)
+
+    def _checked(self, name: str, read: Callable[[Path, int], np.ndarray], channels: int) -> np.ndarray:
         path = self.folder / name
-        found = size_of(path)
-        if found != (self.height, self.width):
-            raise ImageError(f"expected {self.width}x{self.height} texels in {path}, found {found[1]}x{found[0]}")
-        pixels = read_image(path, channels)
+        pixels = read(path, channels)
+        if pixels.shape[:2] != (self.height, self.width):
+            raise ImageError(f"expected {self.width}x{self.height} texels in {path}, found {pixels.shape[1]}x{pixels.shape[0]}")
         require_finite(pixels, path)
         return pixels
 

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from threading import Lock
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Int
+from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.capture import COVERED, ROLES, Capture
 from srbf.errors import InputError
+from srbf.half import finite_to_float32
 from srbf.methods import directional_responses
+from srbf.parallel import each, one_blas_thread
 
 PEAK_QUANTILE = 0.999
+WATCHED_BYTES = 192 << 20  # half answers of all covered texels to all train lights, where they fit: 256² under 500 lights
+SAMPLE_TEXELS = 1 << 15  # watched where they do not, or fewer under very many lights
+PIECE = 1 << 14  # values whose squares are summed in float32
+LIGHTS_AT_A_TIME = 16  # relit on the watched texels by one thread
 
 
 @dataclass(frozen=True)
@@ -34,17 +41,49 @@ class RoleError:
 
 
 class PeakHistogram:
-    """Quantiles of non-negative values from a histogram over their float32 bits: exact on half floats, 2^-11 relative on others."""
+    """Quantiles of non-negative values from a histogram over their float32 bits: exact on half floats, 2^-11 relative on others.
+
+    Told `total`, how many values will come, and the quantile `q` that will be asked for, it looks only at values that can still matter: not
+    at those below a bin that enough others have reached. The answer is the same, and soon most of an image is passed over.
+    """
 
     SHIFT = 13  # mantissa bits dropped: ten are left, as many as a half float has
 
-    def __init__(self) -> None:
+    def __init__(self, total: int | None = None, q: float = 0.0) -> None:
         self._counts: Int[ndarray, " bins"] = np.zeros(1 << (31 - self.SHIFT), np.int64)
+        self._wanted = None if total is None else total - int(np.floor(q * (total - 1)))  # the rank of the quantile from the top
+        self._floor = 0  # the first bin that can matter
+        self._lock = Lock()
 
-    def add(self, values: Float32[ndarray, "*shape"]) -> None:
-        """Count `values`, clamped at 0 and rounded to the nearest bin."""
-        bits = np.maximum(values, 0).ravel().view(np.uint32)
-        self._counts += np.bincount((bits + (1 << (self.SHIFT - 1))) >> self.SHIFT, minlength=len(self._counts))
+    def add(self, values: Float[ndarray, "*shape"], rows: Bool[ndarray, " P"] | None = None) -> None:
+        """Count finite `values`, float32 or float16, of `rows` if given, clamped at 0 and rounded to the nearest bin; from any thread."""
+        count = values.size if rows is None else int(np.count_nonzero(rows)) * (values.size // len(rows))
+        if self._floor:
+            chosen = self._may_matter(values)
+            values = values[chosen if rows is None else chosen & rows[:, None]]
+        elif rows is not None:
+            values = values[rows]
+        values = values.ravel()
+        if values.dtype == np.float16:
+            values = finite_to_float32(values, np.empty(values.shape, np.float32))
+        bits = np.maximum(values, 0).view(np.uint32)
+        bins = (bits + (1 << (self.SHIFT - 1))) >> self.SHIFT
+        first = int(bins.min()) if len(bins) else 0
+        counts = np.bincount(bins - np.uint32(first))
+        with self._lock:
+            self._counts[first : first + len(counts)] += counts
+            self._counts[0] += count - len(values)
+            if self._wanted is not None:
+                above = np.cumsum(self._counts[: self._floor : -1])  # from the last bin down to the floor's next
+                if above[-1] >= self._wanted:
+                    self._floor = len(self._counts) - 1 - int(np.searchsorted(above, self._wanted))
+
+    def _may_matter(self, values: ndarray) -> ndarray:
+        """Which values reach the floor's bin, or the half float below it."""
+        least = np.array([(self._floor - 1) << self.SHIFT], np.uint32).view(np.float32)
+        if values.dtype == np.float16:  # positive halves are in the order of their bits, negative ones below
+            return values.view(np.int16) >= least.astype(np.float16).view(np.int16)
+        return values >= least
 
     def quantile(self, q: float) -> float:
         """Linear interpolation between order statistics, as numpy.quantile has it."""
@@ -55,33 +94,88 @@ class PeakHistogram:
         return float(low + (high - low) * (rank - np.floor(rank)))
 
 
-def evaluate(asset: Asset, capture: Capture, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
+class TrainWatch:
+    """What the error of the train lights needs, taken while a fit streams them, so that they are not read a second time.
+
+    `look`, given to a method's `encode`, counts every covered value for the peak (exact) and keeps the answers of every covered texel where
+    WATCHED_BYTES hold them, else of SAMPLE_TEXELS, one at random out of each of equal runs of them.
+    InputError where nothing is covered.
+    """
+
+    def __init__(self, capture: Capture) -> None:
+        self.lights = capture.indices("train")
+        covered = _covered(capture)
+        self._rows = None if covered.all() else covered
+        texels = np.flatnonzero(covered)
+        held = max(1, WATCHED_BYTES // (6 * max(1, len(self.lights))))
+        self.exact = len(texels) <= held
+        if not self.exact:
+            count = min(held, SAMPLE_TEXELS)
+            runs = np.arange(count + 1) * len(texels) // count
+            texels = texels[(runs[:-1] + np.random.default_rng(0).random(count) * np.diff(runs)).astype(np.int64)]
+        self.texels: Int[ndarray, " n"] = texels
+        self.peaks = PeakHistogram(int(covered.sum()) * 3 * len(self.lights), PEAK_QUANTILE)
+        self._answers: dict[int, ndarray] = {}
+
+    def look(self, row: int, image: Float[ndarray, "P 3"]) -> None:
+        """See the answer to train light `row`, as stored."""
+        self._answers[row] = image[self.texels]
+        self.peaks.add(image, self._rows)
+
+    def squares(self, asset: Asset, capture: Capture) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
+        """Sums of squared differences and of squared references, a light, over `texels`."""
+        picked = asset.at(self.texels)
+        directions = capture.directions(self.lights)
+        sums = np.empty((2, len(self.lights)))
+
+        def compare(task: int) -> None:
+            rows = range(task * LIGHTS_AT_A_TIME, min((task + 1) * LIGHTS_AT_A_TIME, len(self.lights)))
+            relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            for row, answer in zip(rows, relit, strict=True):
+                reference = self._answers[row]
+                if reference.dtype == np.float16:
+                    reference = finite_to_float32(reference, np.empty(reference.shape, np.float32))
+                sums[:, row] = _squares(answer, reference)
+
+        with one_blas_thread():
+            each(compare, -(-len(self.lights) // LIGHTS_AT_A_TIME))
+        return sums[0], sums[1]
+
+
+def evaluate(
+    asset: Asset,
+    capture: Capture,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    watch: TrainWatch | None = None,
+) -> dict[str, Any]:
     """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
 
-    The peak is the 99.9 % quantile of the train references (1 for 8-bit sources). A role without lights is left out.
+    The peak is the 99.9 % quantile of the train references (1 for 8-bit sources). A role without lights is left out. With a
+    `watch` that has seen the train images they are not read again: peak, validation and holdout are the same, and train's error is that
+    of the watched texels, whose number stands beside it as `texels` where they are not all.
     InputError where asset and capture differ in size.
     """
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
-    covered = capture.coverage().ravel() >= COVERED
-    if not covered.any():
-        raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
-    samples = int(covered.sum()) * 3
-    peaks = PeakHistogram()
+    covered = _covered(capture)
+    samples = dict.fromkeys(ROLES, int(covered.sum()) * 3)
+    peaks = PeakHistogram() if watch is None else watch.peaks
     squares: dict[int, float] = {}  # sum of squared differences a light
     powers: dict[int, float] = {}  # sum of squared references a light
+    if watch is not None:
+        samples["train"] = len(watch.texels) * 3
+        for light, square, power in zip(watch.lights, *watch.squares(asset, capture), strict=True):
+            squares[light], powers[light] = float(square), float(power)
     for role in ROLES:
-        indices = capture.indices(role)
+        indices = capture.indices(role) if role != "train" or watch is None else []
         for first, block in capture.blocks(indices):
             chosen = indices[first : first + len(block)]
             relit = directional_responses(asset, capture.directions(chosen)).reshape(block.shape)
             for index, answer, reference in zip(chosen, relit, block, strict=True):
-                reference = np.maximum(reference[covered], 0)
+                reference = reference[covered]
                 if role == "train":
                     peaks.add(reference)
-                difference = np.maximum(answer[covered], 0) - reference
-                squares[index] = float(np.einsum("pc,pc->", difference, difference, dtype=np.float64))
-                powers[index] = float(np.einsum("pc,pc->", reference, reference, dtype=np.float64))
+                squares[index], powers[index] = _squares(answer[covered], reference)
                 progress(len(squares), len(capture.lights))
     has_train = bool(capture.indices("train"))
     peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
@@ -89,12 +183,35 @@ def evaluate(asset: Asset, capture: Capture, progress: Callable[[int, int], None
     for role in ROLES:
         indices = capture.indices(role)
         if indices:
-            error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples, peak)
+            error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
             result[role] = asdict(error)
+    if watch is not None and not watch.exact:
+        result["train"]["texels"] = len(watch.texels)
     result["lights"] = [
-        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples))} for i, light in enumerate(capture.lights)
+        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples[light.role]))}
+        for i, light in enumerate(capture.lights)
     ]
     return result
+
+
+def _covered(capture: Capture) -> Bool[ndarray, " P"]:
+    covered = capture.coverage().ravel() >= COVERED
+    if not covered.any():
+        raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
+    return covered
+
+
+def _squares(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"]) -> tuple[float, float]:
+    """Sums of squared differences and of squared references, both images clamped at 0."""
+    reference = np.maximum(reference, 0)
+    difference = np.maximum(answer, 0) - reference
+    return _energy(difference), _energy(reference)
+
+
+def _energy(values: Float32[ndarray, "n 3"]) -> float:
+    """Sum of squares: float32 within a piece, float64 over pieces."""
+    flat = values.ravel()
+    return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + PIECE] for start in range(0, len(flat), PIECE)))
 
 
 def _role_error(squares: np.ndarray, powers: np.ndarray, samples: int, peak: float) -> RoleError:

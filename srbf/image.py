@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32
+from srbf.arrays import Float, Float32
 from srbf.errors import ImageError, MissingLibraryError
 from srbf.files import atomic_path
+from srbf.half import all_finite, finite_to_float32
+from srbf.parallel import each
 
 Encoding = Literal["half", "float", "uint8"]
 HALF_MAX = 65504.0
@@ -23,20 +26,30 @@ def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W
     With `channels` 3, grey is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned as they
     are: `require_finite` names the file. ImageError on a missing, damaged or truncated file.
     """
+    pixels = read_stored(path, channels)
+    if pixels.dtype == np.float32:
+        return pixels
+    return finite_to_float32(pixels, np.empty(pixels.shape, np.float32)) if all_finite(pixels) else pixels.astype(np.float32)
+
+
+def read_stored(path: Path, channels: int | None = None) -> Float[ndarray, "H W C"]:
+    """`read_image` without its widening: float16 where the file holds half floats, float32 of anything else. The file is opened once."""
     oiio = _oiio()
-    stored = oiio.ImageSpec()
-    stored.attribute("oiio:UnassociatedAlpha", 1)  # colours as the file holds them, not multiplied by its alpha
-    source = oiio.ImageInput.open(str(path), stored) if path.is_file() else None
+    wanted = oiio.ImageSpec()
+    wanted.attribute("oiio:UnassociatedAlpha", 1)  # colours as the file holds them, not multiplied by its alpha
+    source = oiio.ImageInput.open(str(path), wanted) if path.is_file() else None
     if source is None:
         reason = _first_line(oiio.geterror()) if path.is_file() else "no such file"
         raise ImageError(f"cannot read image {path}: {reason}")
     try:
-        pixels = source.read_image(0, 0, 0, source.spec().nchannels, oiio.FLOAT)
+        spec = source.spec()
+        half = spec.format == oiio.TypeHalf
+        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.HALF if half else oiio.FLOAT)
         if pixels is None:
             raise ImageError(f"cannot read image {path}: {_first_line(source.geterror())}; is it damaged or cut short?")
     finally:
         source.close()
-    pixels = np.asarray(pixels, np.float32)
+    pixels = np.asarray(pixels, np.float16 if half else np.float32)
     if pixels.ndim == 2:
         pixels = pixels[:, :, None]
     if channels is None or pixels.shape[2] == channels:
@@ -46,6 +59,17 @@ def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W
     if pixels.shape[2] > channels:
         return np.ascontiguousarray(pixels[:, :, :channels])
     raise ImageError(f"expected {channels} channels in {path}, found {pixels.shape[2]}")
+
+
+def holds_half(path: Path) -> bool:
+    """Whether a file stores half floats, from its header alone; False where there is none to read."""
+    source = _oiio().ImageInput.open(str(path)) if path.is_file() else None
+    if source is None:
+        _oiio().geterror()  # taken, so that it does not speak up at exit
+        return False
+    half = bool(source.spec().format == _oiio().TypeHalf)
+    source.close()
+    return half
 
 
 def bits_of(path: Path) -> int:
@@ -70,9 +94,9 @@ def size_of(path: Path) -> tuple[int, int]:
     return spec.height, spec.width
 
 
-def require_finite(pixels: Float32[ndarray, "H W C"], path: Path) -> None:
-    """ImageError that names the file, the count and the first texel where `pixels` holds NaN or Inf."""
-    if not np.isfinite(pixels).all():
+def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:
+    """ImageError that names the file, the count and the first texel where `pixels`, float32 or float16, holds NaN or Inf."""
+    if not (all_finite(pixels) if pixels.dtype == np.float16 else np.isfinite(pixels).all()):
         bad = ~np.isfinite(pixels).all(axis=2)
         r, c = np.argwhere(bad)[0]
         raise ImageError(f"expected finite values in {path}, found NaN or Inf in {int(bad.sum())} texels, first at row {r}, column {c}")
@@ -90,11 +114,11 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
             raise ImageError(f"expected bytes for {path}, found {pixels.dtype}")
         stored = pixels
     else:
-        if not np.isfinite(pixels).all():
+        if not (all_finite(pixels) if pixels.dtype == np.float16 else np.isfinite(pixels).all()):
             raise ImageError(f"refused to write {path}: it would hold NaN or Inf")
-        if encoding == "half" and pixels.size and float(np.abs(pixels).max()) > HALF_MAX:
+        if encoding == "half" and pixels.dtype != np.float16 and pixels.size and float(np.abs(pixels).max()) > HALF_MAX:
             raise ImageError(f"expected values within half float's ±{HALF_MAX:.0f} for {path}, found {float(np.abs(pixels).max()):.4g}")
-        stored = pixels.astype(np.float16 if encoding == "half" else np.float32)
+        stored = pixels.astype(np.float16 if encoding == "half" else np.float32, copy=False)
     height, width, channels = stored.shape
     spec = oiio.ImageSpec(width, height, channels, {"half": oiio.HALF, "float": oiio.FLOAT, "uint8": oiio.UINT8}[encoding])
     if encoding != "uint8":
@@ -107,6 +131,11 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
         written = target.write_image(np.ascontiguousarray(stored))
         if not (target.close() and written):
             raise ImageError(f"cannot write image {path}: {_first_line(target.geterror())}; is the disk full?")
+
+
+def write_images(images: Sequence[tuple[Path, ndarray, Encoding]]) -> None:
+    """`write_image` of each (path, pixels, encoding), a thread a core at it; the first error in their order, once all have ended."""
+    each(lambda i: write_image(*images[i]), len(images))
 
 
 def write_picture(path: Path, linear: Float32[ndarray, "H W 3"], exposure: float = 0.0) -> None:

@@ -44,6 +44,47 @@ def test_blocks_are_the_images_in_order(capture: Capture, monkeypatch: pytest.Mo
     assert BLOCK_BYTES < 1 << 28
 
 
+@pytest.mark.parametrize("encoding", ["half", "float"])
+def test_the_stream_is_the_images_as_stored(make_capture, encoding: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    capture = make_capture(lambda d: rng.normal(size=(6, 8, 3)), lights=20, encoding=encoding)
+    stored = np.float16 if encoding == "half" else np.float32
+    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 3 * 6 * 8 * 3 * np.dtype(stored).itemsize)
+    indices = capture.indices("train")[::-1]
+    looked: dict[int, np.ndarray] = {}
+    seen = [(first, block.copy()) for first, block in capture.stream(indices, lambda row, image: looked.update({row: image}))]
+    assert [first for first, _ in seen] == list(range(0, 20, 3)) and all(block.dtype == stored for _, block in seen)
+    expected = np.stack([capture.image(i).reshape(48, 3) for i in indices])
+    np.testing.assert_array_equal(np.concatenate([block for _, block in seen]), expected)
+    np.testing.assert_array_equal([looked[row] for row in range(20)], expected)
+    assert list(capture.stream([])) == []
+
+
+def test_one_float_image_keeps_the_whole_stream_float(capture: Capture) -> None:
+    third = np.full((6, 8, 3), 1 / 3, np.float32)
+    for i in range(20):
+        write_image(capture.folder / capture.lights[i].file, third, "half" if i != 7 else "float")
+    (_, block), *rest = capture.stream(capture.indices("train"))
+    assert not rest and block.dtype == np.float32
+    assert (block[7] == np.float32(1 / 3)).all() and (block[8] == np.float16(1 / 3)).all()
+
+
+def test_a_sample_is_rows_of_the_transport_matrix(capture: Capture) -> None:
+    indices, texels = [4, 0, 21], np.array([47, 3, 11])
+    expected = np.stack([capture.image(i).reshape(48, 3)[texels] for i in indices], axis=1)
+    np.testing.assert_array_equal(capture.sample(indices, texels), expected)
+
+
+def test_a_stream_left_early_or_broken_ends(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 1)
+    stream = capture.stream(capture.indices("train"))
+    next(stream)
+    stream.close()
+    write_image(capture.folder / capture.lights[5].file, np.zeros((6, 9, 3), np.float32), "half")
+    with pytest.raises(ImageError, match=r"0005\.exr"):
+        list(capture.stream(capture.indices("train")))
+
+
 def bad_light(**changes: object) -> list[dict[str, object]]:
     return [{"kind": "directional", "direction": [0, 0, 1], "role": "train", "file": "lights/0000.exr", **changes}]
 

@@ -11,7 +11,7 @@ from srbf.asset import MANIFEST
 from srbf.capture import Capture
 from srbf.cli.parameters import CaptureFolder, Force, Output, parse_spread
 from srbf.cli.terminal import note, progress_bar
-from srbf.evaluation import evaluate
+from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
 from srbf.methods.relighting_map import RelightingMap
 
@@ -29,16 +29,21 @@ def fit(
     encoding: Annotated[Literal["half", "float", "uint8"], typer.Option(help="Of the maps on disk.")] = "half",
     force: Force = False,
 ) -> None:
-    """Fit k relighting maps by least squares and measure their error on every role of the capture."""
+    """Fit k relighting maps by least squares and measure their error on every role of the capture.
+
+    Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
+    they are many: `srbf evaluate` reads them all again.
+    """
     method = RelightingMap(k=k, centers=centers, domain=domain, spread=parse_spread(spread), ridge=ridge, encoding=encoding)
     check_replaceable(output, force, MANIFEST)
     opened = Capture.open(capture)
     started = time.perf_counter()
+    watch = TrainWatch(opened)
     with progress_bar("fit") as update:
-        asset = method.encode(opened, update)
+        asset = method.encode(opened, update, watch.look)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
-        errors = evaluate(asset, opened, update)
+        errors = evaluate(asset, opened, update, watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     asset.save(output, force)
     facts = asset.manifest["source"]["fit"]
@@ -48,4 +53,5 @@ def fit(
         f"condition {condition}, rank {facts['rank']}, residual {facts['relative_residual']:.3g}"
     )
     for role, error in asset.manifest["error"].items():
-        note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}")
+        texels = f" (of {error['texels']} texels)" if "texels" in error else ""
+        note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")

@@ -14,7 +14,7 @@ import srbf
 from srbf.arrays import Float32, Float64
 from srbf.asset import GEOMETRY, Asset
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of
-from srbf.capture import Capture
+from srbf.capture import Capture, Look
 from srbf.dilation import dilate, nearest_covered
 from srbf.errors import InputError
 from srbf.image import HALF_MAX, Encoding
@@ -29,6 +29,7 @@ from srbf.lights import (
     moved,
     spot_cone,
 )
+from srbf.parallel import each
 from srbf.solve.least_squares import StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, domain_of, normalize, point_set
 
@@ -69,8 +70,16 @@ class RelightingMap:
         centers = point_set(self.centers, self.k, domain)
         return GaussianBasis(centers, spread_of(centers, self.spread)), domain
 
-    def encode(self, capture: Capture, progress: Callable[[int, int], None] = lambda done, total: None) -> Asset:
+    def encode(
+        self,
+        capture: Capture,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+        look: Look = lambda row, image: None,
+    ) -> Asset:
         """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
+
+        `look` sees every train image as it streams by (`Capture.stream`). Peak memory, whatever the number of lights: 30 k + 40 bytes
+        a texel, two blocks of `capture.STREAM_BYTES` and some 0.2 GB of libraries.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
@@ -86,17 +95,21 @@ class RelightingMap:
         basis, domain = self.basis_for(directions)
         table = r_table(basis.spread)
         solve = StreamedLeastSquares(basis.evaluate(directions), self.ridge)
-        for first, block in capture.blocks(train):
-            solve.add(first, block.reshape(len(block), -1))
+        for first, block in capture.stream(train, look):
+            solve.add(first, block)
             progress(first + len(block), len(train))
+        report = solve.report()
         coefficients = solve.solve().reshape(self.k, capture.height, capture.width, 3)
+        del solve  # its sums are as large as the maps
         coverage = capture.coverage()
         nearest = nearest_covered(coverage)
         if nearest is not None:
-            for i in range(self.k):
+
+            def fill(i: int) -> None:
                 coefficients[i] = dilate(coefficients[i], nearest)
+
+            each(fill, self.k)
         stored, scale, bias = quantize(coefficients, self.encoding)
-        report = solve.report()
         images = _geometry(capture, coverage, nearest)
         manifest: dict[str, Any] = {
             "format": "srbf-asset",
@@ -146,7 +159,8 @@ def quantize(
     if encoding == "float":
         return coefficients, scale, bias
     if encoding == "half":
-        largest = np.abs(coefficients).max(axis=(1, 2))  # (K, 3)
+        low, high = _extremes(coefficients)
+        largest = np.maximum(-low, high)  # (K, 3)
         dim = (largest > 0) & (largest < HALF_DIM)
         scale[dim] = largest[dim]
         too_large = largest > HALF_MAX
@@ -157,14 +171,36 @@ def quantize(
                 "and lose the picture in any half or 8-bit file; add --ridge, or match --domain to the lights",
                 stacklevel=2,
             )
-        return (coefficients / scale[:, None, None]).astype(np.float16), scale, bias
-    low, high = coefficients.min(axis=(1, 2)), coefficients.max(axis=(1, 2))
+
+        def halves(i: int) -> None:
+            stored[i] = coefficients[i] if (scale[i] == 1).all() else coefficients[i] / scale[i]
+
+        stored = np.empty(coefficients.shape, np.float16)
+        each(halves, k)
+        return stored, scale, bias
+    low, high = _extremes(coefficients)
     bias = low
     scale = np.where(high > low, high - low, 1).astype(np.float32)
     stored = np.empty(coefficients.shape, np.uint8)
-    for i in range(k):
+
+    def bytes_of(i: int) -> None:
         stored[i] = np.round(np.clip((coefficients[i] - bias[i]) / scale[i], 0, 1) * 255)
+
+    each(bytes_of, k)
     return stored, scale, bias
+
+
+def _extremes(coefficients: Float32[ndarray, "K H W 3"]) -> tuple[Float32[ndarray, "K 3"], Float32[ndarray, "K 3"]]:
+    """Least and largest value of every map and channel; down the rows first, where memory is contiguous."""
+    low, high = np.empty((len(coefficients), 3), np.float32), np.empty((len(coefficients), 3), np.float32)
+
+    def find(i: int) -> None:
+        rows = coefficients[i].reshape(coefficients.shape[1], -1)
+        low[i] = rows.min(axis=0).reshape(-1, 3).min(axis=0)
+        high[i] = rows.max(axis=0).reshape(-1, 3).max(axis=0)
+
+    each(find, len(coefficients))
+    return low, high
 
 
 def relight(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:

@@ -18,12 +18,13 @@ def fed(matrix: np.ndarray, right: np.ndarray, ridge: float, block: int) -> Stre
 
 
 @pytest.mark.parametrize("block", [1, 7, 40])
-def test_equals_lstsq_whatever_the_blocks(block: int) -> None:
+def test_equals_lstsq_whatever_the_blocks(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.solve.streamed_product.TASK_COLUMNS", 13)
     rng = np.random.default_rng(1)
     matrix, right = rng.normal(size=(40, 6)), rng.normal(size=(40, 50))
     expected, residuals, rank, singular = np.linalg.lstsq(matrix, right, rcond=None)
     solve = fed(matrix, right, 0, block)
-    np.testing.assert_allclose(solve.solve(chunk=13), expected, atol=FLOAT32_STREAM * np.abs(right).max())
+    np.testing.assert_allclose(solve.solve(), expected, atol=FLOAT32_STREAM * np.abs(right).max())
     report = solve.report()
     assert report.rank == rank == 6
     assert report.condition_number == pytest.approx(singular[0] / singular[-1])

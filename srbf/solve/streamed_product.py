@@ -1,0 +1,102 @@
+"""The product of a few rows of weights with a matrix of millions of columns whose rows arrive in blocks, half or float."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float, Float32, Float64
+from srbf.half import finite_to_float32
+from srbf.parallel import cores, one_blas_thread
+
+TILE_BYTES = 1 << 20  # of the converted rows and the product's part at a time: what a core's cache holds
+TASK_COLUMNS = 1 << 15  # of one thread's turn; fixed, so that sums are the same on any number of cores
+
+
+class StreamedProduct:
+    """X = sum over rows l of W[:, l] B[l], B of L rows fed block by block, each row of P columns of C components.
+
+    `weights` (J, L) leave the components apart: X is (J, P C), a plane (P, C) a row. `weights` (J, L, C) sum over them as well:
+    X(j, p) = sum_{l,c} W[j, l, c] B(l, p, c), (J, P).
+
+    Rows may be float32 or finite float16, which are converted piece by piece in cache; products and sums are float32, the same
+    bits whatever the number of cores. Memory: X and, a core, TILE_BYTES. Work: 2 J L P C flops. X is read and written once a block, so
+    feed dozens of rows at a time.
+    """
+
+    def __init__(self, weights: Float[ndarray, "J L"] | Float[ndarray, "J L C"]) -> None:
+        self._weights = np.asarray(weights, np.float32)
+        self._result: np.ndarray | None = None
+        self._norm_squared = 0.0
+
+    @property
+    def result(self) -> Float32[ndarray, "J M"]:
+        """X as far as it is fed."""
+        assert self._result is not None, "no rows were fed"
+        return self._result
+
+    @property
+    def norm_squared(self) -> float:
+        """|B|^2 as far as it is fed, to float32's precision."""
+        return self._norm_squared
+
+    def add(self, first_row: int, block: Float[ndarray, "*block"]) -> None:
+        """Feed rows first_row … first_row + b - 1, (b, P C) or (b, P, C); every row exactly once, in any order."""
+        rows = len(block)
+        weights = self._weights[:, first_row : first_row + rows]  # (J, b) or (J, b, C)
+        joint = weights.ndim == 3
+        parts = weights.shape[2] if joint else 1
+        block = block.reshape(rows, -1, parts)  # (b, M, parts)
+        columns = block.shape[1]
+        fresh = self._result is None
+        result = np.empty((len(weights), columns), np.float32) if self._result is None else self._result
+        weights = np.ascontiguousarray(weights).reshape(len(weights), -1)  # (J, b parts)
+        width = max(64, TILE_BYTES // (4 * sum(weights.shape)))
+
+        def work(task: slice) -> float:
+            converted = np.empty((rows, parts, min(width, columns)), np.float32)
+            product = np.empty((len(weights), min(width, columns)), np.float32)
+            squares = 0.0
+            for start in range(task.start, task.stop, width):
+                tile = slice(start, min(start + width, task.stop))
+                size = tile.stop - tile.start
+                values = converted[:, :, :size]
+                source = block[:, tile].transpose(0, 2, 1)  # (b, parts, size)
+                if block.dtype == np.float16:
+                    finite_to_float32(source, values)
+                else:
+                    np.copyto(values, source)
+                flat = values.reshape(-1, size)  # a copy only in a task's last, narrower tile
+                np.matmul(weights, flat, out=product[:, :size])
+                if fresh:
+                    result[:, tile] = product[:, :size]
+                else:
+                    result[:, tile] += product[:, :size]
+                squares += float(np.vdot(flat, flat))
+            return squares
+
+        self._norm_squared += sum(in_tasks(work, columns))
+        self._result = result
+
+    def transform(self, matrix: Float64[ndarray, "I J"]) -> Float32[ndarray, "I M"]:
+        """`matrix` X by float64 products of pieces of columns; in X's own memory where `matrix` is square, so that X is gone."""
+        result = self.result
+        in_place = len(matrix) == len(result)
+        transformed = result if in_place else np.empty((len(matrix), result.shape[1]), np.float32)
+
+        def work(task: slice) -> None:
+            transformed[:, task] = matrix @ result[:, task].astype(np.float64)
+
+        in_tasks(work, result.shape[1])
+        self._result = None if in_place else result
+        return transformed
+
+
+def in_tasks(work: Callable[[slice], object], columns: int) -> list:
+    """`work` on pieces of TASK_COLUMNS columns by a thread a core, their matrix products single-threaded; answers in order."""
+    tasks = [slice(start, min(start + TASK_COLUMNS, columns)) for start in range(0, columns, TASK_COLUMNS)]
+    with one_blas_thread(), ThreadPoolExecutor(cores()) as workers:
+        return list(workers.map(work, tasks))
