@@ -26,7 +26,7 @@ MANIFEST = "capture.json"
 COVERED = 0.5  # a texel of at least this coverage counts in metrics and figures
 UNIT_TOLERANCE = 1e-3  # of a manifest's directions
 BLOCK_BYTES = 64 << 20  # float32 images of one block: small beside the maps, large enough for a matrix product
-STREAM_BYTES = 128 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
+STREAM_BYTES = 192 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
 Look = Callable[[int, ndarray], None]  # (position within the lights asked for, image (P, 3) as stored)
 
 

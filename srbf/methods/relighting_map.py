@@ -78,8 +78,8 @@ class RelightingMap:
     ) -> Asset:
         """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
 
-        `look` sees every train image as it streams by (`Capture.stream`). Peak memory, whatever the number of lights: 30 k + 40 bytes
-        a texel, two blocks of `capture.STREAM_BYTES` and some 0.2 GB of libraries.
+        `look` sees every train image as it streams by (`Capture.stream`). Peak memory, whatever the number of lights: 18 k + 40 bytes
+        a texel, two blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB of libraries.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
