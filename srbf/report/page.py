@@ -69,7 +69,7 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
         *([("asset on disk", bytes_text(folder_bytes(asset_folder)))] if asset_folder else []),
         ("maps, uncompressed", f"{bytes_text(raw)}, {asset.k} maps, {asset.encoding}"),
         ("lights for each map", f"{len(capture.indices('train')) / asset.k:.1f} train images are folded into one map"),
-        ("read by a shader of the texel's own maps", f"{asset.map_bytes_per_texel()} bytes a texel"),
+        ("read by a shader of the texel's own maps", f"{asset.bytes_per_texel()['directional']} bytes a texel"),
         ("resident on a GPU, everything", bytes_text(asset.resident_bytes())),
     )
     return Table("Size", ("what", "how much"), rows)

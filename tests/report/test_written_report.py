@@ -174,7 +174,7 @@ def test_lamps_stand_in_front_of_a_wall_and_inside_a_room(full: Case) -> None:
             full.asset.stored,
             full.asset.scale,
             full.asset.bias,
-            full.asset.table,
+            full.asset.tables,
             images,
         )
 
