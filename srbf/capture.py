@@ -18,6 +18,7 @@ from srbf.image import read_image, require_finite, size_of
 
 Role = Literal["train", "validation", "holdout"]
 Quantity = Literal["irradiance", "radiance"]
+Transport = Literal["combined", "indirect"]
 ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
 MANIFEST = "capture.json"
 COVERED = 0.5  # a texel of at least this coverage counts in metrics and figures
@@ -27,11 +28,15 @@ BLOCK_BYTES = 64 << 20  # images of one block: small beside the maps, large enou
 
 @dataclass(frozen=True)
 class CapturedLight:
-    """One illuminant of a capture: a directional light of unit irradiance, and the image that answers it."""
+    """One illuminant of a capture: a directional light of unit irradiance, and the image that answers it.
+
+    `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks.
+    """
 
     direction: tuple[float, float, float]
     role: Role
     file: str
+    direct: str | None = None
 
 
 @dataclass(frozen=True)
@@ -58,9 +63,12 @@ class Capture:
             if not abs(length - 1) <= UNIT_TOLERANCE:
                 raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalise it")
             files.inside(folder, light["file"], path)
+            if "direct" in light:
+                files.inside(folder, light["direct"], path)
             unit = np.asarray(light["direction"], np.float64) / length
-            lights.append(CapturedLight((float(unit[0]), float(unit[1]), float(unit[2])), light["role"], light["file"]))
-        for name in ("position", "normal", "albedo", "coverage", "ambient"):
+            direction = (float(unit[0]), float(unit[1]), float(unit[2]))
+            lights.append(CapturedLight(direction, light["role"], light["file"], light.get("direct")))
+        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene"):
             if name in manifest:
                 files.inside(folder, manifest[name], path)
         return Capture(folder, manifest, tuple(lights))
@@ -78,8 +86,30 @@ class Capture:
         return self.manifest["quantity"]
 
     @property
-    def transport(self) -> str:
+    def transport(self) -> Transport:
         return self.manifest.get("transport", "combined")
+
+    @property
+    def has_direct(self) -> bool:
+        """Whether every light has its direct image beside it, so that the combined answer can be told."""
+        return all(light.direct is not None for light in self.lights)
+
+    def combined(self) -> Capture:
+        """The same capture with the direct light put back; itself where it is combined. ManifestError where direct images lack."""
+        if self.transport == "combined":
+            return self
+        if not self.has_direct:
+            raise ManifestError(f"expected a direct image of every light in {self.folder}, found lights without; bake it again")
+        return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
+
+    def scene(self) -> bytes | None:
+        """The .glb of receivers and occluders, where the capture has one."""
+        if "scene" not in self.manifest:
+            return None
+        path = self.folder / self.manifest["scene"]
+        if not path.is_file():
+            raise ManifestError(f"expected the scene's triangles at {path}, found no such file; bake again")
+        return path.read_bytes()
 
     @property
     def source_bits(self) -> int | None:
@@ -144,6 +174,15 @@ class Capture:
         pixels = read_image(path, channels)
         require_finite(pixels, path)
         return pixels
+
+
+class CombinedCapture(Capture):
+    """An indirect capture whose images have their direct light added."""
+
+    def image(self, index: int) -> Float32[ndarray, "H W 3"]:
+        direct = self.lights[index].direct
+        assert direct is not None
+        return super().image(index) + self._read(direct, 3)
 
 
 def check_version(manifest: dict[str, Any], expected: str, path: Path) -> None:
