@@ -18,7 +18,8 @@ from srbf.image import Encoding, read_image, require_finite, write_image
 from srbf.sphere import Domain
 
 MANIFEST = "asset.json"
-GEOMETRY = ("position", "normal", "coverage", "ambient")
+GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
+SCENE_FILE = "scene.glb"
 UNIT_TOLERANCE = 1e-3
 TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest's spread
 
@@ -38,6 +39,7 @@ class Asset:
     bias: Float32[ndarray, "K 3"]
     table: Float32[ndarray, " n"]
     images: dict[str, ndarray] = field(default_factory=dict)
+    scene: bytes | None = None  # scene.glb of an indirect asset: what casts the shadows of the light to be added
 
     @property
     def method(self) -> str:
@@ -116,6 +118,8 @@ class Asset:
             write_image(temporary / self.manifest["r_table"]["file"], self.table[None, :, None], "float")
             for name, image in self.images.items():
                 write_image(temporary / self.manifest[name], image, "float")
+            if self.scene is not None:
+                (temporary / self.manifest["scene"]).write_bytes(self.scene)
             written = sorted(p.name for p in temporary.iterdir())
             self.manifest["sha256"] = {name: files.sha256_of(temporary / name) for name in written}
             schemas.check(self.manifest, "asset", MANIFEST)
@@ -148,7 +152,8 @@ class Asset:
             raise ManifestError(f"expected the R table of spread {manifest['basis']['spread']:g} in {path}, found one off by {error:.2g}")
         scale = np.array([entry["scale"] for entry in maps], np.float32)
         bias = np.array([entry["bias"] for entry in maps], np.float32)
-        return Asset(manifest, stored, scale, bias, table, images)
+        scene = reader.bytes(manifest["scene"]) if "scene" in manifest else None
+        return Asset(manifest, stored, scale, bias, table, images, scene)
 
 
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
@@ -177,11 +182,21 @@ class _Reader:
             )
         return np.ascontiguousarray(pixels[0, :, 0])
 
-    def _pixels(self, name: str, channels: int) -> np.ndarray:
+    def bytes(self, name: str) -> bytes:
+        path = self._checked(name)
+        if not path.is_file():
+            raise ManifestError(f"expected {path}, found no such file; fit again")
+        return path.read_bytes()
+
+    def _checked(self, name: str) -> Path:
         path = files.inside(self.folder, name, self.folder / MANIFEST)
         expected = self.manifest.get("sha256", {}).get(name)
         if expected and path.is_file() and files.sha256_of(path) != expected:
             raise ImageError(f"expected {path} as it was written, found another checksum: it is damaged or was changed; fit again")
+        return path
+
+    def _pixels(self, name: str, channels: int) -> np.ndarray:
+        path = self._checked(name)
         pixels = read_image(path, channels)
         require_finite(pixels, path)
         return pixels

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,7 +11,8 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture
+from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.direct.choice import Added, Direct
 from srbf.errors import InputError
 from srbf.methods import directional_responses
 
@@ -55,46 +56,83 @@ class PeakHistogram:
         return float(low + (high - low) * (rank - np.floor(rank)))
 
 
-def evaluate(asset: Asset, capture: Capture, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
+def evaluate(
+    asset: Asset,
+    capture: Capture,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    direct: Direct = "none",
+    roles: Sequence[Role] = ROLES,
+) -> dict[str, Any]:
     """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
 
-    The peak is the 99.9 % quantile of the train references (1 for 8-bit sources). A role without lights is left out.
-    InputError where asset and capture differ in size.
+    The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
+    and all but `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the clamp
+    comes after the direct light; with it, against the combined answer. InputError where asset and capture cannot be compared.
     """
+    reference, peak_source = _references(asset, capture, direct)
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
     covered = capture.coverage().ravel() >= COVERED
     if not covered.any():
         raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
     samples = int(covered.sum()) * 3
+    floor = -np.inf if reference.transport == "indirect" else 0.0
     peaks = PeakHistogram()
+    if peak_source is not reference or "train" not in roles:
+        for _, block in peak_source.blocks(peak_source.indices("train")):
+            peaks.add(block[:, covered])
     squares: dict[int, float] = {}  # sum of squared differences a light
     powers: dict[int, float] = {}  # sum of squared references a light
-    for role in ROLES:
-        indices = capture.indices(role)
-        for first, block in capture.blocks(indices):
-            chosen = indices[first : first + len(block)]
-            relit = directional_responses(asset, capture.directions(chosen)).reshape(block.shape)
-            for index, answer, reference in zip(chosen, relit, block, strict=True):
-                reference = np.maximum(reference[covered], 0)
-                if role == "train":
-                    peaks.add(reference)
-                difference = np.maximum(answer[covered], 0) - reference
-                squares[index] = float(np.einsum("pc,pc->", difference, difference, dtype=np.float64))
-                powers[index] = float(np.einsum("pc,pc->", reference, reference, dtype=np.float64))
-                progress(len(squares), len(capture.lights))
+    total = sum(len(capture.indices(role)) for role in roles)
+    with Added(asset, direct) as added:
+        for role in roles:
+            indices = capture.indices(role)
+            for first, block in reference.blocks(indices):
+                chosen = indices[first : first + len(block)]
+                directions = capture.directions(chosen)
+                relit = directional_responses(asset, directions).reshape(block.shape)
+                for index, direction, answer, true in zip(chosen, directions, relit, block, strict=True):
+                    lit = added.directional(direction[None])
+                    if not isinstance(lit, float):
+                        answer = answer + lit.reshape(answer.shape)
+                    true = np.maximum(true[covered], floor)
+                    if role == "train" and peak_source is reference:
+                        peaks.add(true)
+                    difference = np.maximum(answer[covered], floor) - true
+                    squares[index] = float(np.einsum("pc,pc->", difference, difference, dtype=np.float64))
+                    powers[index] = float(np.einsum("pc,pc->", true, true, dtype=np.float64))
+                    progress(len(squares), total)
     has_train = bool(capture.indices("train"))
     peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
     result: dict[str, Any] = {}
-    for role in ROLES:
+    for role in roles:
         indices = capture.indices(role)
         if indices:
             error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples, peak)
             result[role] = asdict(error)
     result["lights"] = [
-        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples))} for i, light in enumerate(capture.lights)
+        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples))}
+        for i, light in enumerate(capture.lights)
+        if i in squares
     ]
     return result
+
+
+def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture, Capture]:
+    """(what the relit images are compared with, what the peak is taken of)."""
+    whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
+    if asset.transport == "combined":
+        if direct != "none":
+            raise InputError(f"expected an indirect asset for --direct {direct}, found a combined one: it holds the direct light already")
+        return capture.combined(), whole
+    if direct == "none":
+        if capture.transport == "combined":
+            raise InputError(
+                f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
+                "add its direct light: --direct ray or shadow-map"
+            )
+        return capture, whole
+    return capture.combined(), whole
 
 
 def _role_error(squares: np.ndarray, powers: np.ndarray, samples: int, peak: float) -> RoleError:

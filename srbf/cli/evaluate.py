@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -23,6 +23,10 @@ def evaluate(
     point_reference: Annotated[
         int | None, typer.Option(help="Compare with N true Cycles lamps inside the scene.", show_default=False)
     ] = None,
+    direct: Annotated[
+        Literal["none", "ray", "shadow-map"],
+        typer.Option(help="Direct light added to an indirect asset, which is then compared with the combined answer."),
+    ] = "none",
     samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
     seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
     blender: Blender = None,
@@ -43,7 +47,7 @@ def evaluate(
             typer.echo(f"{row['from']:7.2f} – {row['to']:6.2f} {cells[0]:>18} {cells[1]:>18} {row['texels']:>10}")
         return
     with progress_bar("evaluate") as update:
-        result = evaluate_capture(opened, Capture.open(reference), update)
+        result = evaluate_capture(opened, Capture.open(reference), update, direct)
     if json:
         print_json(result)
         return

@@ -11,12 +11,16 @@ from srbf.lights import Light
 from srbf.methods import relighting_map
 
 RELIGHT: dict[str, Callable[[Asset, Sequence[Light]], np.ndarray]] = {"relighting-map": relighting_map.relight}
+LINEAR: dict[str, Callable[[Asset, Sequence[Light]], np.ndarray]] = {"relighting-map": relighting_map.linear_response}
 DIRECTIONAL: dict[str, Callable[[Asset, np.ndarray], np.ndarray]] = {"relighting-map": relighting_map.directional_responses}
 
 
-def relight(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
-    """The asset under `lights`, (H, W, 3) float32, by the method that it names."""
-    return RELIGHT[asset.method](asset, lights)
+def relight(asset: Asset, lights: Sequence[Light], direct: np.ndarray | None = None) -> np.ndarray:
+    """The asset under `lights`, (H, W, 3) float32, by the method that it names; `direct` light is added before the one clamp."""
+    if direct is None:
+        return RELIGHT[asset.method](asset, lights)
+    total = np.maximum(LINEAR[asset.method](asset, lights) + direct, 0)
+    return total + asset.images["ambient"] if "ambient" in asset.images else total
 
 
 def directional_responses(asset: Asset, directions: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 import srbf
 from srbf.arrays import Float32, Float64
-from srbf.asset import GEOMETRY, Asset
+from srbf.asset import GEOMETRY, SCENE_FILE, Asset
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of
 from srbf.capture import Capture
 from srbf.dilation import dilate, nearest_covered
@@ -119,6 +119,7 @@ class RelightingMap:
             ],
             "r_table": {"file": "r_table.exr", "size": len(table)},
             **{name: f"{name}.exr" for name in images},
+            **_kept_apart(capture),
             "row_origin": "top",
             "axes": "z-up-right-handed",
             "asset_from_world": np.eye(4).tolist(),
@@ -130,7 +131,8 @@ class RelightingMap:
                 "fit": {"train_lights": len(train), **_finite(asdict(report))},
             },
         }
-        return Asset(manifest, stored, scale, bias, table, images)
+        scene = capture.scene() if "scene" in manifest else None
+        return Asset(manifest, stored, scale, bias, table, images, scene)
 
 
 def quantize(
@@ -286,7 +288,7 @@ def _geometry(capture: Capture, coverage: np.ndarray, nearest: np.ndarray | None
     """The receivers' images that go along, dilated as the maps are."""
     images: dict[str, np.ndarray] = {}
     for name in GEOMETRY:
-        if name not in capture.manifest:
+        if name not in capture.manifest or (name == "albedo" and not _needs_albedo(capture)):
             continue
         if name == "coverage":
             images[name] = coverage
@@ -295,6 +297,19 @@ def _geometry(capture: Capture, coverage: np.ndarray, nearest: np.ndarray | None
             assert image is not None
             images[name] = dilate(image, nearest)
     return images
+
+
+def _needs_albedo(capture: Capture) -> bool:
+    """Direct light is added as irradiance; only radiance has the albedo in it."""
+    return capture.transport == "indirect" and capture.quantity == "radiance"
+
+
+def _kept_apart(capture: Capture) -> dict[str, Any]:
+    """What an indirect asset says of the direct light to be added: how it was sampled, and the scene that shadows it."""
+    if capture.transport != "indirect":
+        return {}
+    keys = {"direct": capture.manifest["direct"]} if "direct" in capture.manifest else {}
+    return {**keys, **({"scene": SCENE_FILE} if "scene" in capture.manifest else {})}
 
 
 def _finite(report: dict[str, Any]) -> dict[str, Any]:
