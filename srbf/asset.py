@@ -105,10 +105,10 @@ class Asset:
         return self.k * 4 * {"half": 2, "float": 4, "uint8": 1}[self.encoding]
 
     def resident_bytes(self) -> int:
-        """Everything the folder holds, as GPU memory: maps, position, normal, ambient (RGBA float), coverage and the table."""
+        """Everything the folder holds, as GPU memory: maps, position, normal, ambient (RGBA float), coverage, the table, and the scene."""
         texels = self.width * self.height
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
-        return texels * (self.map_bytes_per_texel() + 4 * channels) + self.table.nbytes
+        return texels * (self.map_bytes_per_texel() + 4 * channels) + self.table.nbytes + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
         """Write the folder whole or not at all; fills in `sha256`."""

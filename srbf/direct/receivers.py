@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy import ndarray
+from scipy.stats import qmc
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
@@ -98,9 +99,8 @@ class Receivers:
 
 
 def spread_points(count: int) -> Float64[ndarray, "S 4"]:
-    """`count` points that fill the unit hypercube evenly, any prefix of them too: the additive sequence of x^5 = x + 1 [Roberts2018]."""
-    g = 1.1673039782614187
-    return (0.5 + np.arange(1, count + 1)[:, None] * g ** -np.arange(1.0, 5)) % 1
+    """`count` points that fill the unit hypercube evenly, and best in powers of two of them [Sobol1967]."""
+    return qmc.Sobol(4, scramble=False).random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
 
 
 def disc_points(square: Float64[ndarray, "*s 2"]) -> Float64[ndarray, "*s 2"]:
