@@ -100,11 +100,11 @@ def pane():
     glass.data.materials[0] = material("glass", (0.8, 0.4, 0.2), "ShaderNodeBsdfTransparent")
 
 
-def sharp():
+def sharp(kind="PERSP"):
     """A coloured plane and the wall before a camera without depth of field."""
     quad("Plane", color=(0.8, 0.4, 0.2))
     quad("Wall", corners=[(0, 0, 0), (0, 1, 0), (0, 1, 0.5), (0, 0, 0.5)], color=(0.3, 0.5, 0.7))
-    camera()
+    camera(kind)
     bpy.context.scene.camera.data.dof.use_dof = False
 
 
@@ -242,6 +242,7 @@ SCENES = {
     "pano": lambda: view("PANO"),
     "pane": pane,
     "sharp": sharp,
+    "sharp ortho": lambda: sharp("ORTHO"),
     "emissive": emissive,
     "metal": metal,
     "layers": layers,

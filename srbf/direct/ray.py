@@ -26,6 +26,8 @@ LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off i
 PROBE = 1e-4  # likewise, how near a lightmap's texel its triangle is looked for
 MOST_WALLS = 32
 TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
+TINY = 1e-12  # a share below which nothing is diffuse
+NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbours of a pixel
 SMOOTH_COS = 0.9999  # corner normals closer than that to the face's are a flat face's
 
 
@@ -39,6 +41,7 @@ class Samples:
     normal: Float32[ndarray, "n 3"]
     face: Float32[ndarray, "n 3"]
     lift: Float32[ndarray, "n 3"]
+    share: Float32[ndarray, "n 3"] | Float32[ndarray, "n 1"]  # in its texel's mean: its albedo, where a pixel shows several
 
 
 class RayTracer:
@@ -64,6 +67,9 @@ class RayTracer:
         self._texels = np.flatnonzero(covered)
         self._nearest = None if coverage is None else nearest_covered(coverage)
         self._kept: dict[int, Samples] = {}
+        self._pure: Int[ndarray, " P"] | None = None
+        if receivers.camera is not None and receivers.quantity == "radiance":
+            self._pure = self._materials_of_pixels()
         if receivers.camera is None:
             self._slopes = [g.reshape(-1, 3) for name in ("position", "normal") for g in receivers.gradients(name)]
 
@@ -82,7 +88,7 @@ class RayTracer:
 
     def _irradiance(self, light: DirectionalLight | PointLight) -> Float32[ndarray, "P 3"]:
         texels = self._receivers.height * self._receivers.width
-        total, weight = np.zeros((texels, 3)), np.zeros(texels)
+        total, share, weight = np.zeros((texels, 3)), np.zeros((texels, 3)), np.zeros(texels)
         low, high = np.full((texels, 3), np.inf, np.float32), np.zeros((texels, 3), np.float32)
         for start in range(0, len(self._texels), TEXELS):
             samples = self._first(start)
@@ -90,13 +96,14 @@ class RayTracer:
             real = samples.weight > 0
             np.minimum.at(low, samples.texel[real], light_in[real])
             np.maximum.at(high, samples.texel[real], light_in[real])
-            _add(total, weight, samples, light_in)
-        ragged = self._ragged(total / np.maximum(weight, 1)[:, None], low, high, weight)
+            _add(total, share, samples, light_in)
+            weight += np.bincount(samples.texel, samples.weight, texels)
+        ragged = self._ragged(total / np.maximum(share, TINY), low, high, weight)
         for start in range(0, len(ragged), TEXELS):
             chunk = ragged[start : start + TEXELS]
             samples = self._samples(chunk, range(FIRST, self._count))
-            _add(total, weight, samples, self._lit(samples, light, FIRST))
-        return (total / np.maximum(weight, 1)[:, None]).astype(np.float32)
+            _add(total, share, samples, self._lit(samples, light, FIRST))
+        return (total / np.maximum(share, TINY)).astype(np.float32)
 
     def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
         """Texels whose samples differ, or that differ from a neighbour."""
@@ -208,9 +215,23 @@ class RayTracer:
         lift = lift * np.where(agrees < 0, -1, 1)[:, None].astype(np.float32)
         found &= np.abs(agrees) > 0.2
         face = np.where(found[:, None], face, normal)
-        return Samples(texel, np.ones(len(texel), np.float32), point, normal, face, np.where(found[:, None], lift, 0))
+        whole = np.ones((len(texel), 1), np.float32)
+        return Samples(texel, whole[:, 0], point, normal, face, np.where(found[:, None], lift, 0), whole)
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
+        origin, direction = self._looks(texel, square)
+        hit, far, _ = self._all.first_hit(origin, direction)
+        real = hit >= 0
+        triangle = np.where(real, hit, 0)
+        point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
+        normal, face, lift = self._surface(triangle, point)
+        away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
+        weight = real.astype(np.float32)
+        share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
+        return Samples(texel, weight, point, normal * away, face * away, lift * away, share)
+
+    def _looks(self, texel: np.ndarray, square: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
+        """The camera's rays: origin and direction."""
         camera = self._receivers.camera
         assert camera is not None
         offset = pixel_filter(camera["filter"], camera["filter_width"], square)
@@ -226,12 +247,35 @@ class RayTracer:
             origin = (aim * [1, 1, 0]) @ matrix[:3, :3].T + matrix[:3, 3]
             direction = np.broadcast_to(-matrix[:3, 2], aim.shape)
         direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-        hit, far, _ = self._all.first_hit(origin.astype(np.float32), direction.astype(np.float32))
-        real = hit >= 0
-        point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
-        normal, face, lift = self._surface(np.where(real, hit, 0), point)
-        away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
-        return Samples(texel, real.astype(np.float32), point, normal * away, face * away, lift * away)
+        return origin.astype(np.float32), direction.astype(np.float32)
+
+    def _materials_of_pixels(self) -> Int[ndarray, " P"]:
+        """The one material that each pixel shows; -1 where its first samples show several, or nothing."""
+        pure = np.full(self._receivers.height * self._receivers.width, -1)
+        for start in range(0, len(self._texels), TEXELS):
+            texels = self._texels[start : start + TEXELS]
+            square = (self._square[:FIRST, None] + self._turn[None, texels, :2]) % 1
+            hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, FIRST), square.reshape(-1, 2)))
+            shown = np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(FIRST, -1)
+            pure[texels] = np.where((shown == shown[0]).all(axis=0), shown[0], -1)
+        return pure
+
+    def _albedo(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Float32[ndarray, "n 3"]:
+        """The albedo of a material as its pixel shows it, or the nearest pixel that shows it alone; of the mixture where none does."""
+        assert self._pure is not None
+        width, height = self._receivers.width, self._receivers.height
+        image = self._receivers.images["albedo"].reshape(-1, 3)
+        source = texel.copy()
+        open_ = np.flatnonzero(self._pure[texel] != material)
+        for right, down in NEAREST_FIRST:
+            if not len(open_):
+                break
+            column, row = texel[open_] % width + right, texel[open_] // width + down
+            beside = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
+            found = self._pure[beside] == material[open_]
+            source[open_[found]] = beside[found]
+            open_ = open_[~found]
+        return np.maximum(image[source], 0)
 
     def _surface(self, triangle: Int[ndarray, " n"], point: Float32[ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(shading normal, face normal, offset onto the surface that the corner normals round) at points of triangles [Hanika2021]."""
@@ -257,10 +301,12 @@ class RayTracer:
         return normal, face.astype(np.float32), np.where(flat[:, None], 0, lift).astype(np.float32)
 
 
-def _add(total: np.ndarray, weight: np.ndarray, samples: Samples, light: np.ndarray) -> None:
+def _add(total: np.ndarray, share: np.ndarray, samples: Samples, light: np.ndarray) -> None:
+    """Sums of light and of shares by texel: their ratio times the texel's own albedo is its radiance, whatever mixture it shows."""
+    every = np.broadcast_to(samples.share, light.shape)
     for channel in range(3):
-        total[:, channel] += np.bincount(samples.texel, light[:, channel], len(total))
-    weight += np.bincount(samples.texel, samples.weight, len(weight))
+        total[:, channel] += np.bincount(samples.texel, light[:, channel] * every[:, channel], len(total))
+        share[:, channel] += np.bincount(samples.texel, every[:, channel], len(share))
 
 
 class _Scene:

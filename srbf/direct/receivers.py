@@ -110,12 +110,17 @@ def disc_points(square: Float64[ndarray, "*s 2"]) -> Float64[ndarray, "*s 2"]:
 
 
 def pixel_filter(kind: str, width: float, square: Float64[ndarray, "S 2"]) -> Float64[ndarray, "S 2"]:
-    """Offsets (pixels) spread as Cycles spreads its samples over a pixel: by the filter itself, so that all weigh alike."""
+    """Offsets (pixels) spread as Cycles spreads its samples about a pixel: by the filter itself, so that all weigh alike.
+
+    Cycles' Blackman-Harris filter is twice as wide as its setting says, its Gaussian three times, its box always one pixel.
+    """
     x = np.linspace(-0.5, 0.5, 1025)
     if kind == "BLACKMAN_HARRIS":
         a = 2 * np.pi * (x + 0.5)
+        width *= 2
         density = 0.35875 - 0.48829 * np.cos(a) + 0.14128 * np.cos(2 * a) - 0.01168 * np.cos(3 * a)
     elif kind == "GAUSSIAN":
+        width *= 3
         density = np.exp(-2 * (6 * x) ** 2)
     else:
         density = np.ones_like(x)
