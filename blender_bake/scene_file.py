@@ -39,9 +39,15 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
     """Make the viewport's scene that of a render: what is shown, and how finely it is divided, so that it can be read from Python."""
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
+    layers = [bpy.context.view_layer.layer_collection]
+    while layers:
+        layer = layers.pop()
+        layer.hide_viewport = False
+        layers += layer.children
+    for obj in bpy.context.view_layer.objects:
+        obj.hide_set(False)
     for obj in scene.objects:
         obj.hide_viewport = obj.hide_render
-        obj.hide_set(False)
         for modifier in obj.modifiers:
             modifier.show_viewport = modifier.show_render
             if modifier.type in {"SUBSURF", "MULTIRES"}:

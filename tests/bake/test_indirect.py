@@ -97,6 +97,10 @@ def test_the_scene_is_valid_gltf_of_the_evaluated_scene(bake) -> None:
         view = document["bufferViews"][accessor["bufferView"]]
         assert view["byteOffset"] % 4 == 0 and view["byteOffset"] + view["byteLength"] <= document["buffers"][0]["byteLength"]
     triangles = read_triangles(data)
+    plates = triangles.corners[
+        (np.abs(triangles.corners[..., :2]) < 0.31).all(axis=(1, 2)) & (triangles.corners[..., 2] > 0.29).all(axis=1)
+    ]
+    assert len(plates) == 2  # the instance, where its modifier puts it
     position = capture.geometry("position")[capture.coverage() > 0]
     lowest, highest = triangles.corners.min(axis=(0, 1)), triangles.corners.max(axis=(0, 1))
     assert (position >= lowest - 1e-4).all() and (position <= highest + 1e-4).all()
