@@ -29,7 +29,7 @@ AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
 GEOMETRY = ("position", "normal", "albedo", "coverage")
 SCENE_FILE = "scene.glb"
-PROBES = 12  # lights by which the tints of translucent materials are chosen
+PROBES = 12  # about so many lights by which the tints of translucent materials are chosen
 BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights", "direct")  # what may be there of a bake that never wrote an image
 WRITTEN = (
     "lights",
@@ -228,12 +228,13 @@ class Bake:
 
     def _job(self, missing: list[PlannedLight], scratch: Path) -> dict[str, Any]:
         settings = self.settings
+        train = [light for light in plan_lights(settings) if light.role == "train"]
         return {
             **base_job(self.scene, settings, scratch),
             "geometry": True,
             "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)},
             "lights": [light.job() for light in missing],
-            "probes": [light.job() for light in plan_lights(settings)[: settings.lights : max(1, settings.lights // PROBES)]],
+            "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
         }
 
     def _is_done(self, light: PlannedLight) -> bool:
