@@ -9,16 +9,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float, Float32, Float64, Int
+    from jaxtyping import Bool, Float, Float16, Float32, Float64, Int
 else:
     try:
-        from jaxtyping import Bool, Float, Float32, Float64, Int
+        from jaxtyping import Bool, Float, Float16, Float32, Float64, Int
     except ImportError:
 
         class _Unchecked:
             def __class_getitem__(cls, _shape: object) -> type:
                 return Any
 
-        Bool = Float = Float32 = Float64 = Int = _Unchecked
+        Bool = Float = Float16 = Float32 = Float64 = Int = _Unchecked
 
-__all__ = ["Bool", "Float", "Float32", "Float64", "Int"]
+__all__ = ["Bool", "Float", "Float16", "Float32", "Float64", "Int"]

@@ -12,12 +12,15 @@ from numpy import ndarray
 from srbf import files, schemas
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.basis.gaussian import GaussianBasis, weight
+from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
+from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
-from srbf.errors import ImageError, ManifestError
+from srbf.errors import ImageError, InputError, ManifestError
 from srbf.image import Encoding, read_image, require_finite, write_images
 from srbf.sphere import Domain
 
 MANIFEST = "asset.json"
+LAYERS = {"relighting-map": "maps", "eigen-map": "planes", "clustered-eigen-map": "planes"}  # the key of a method's images
 GEOMETRY = ("position", "normal", "coverage", "ambient")
 UNIT_TOLERANCE = 1e-3
 TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest's spread
@@ -25,18 +28,21 @@ TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest'
 
 @dataclass(eq=False)
 class Asset:
-    """Stored maps with the rule value = stored * scale + bias, the basis that they weigh, and the receivers' geometry.
+    """Stored layers with the rule value = stored * scale + bias, the functions that they weigh, and the receivers' geometry.
 
-    `stored` (K, H, W, 3) is float16, float32 or uint8 as on disk (a byte counts as byte / 255); `scale`, `bias` (K, 3).
+    `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255); `scale`, `bias` (N, C). Relighting maps
+    are N = K layers of C = 3, one a Gaussian; scalar planes are four to a layer, C = 4.
+    `tables` holds what the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32,
+    `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
     `images` holds position, normal (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
     `manifest` is asset.json: what is in memory is exactly what the files say.
     """
 
     manifest: dict[str, Any]
     stored: ndarray
-    scale: Float32[ndarray, "K 3"]
-    bias: Float32[ndarray, "K 3"]
-    table: Float32[ndarray, " n"]
+    scale: Float32[ndarray, "N C"]
+    bias: Float32[ndarray, "N C"]
+    tables: dict[str, ndarray]
     images: dict[str, ndarray] = field(default_factory=dict)
 
     @property
@@ -61,12 +67,38 @@ class Asset:
 
     @property
     def k(self) -> int:
-        """How many maps."""
+        """How many relighting maps."""
         return len(self.stored)
 
     @property
+    def scalars(self) -> int:
+        """How many scalar planes."""
+        return self.manifest["scalars"]
+
+    @property
+    def clusters(self) -> int:
+        """How many clusters of texels have light functions of their own."""
+        return self.manifest.get("clusters", 1)
+
+    @property
+    def layers(self) -> list[dict[str, Any]]:
+        """The manifest's entry of every stored layer: file, encoding, scale, bias."""
+        return self.manifest[LAYERS[self.method]]
+
+    @property
     def encoding(self) -> Encoding:
-        return self.manifest["maps"][0]["encoding"]
+        return self.layers[0]["encoding"]
+
+    @property
+    def table(self) -> Float32[ndarray, " n"]:
+        """The R table of relighting maps."""
+        return self.tables["r_table"]
+
+    @property
+    def light_functions(self) -> LightFunctions:
+        """w_f(L) of scalar planes: function (S + 1) m + j is that of plane j in cluster m, j = 0 the mean's."""
+        basis = self.manifest["light_basis"]
+        return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), self.tables["light_coefficients"])
 
     @property
     def domain(self) -> Domain:
@@ -74,9 +106,18 @@ class Asset:
 
     @property
     def basis(self) -> GaussianBasis:
-        """The Gaussians that the maps weigh; centers are normalised here."""
-        centers = np.array(self.manifest["basis"]["centers"], np.float64)
-        return GaussianBasis(centers / np.linalg.norm(centers, axis=1, keepdims=True), float(self.manifest["basis"]["spread"]))
+        """The Gaussians that relighting maps weigh, centers normalised here; InputError on an asset of other functions."""
+        basis = self.manifest.get("basis", {"kind": self.method})
+        if basis["kind"] != "gaussian":
+            raise InputError(f"expected relighting maps of Gaussians, found {basis['kind']}")
+        centers = np.array(basis["centers"], np.float64)
+        return GaussianBasis(centers / np.linalg.norm(centers, axis=1, keepdims=True), float(basis["spread"]))
+
+    @property
+    def map_functions(self) -> GaussianBasis | SphericalHarmonics | PolynomialTextureMap:
+        """The functions that relighting maps weigh, Gaussians or a baseline's."""
+        kind = self.manifest["basis"]["kind"]
+        return self.basis if kind == "gaussian" else HARMONICS[kind](self.k)
 
     @property
     def asset_from_world(self) -> Float64[ndarray, "4 4"]:
@@ -89,8 +130,8 @@ class Asset:
         coverage = self.images.get("coverage")
         return np.ones((self.height, self.width), bool) if coverage is None else coverage >= COVERED
 
-    def coefficients(self, rows: slice = slice(None)) -> Float32[ndarray, "K h W 3"]:
-        """The decoded maps c_i, or some of their rows."""
+    def coefficients(self, rows: slice = slice(None)) -> Float32[ndarray, "N h W C"]:
+        """The decoded layers, c_i of relighting maps, or some of their rows."""
         stored = self.stored[:, rows].astype(np.float32)
         if self.encoding == "uint8":
             stored /= 255
@@ -100,25 +141,37 @@ class Asset:
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
         """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to ask it for answers, not to save."""
-        stored = self.stored.reshape(len(self.stored), -1, 3)[:, texels]
-        return replace(self, manifest={**self.manifest, "height": 1, "width": len(texels)}, stored=stored[:, None], images={})
+        stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
+        tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
+        manifest = {**self.manifest, "height": 1, "width": len(texels)}
+        return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images={})
 
-    def map_bytes_per_texel(self) -> int:
-        """What a shader reads of a texel's own maps: three channels count as four, since no GPU keeps three."""
-        return self.k * 4 * {"half": 2, "float": 4, "uint8": 1}[self.encoding]
+    def bytes_per_texel(self) -> dict[str, int]:
+        """What a shader reads of a texel's own data, by kind of light: its layers, three channels counting as four since no GPU
+        keeps three, and its cluster's index; the position that point and spot lights need is left out.
+        """
+        channel = {"half": 2, "float": 4, "uint8": 1}[self.encoding]
+        own = 4 * channel * len(self.stored) + (1 if "cluster_index" in self.tables else 0)
+        return {"directional": own, "point": own, "spot": own, "environment": own}
 
     def resident_bytes(self) -> int:
-        """Everything the folder holds, as GPU memory: maps, position, normal, ambient (RGBA float), coverage and the table."""
+        """Everything the folder holds, as GPU memory: layers, position, normal, albedo, ambient (RGBA float), coverage and the tables."""
         texels = self.width * self.height
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
-        return texels * (self.map_bytes_per_texel() + 4 * channels) + self.table.nbytes
+        own = self.bytes_per_texel()["directional"] - (1 if "cluster_index" in self.tables else 0)
+        tables = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in self.tables.values())
+        return texels * (own + 4 * channels) + tables
 
     def save(self, folder: Path, force: bool = False) -> None:
         """Write the folder whole or not at all; fills in `sha256`."""
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
-            maps = zip(self.manifest["maps"], self.stored, strict=True)
-            images: list[tuple[Path, ndarray, Encoding]] = [(temporary / map["file"], stored, map["encoding"]) for map, stored in maps]
-            images.append((temporary / self.manifest["r_table"]["file"], self.table[None, :, None], "float"))
+            layers = zip(self.layers, self.stored, strict=True)
+            images: list[tuple[Path, ndarray, Encoding]] = [
+                (temporary / entry["file"], stored, entry["encoding"]) for entry, stored in layers
+            ]
+            for name, table in self.tables.items():
+                pixels = table[None] if table.ndim == 1 else table
+                images.append((temporary / self.manifest[name]["file"], np.atleast_3d(pixels), _ENCODING[table.dtype.name]))
             images += [(temporary / self.manifest[name], image, "float") for name, image in self.images.items()]
             write_images(images)
             written = sorted(p.name for p in temporary.iterdir())
@@ -135,28 +188,30 @@ class Asset:
             raise ManifestError(f"expected an asset with an {MANIFEST} at {folder}, found none; srbf fit makes one")
         manifest = files.read_json(path)
         check_version(manifest, "srbf-asset", path)
+        if manifest.get("method") not in LAYERS:
+            raise ManifestError(f"expected a method of {', '.join(LAYERS)} in {path}, found {manifest.get('method')!r}")
         schemas.check(manifest, "asset", str(path))
-        _check_basis(manifest, path)
         reader = _Reader(folder, manifest)
-        maps = manifest["maps"]
-        encoding: Encoding = maps[0]["encoding"]
-        stored = np.empty((len(maps), manifest["height"], manifest["width"], 3), _DTYPE[encoding])
-        for target, entry in zip(stored, maps, strict=True):
-            pixels = reader.image(entry["file"], 3)
+        layers = manifest[LAYERS[manifest["method"]]]
+        if len({entry["encoding"] for entry in layers}) != 1:
+            raise ManifestError(f"expected one encoding for all layers in {path}, found several")
+        encoding: Encoding = layers[0]["encoding"]
+        channels = len(layers[0]["scale"])
+        tables = _read_maps(reader, path) if manifest["method"] == "relighting-map" else _read_planes(reader, path)
+        stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), _DTYPE[encoding])
+        for target, entry in zip(stored, layers, strict=True):
+            pixels = reader.image(entry["file"], channels)
             target[...] = np.round(pixels * 255) if encoding == "uint8" else pixels
         images = {name: reader.image(manifest[name], 1 if name == "coverage" else 3) for name in GEOMETRY if name in manifest}
         if "coverage" in images:
             images["coverage"] = images["coverage"][:, :, 0]
-        table = reader.table(manifest["r_table"])
-        error = float(np.abs(table - weight(np.linspace(-1, 1, len(table)), manifest["basis"]["spread"])).max())
-        if error > TABLE_ENTRY_TOLERANCE:
-            raise ManifestError(f"expected the R table of spread {manifest['basis']['spread']:g} in {path}, found one off by {error:.2g}")
-        scale = np.array([entry["scale"] for entry in maps], np.float32)
-        bias = np.array([entry["bias"] for entry in maps], np.float32)
-        return Asset(manifest, stored, scale, bias, table, images)
+        scale = np.array([entry["scale"] for entry in layers], np.float32)
+        bias = np.array([entry["bias"] for entry in layers], np.float32)
+        return Asset(manifest, stored, scale, bias, tables, images)
 
 
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
+_ENCODING: dict[str, Encoding] = {"float16": "half", "float32": "float", "uint8": "uint8"}
 
 
 @dataclass(frozen=True)
@@ -174,13 +229,14 @@ class _Reader:
             raise ImageError(f"expected {expected[1]}x{expected[0]} texels in {self.folder / name}, found {size}")
         return pixels
 
-    def table(self, entry: dict[str, Any]) -> np.ndarray:
-        pixels = self._pixels(entry["file"], 1)
-        if pixels.shape[:2] != (1, entry["size"]):
-            raise ImageError(
-                f"expected {entry['size']}x1 texels in {self.folder / entry['file']}, found {pixels.shape[1]}x{pixels.shape[0]}"
-            )
-        return np.ascontiguousarray(pixels[0, :, 0])
+    def table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
+        """A table of the manifest's key `name`, (rows, columns, channels) float32."""
+        file = self.manifest[name]["file"]
+        pixels = self._pixels(file, channels)
+        if pixels.shape[:2] != shape:
+            found = f"{pixels.shape[1]}x{pixels.shape[0]}"
+            raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
+        return pixels
 
     def _pixels(self, name: str, channels: int) -> np.ndarray:
         path = files.inside(self.folder, name, self.folder / MANIFEST)
@@ -192,12 +248,53 @@ class _Reader:
         return pixels
 
 
-def _check_basis(manifest: dict[str, Any], path: Path) -> None:
-    centers = np.array(manifest["basis"]["centers"], np.float64)
-    if len(centers) != len(manifest["maps"]):
-        raise ManifestError(f"expected as many centers as maps in {path}, found {len(centers)} centers, {len(manifest['maps'])} maps")
-    if len({entry["encoding"] for entry in manifest["maps"]}) != 1:
-        raise ManifestError(f"expected one encoding for all maps in {path}, found several")
-    lengths = np.linalg.norm(centers, axis=1)
+def _read_maps(reader: _Reader, path: Path) -> dict[str, ndarray]:
+    """The R table of relighting maps; refuses centers and spread that are not theirs."""
+    manifest = reader.manifest
+    if manifest["basis"]["kind"] != "gaussian":
+        return {}
+    if "r_table" not in manifest:
+        raise ManifestError(f"expected an r_table for Gaussians in {path}, found none")
+    _check_centers(manifest["basis"]["centers"], path)
+    if len(manifest["basis"]["centers"]) != len(manifest["maps"]):
+        found = f"{len(manifest['basis']['centers'])} centers, {len(manifest['maps'])} maps"
+        raise ManifestError(f"expected as many centers as maps in {path}, found {found}")
+    size, spread = manifest["r_table"]["size"], manifest["basis"]["spread"]
+    table = np.ascontiguousarray(reader.table("r_table", (1, size), 1)[0, :, 0])
+    error = float(np.abs(table - weight(np.linspace(-1, 1, size), spread)).max())
+    if error > TABLE_ENTRY_TOLERANCE:
+        raise ManifestError(f"expected the R table of spread {spread:g} in {path}, found one off by {error:.2g}")
+    return {"r_table": table}
+
+
+def _read_planes(reader: _Reader, path: Path) -> dict[str, ndarray]:
+    """The light functions, their octahedral table and the clusters of scalar planes."""
+    manifest = reader.manifest
+    scalars, clusters = manifest["scalars"], manifest.get("clusters", 1)
+    if len(manifest["planes"]) != -(-scalars // 4):
+        found = f"{len(manifest['planes'])} images"
+        raise ManifestError(f"expected {scalars} scalars four to an image in {path}, found {found}")
+    functions = clusters * (scalars + 1)
+    basis = manifest["light_basis"]
+    _check_centers(basis["centers"], path)
+    if len(basis["spreads"]) != functions:
+        raise ManifestError(f"expected a spread for each of {functions} light functions in {path}, found {len(basis['spreads'])}")
+    size, columns = manifest["w_table"]["size"], manifest["w_table"]["columns"]
+    tables = {
+        "light_coefficients": reader.table("light_coefficients", (functions, len(basis["centers"])), 3),
+        "w_table": reader.table("w_table", (-(-functions // columns) * size, columns * size), 3).astype(np.float16),
+    }
+    if "cluster_index" in manifest:
+        index = np.round(reader.table("cluster_index", (manifest["height"], manifest["width"]), 1)[:, :, 0] * 255).astype(np.uint8)
+        if index.max() >= clusters:
+            raise ManifestError(f"expected cluster indices below {clusters} in {path}, found {index.max()}")
+        tables["cluster_index"] = index
+    elif clusters > 1:
+        raise ManifestError(f"expected a cluster_index for the {clusters} clusters in {path}, found none")
+    return tables
+
+
+def _check_centers(listed: list[list[float]], path: Path) -> None:
+    lengths = np.linalg.norm(np.array(listed, np.float64), axis=1)
     if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
         raise ManifestError(f"expected unit centers in {path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,7 +16,7 @@ from srbf import files, schemas
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.errors import ImageError, ManifestError
 from srbf.half import finite_to_float32
-from srbf.image import holds_half, read_image, read_stored, require_finite
+from srbf.image import holds_half, read_image, read_stored, require_finite, size_of
 from srbf.parallel import cores, each
 
 Role = Literal["train", "validation", "holdout"]
@@ -26,7 +26,8 @@ MANIFEST = "capture.json"
 COVERED = 0.5  # a texel of at least this coverage counts in metrics and figures
 UNIT_TOLERANCE = 1e-3  # of a manifest's directions
 BLOCK_BYTES = 64 << 20  # float32 images of one block: small beside the maps, large enough for a matrix product
-STREAM_BYTES = 128 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
+STREAM_BYTES = 192 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
+STRIP = 16  # rows: what the EXRs compress at a time
 Look = Callable[[int, ndarray], None]  # (position within the lights asked for, image (P, 3) as stored)
 
 
@@ -126,14 +127,50 @@ class Capture:
         return self._blocks(indices, size, stored, 2, look)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
-        """Rows of T: what receivers `texels` (flat) answer to each of `indices`. An image's ZIP is undone whole to pick from it."""
+        """Rows of T: what receivers `texels` (flat) answer to each of `indices`. Only an image's strips with such texels are undone."""
         answers = np.empty((len(texels), len(indices), 3), np.float32)
+        strips, place = np.unique(texels // self.width // STRIP, return_inverse=True)
+        rows = [(int(strip) * STRIP, min((int(strip) + 1) * STRIP, self.height)) for strip in strips]
+        picked = place * STRIP * self.width + texels - strips[place] * STRIP * self.width
+        whole = len(rows) * STRIP >= self.height
 
         def read(row: int) -> None:
-            answers[:, row] = self._stored(indices[row])[texels]
+            name = self.lights[indices[row]].file
+            if whole:
+                answers[:, row] = self._stored(indices[row])[texels]
+                return
+            path = self.folder / name
+            if size_of(path) != (self.height, self.width):
+                self._stored(indices[row])  # says what is wrong
+            pixels = read_stored(path, 3, rows)
+            require_finite(pixels, path)
+            answers[:, row] = pixels.reshape(-1, 3)[picked]
 
         each(read, len(indices))
         return answers
+
+    def kept(self, texels: Int[ndarray, " n"] | None = None) -> Capture:
+        """The capture with all answers in memory, of some flat `texels` alone, (1, n) of them and without geometry, or of all.
+
+        12 bytes a texel and light. What is fitted or asked many times over is read once.
+        """
+        whole = np.arange(self.width * self.height) if texels is None else texels
+        answers = self.sample(range(len(self.lights)), whole)
+        manifest = self.manifest
+        if texels is not None:
+            manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient")}
+            manifest |= {"width": len(texels), "height": 1}
+        coverage = self.coverage() if texels is None else self.coverage().reshape(1, -1)[:, texels]
+        return _KeptCapture(self.folder, manifest, self.lights, answers, coverage)
+
+    def with_roles(self, roles: Sequence[Role | None]) -> Capture:
+        """The same images under other roles, one a light; lights of role None are left out."""
+        chosen = [i for i, role in enumerate(roles) if role is not None]
+        lights = tuple(replace(self.lights[i], role=role) for i in chosen if (role := roles[i]) is not None)
+        return self._of(lights, chosen)
+
+    def _of(self, lights: tuple[CapturedLight, ...], chosen: Sequence[int]) -> Capture:
+        return replace(self, lights=lights)
 
     def _blocks(
         self, indices: Sequence[int], size: int, stored: np.dtype, buffers: int, look: Look | None = None
@@ -197,6 +234,32 @@ class Capture:
             raise ImageError(f"expected {self.width}x{self.height} texels in {path}, found {pixels.shape[1]}x{pixels.shape[0]}")
         require_finite(pixels, path)
         return pixels
+
+
+@dataclass(frozen=True, eq=False)
+class _KeptCapture(Capture):
+    """A capture whose answers (P, L, 3) are in memory."""
+
+    answers: Float32[ndarray, "P L 3"]
+    covered: Float32[ndarray, "H W"]
+
+    def image(self, index: int) -> Float32[ndarray, "H W 3"]:
+        return self._stored(index).reshape(self.height, self.width, 3)
+
+    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+        return self._blocks(indices, max(1, STREAM_BYTES // (len(self.answers) * 12)), np.dtype(np.float32), 2, look)
+
+    def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
+        return self.answers[np.ix_(texels, np.asarray(indices, np.int64))]
+
+    def coverage(self) -> Float32[ndarray, "H W"]:
+        return self.covered
+
+    def _stored(self, index: int) -> Float32[ndarray, "P 3"]:
+        return self.answers[:, index]
+
+    def _of(self, lights: tuple[CapturedLight, ...], chosen: Sequence[int]) -> Capture:
+        return replace(self, lights=lights, answers=self.answers[:, list(chosen)])
 
 
 def check_version(manifest: dict[str, Any], expected: str, path: Path) -> None:

@@ -45,7 +45,6 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
     `bytes_per_texel` is, per light kind, what a shader reads of a texel's own maps (RGB counts as RGBA, position excluded);
     `resident_bytes` is everything the asset keeps on a GPU, tables included.
     """
-    texel = asset.map_bytes_per_texel()
     return {
         "format": "srbf-asset",
         "version": 1,
@@ -54,14 +53,27 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "transport": asset.transport,
         "width": asset.width,
         "height": asset.height,
-        "k": asset.k,
-        "spread": asset.basis.spread,
+        **_model(asset),
         "domain": asset.domain,
         "encoding": asset.encoding,
-        "bytes_per_texel": {"directional": texel, "point": texel, "spot": texel, "environment": texel},
+        "bytes_per_texel": asset.bytes_per_texel(),
         "resident_bytes": asset.resident_bytes(),
         "disk_bytes": folder_bytes(folder),
         "error": asset.manifest.get("error", {}),
+    }
+
+
+def _model(asset: Asset) -> dict[str, Any]:
+    """What tells one asset of a method from another."""
+    if asset.method == "relighting-map":
+        basis = asset.manifest["basis"]
+        return {"k": asset.k, "basis": basis["kind"], **({"spread": basis["spread"]} if "spread" in basis else {})}
+    functions = asset.manifest["light_basis"]
+    return {
+        "scalars": asset.scalars,
+        "clusters": asset.clusters,
+        "light_basis": len(functions["centers"]),
+        "table": asset.manifest["w_table"]["size"],
     }
 
 

@@ -32,8 +32,11 @@ def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W
     return finite_to_float32(pixels, np.empty(pixels.shape, np.float32)) if all_finite(pixels) else pixels.astype(np.float32)
 
 
-def read_stored(path: Path, channels: int | None = None) -> Float[ndarray, "H W C"]:
-    """`read_image` without its widening: float16 where the file holds half floats, float32 of anything else. The file is opened once."""
+def read_stored(path: Path, channels: int | None = None, rows: Sequence[tuple[int, int]] | None = None) -> Float[ndarray, "H W C"]:
+    """`read_image` without its widening: float16 where the file holds half floats, float32 of anything else. The file is opened once.
+
+    With `rows`, only those (begin, end) of it, one below the other: of an EXR the other strips of 16 rows are not undone.
+    """
     oiio = _oiio()
     wanted = oiio.ImageSpec()
     wanted.attribute("oiio:UnassociatedAlpha", 1)  # colours as the file holds them, not multiplied by its alpha
@@ -44,12 +47,18 @@ def read_stored(path: Path, channels: int | None = None) -> Float[ndarray, "H W 
     try:
         spec = source.spec()
         half = spec.format == oiio.TypeHalf
-        pixels = source.read_image(0, 0, 0, spec.nchannels, oiio.HALF if half else oiio.FLOAT)
-        if pixels is None:
+        kind = oiio.HALF if half else oiio.FLOAT
+        if rows is None or spec.tile_width:
+            parts = [source.read_image(0, 0, 0, spec.nchannels, kind)]
+        else:
+            parts = [source.read_scanlines(0, 0, spec.y + begin, spec.y + end, 0, 0, spec.nchannels, kind) for begin, end in rows]
+        if any(part is None for part in parts):
             raise ImageError(f"cannot read image {path}: {_first_line(source.geterror())}; is it damaged or cut short?")
+        if rows is not None and spec.tile_width:
+            parts = [parts[0][begin:end] for begin, end in rows]
     finally:
         source.close()
-    pixels = np.asarray(pixels, np.float16 if half else np.float32)
+    pixels = np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts), np.float16 if half else np.float32)
     if pixels.ndim == 2:
         pixels = pixels[:, :, None]
     if channels is None or pixels.shape[2] == channels:

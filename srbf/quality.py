@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, MANIFEST, Capture, Role
+from srbf.capture import Capture, Role
 from srbf.evaluation import psnr
-from srbf.image import Encoding, write_images
 from srbf.methods import directional_responses
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
+from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
-from srbf.motion import TEXELS, Reference, dense_reference, sampled_texels
+from srbf.motion import Reference, dense_reference
 
 IMAGE_BYTES = 8  # of an RGBA half texel: what one captured image costs where it is shipped as it is
 ALL, NEAREST = "all images interpolated", "nearest image"
@@ -36,7 +34,12 @@ class Method(Protocol):
         ...
 
 
-METHODS: tuple[Method, ...] = tuple(RelightingMap(k=k) for k in (9, 16, 25, 36, 49))  # that a report compares
+METHODS: tuple[Method, ...] = (  # that a report compares
+    *(RelightingMap(k=k) for k in (9, 25, 49)),
+    *(RelightingMap(k=k, basis="spherical-harmonics") for k in (4, 9, 16)),
+    *(EigenMap(scalars=s, encoding="uint8") for s in (8, 16, 32)),
+    *(ClusteredEigenMap(clusters=64, scalars=s, encoding="uint8") for s in (4, 8, 16)),
+)
 
 
 @dataclass(frozen=True)
@@ -54,58 +57,23 @@ class Score:
     seconds: float | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class TexelSample:
-    """Some covered `texels` (flat) of a capture as a capture of its own, n x 1 texels with every light, for the while of a `with`."""
-
-    capture: Capture
-    texels: Int[ndarray, " n"]
-
-
-@contextmanager
-def texel_sample(capture: Capture, count: int = TEXELS, seed: int = 0) -> Iterator[TexelSample]:
-    """`count` random covered texels in a temporary folder: fits take a second, and errors are within a few hundredths of a dB.
-
-    Texels that are neighbours in the sample are none in the image. Every image of the capture is read once.
-    """
-    texels = sampled_texels(capture.coverage() >= COVERED, count, seed)
-    answers = capture.sample(range(len(capture.lights)), texels)  # (n, L, 3)
-    limit = float(np.finfo(np.float16).max)
-    half = bool(np.abs(answers).max(initial=0) <= limit) and np.array_equal(answers.astype(np.float16), answers)
-    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
-        folder = Path(name)
-        files.make_folder(folder / "lights")
-        lights: list[dict[str, Any]] = []
-        for i, light in enumerate(capture.lights):
-            lights.append({"kind": "directional", "direction": list(light.direction), "role": light.role, "file": f"lights/{i:04d}.exr"})
-        encoding: Encoding = "half" if half else "float"
-        write_images([(folder / entry["file"], answers[None, :, i], encoding) for i, entry in enumerate(lights)])
-        manifest = {
-            "format": "srbf-capture",
-            "version": 1,
-            "quantity": capture.quantity,
-            "transport": capture.transport,
-            "width": len(texels),
-            "height": 1,
-            "lights": lights,
-            **({"source": capture.manifest["source"]} if "source" in capture.manifest else {}),
-        }
-        files.write_json(folder / MANIFEST, manifest)
-        yield TexelSample(Capture.open(folder), texels)
-
-
 def contest(
-    sample: TexelSample, methods: Sequence[Method], role: Role, peak: float, progress: Callable[[int, int], None] = lambda done, total: None
+    sample: Capture, methods: Sequence[Method], role: Role, peak: float, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Score]:
-    """Each method fitted to the sample's train lights and asked for those of `role`, and the baselines; in the order given."""
+    """Each method fitted to the train lights of a sample and asked for those of `role`, and the baselines; in the order given.
+
+    `sample` is a capture kept in memory, of a few thousand texels. Clusters hold the few texels that a sample leaves them a little better
+    than the many of the whole. What settings warn of is passed over.
+    """
     scores = []
     for done, method in enumerate(methods):
         started = time.perf_counter()
-        asset = method.encode(sample.capture)
-        seconds = time.perf_counter() - started
-        scores.append(score_asset(asset, sample.capture, role, peak, seconds))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            asset = method.encode(sample)
+        scores.append(score_asset(asset, sample, role, peak, time.perf_counter() - started))
         progress(done + 1, len(methods))
-    return scores + baselines(sample.capture, role, peak)
+    return scores + baselines(sample, role, peak)
 
 
 def score_asset(asset: Asset, capture: Capture, role: Role, peak: float, seconds: float | None = None) -> Score:
@@ -143,13 +111,14 @@ def error_of(answers: Reference, capture: Capture, role: Role, peak: float) -> t
     return float(np.mean([psnr(peak, np.sqrt(s)) for s in squares])), float(np.sqrt(sum(squares) / max(power, 1e-30)))
 
 
-def spectrum(sample: TexelSample) -> Float64[ndarray, " r"]:
-    """Singular values of the sample's train answers as a (texels, lights x colours) matrix less its mean texel, largest first.
+def spectrum(sample: Capture) -> Float64[ndarray, " r"]:
+    """Singular values of all train answers as a (texels, lights x colours) matrix less its mean texel, largest first.
 
     They are what the best scalar planes could hold, one a plane; all colours share a plane and weigh alike, as all lights do.
+    Work: the smaller side squared times the larger.
     """
-    train = sample.capture.indices("train")
-    answers = sample.capture.sample(train, np.arange(len(sample.texels))).reshape(len(sample.texels), -1)
+    texels = sample.width * sample.height
+    answers = sample.sample(sample.indices("train"), np.arange(texels)).reshape(texels, -1)
     centred: Float32[ndarray, "n 3L"] = answers - answers.mean(axis=0, dtype=np.float64).astype(np.float32)
     smaller = centred.T if len(centred) > centred.shape[1] else centred
     gram = (smaller @ smaller.T).astype(np.float64)
@@ -157,32 +126,31 @@ def spectrum(sample: TexelSample) -> Float64[ndarray, " r"]:
 
 
 def planes_bound(values: Float64[ndarray, " r"], answers: int, peak: float) -> Float64[ndarray, " r"]:
-    """PSNR (dB, pooled over `answers` values) that the best 0 … r - 1 scalar planes leave on the very answers they come from."""
+    """PSNR (dB, pooled over `answers` values) of the best 0 … r - 1 scalar planes on the very answers they come from, before a clamp."""
     left = np.cumsum((values**2)[::-1])[::-1]  # beyond the first s planes
     return np.array([psnr(peak, float(np.sqrt(energy / answers))) for energy in left])
 
 
 def scalars_of(asset: Asset) -> int:
     """Numbers that an asset keeps of a texel."""
-    return asset.manifest["scalars"] if "scalars" in asset.manifest else asset.stored.shape[0] * asset.stored.shape[3]
+    return 3 * asset.k if asset.method == "relighting-map" else asset.scalars
 
 
 def texel_bytes(asset: Asset) -> int:
     """Bytes that a shader reads of a texel's own data under a directional light."""
-    return asset.map_bytes_per_texel()
+    return asset.bytes_per_texel()["directional"]
 
 
 def family_of(asset: Asset) -> str:
     """The curve that an asset lies on: its method, or its basis where a method has several."""
     kind = asset.manifest.get("basis", {}).get("kind", "gaussian")
     method = asset.method.replace("-", " ")
-    return method if kind == "gaussian" else f"{kind.replace('-', ' ')} lightmap"
+    return method if kind == "gaussian" else kind.replace("-", " ")
 
 
 def name_of(asset: Asset) -> str:
-    """What tells an asset from its siblings: how many numbers a texel."""
-    manifest = asset.manifest
-    if "scalars" not in manifest:
-        return f"{len(asset.stored)} maps"
-    clusters = manifest.get("clusters", 1)
-    return f"{manifest['scalars']} scalars" + (f", {clusters} clusters" if clusters > 1 else "")
+    """What tells an asset from its siblings: how many numbers a texel, and its encoding where it is not half floats."""
+    encoding = {"half": "", "float": ", float", "uint8": ", bytes"}[asset.encoding]
+    if asset.method == "relighting-map":
+        return f"{asset.k} maps{encoding}"
+    return f"{asset.scalars} scalars" + (f", {asset.clusters} clusters" if asset.clusters > 1 else "") + encoding

@@ -126,6 +126,27 @@ def mean_spacing(points: Float[ndarray, "n 3"]) -> float:
     return float((2 * np.arcsin(np.clip(chords / 2, 0, 1))).mean())
 
 
+def octahedral_decode(u: Float[ndarray, "*shape"], v: Float[ndarray, "*shape"]) -> Float64[ndarray, "*shape 3"]:
+    """Unit direction of octahedral coordinates in [-1, 1]: z > 0 inside the diamond |u| + |v| < 1 [Cigolle2014]."""
+    x, y = np.asarray(u, np.float64), np.asarray(v, np.float64)
+    z = 1 - np.abs(x) - np.abs(y)
+    folded_x, folded_y = (1 - np.abs(y)) * _sign(x), (1 - np.abs(x)) * _sign(y)
+    return normalize(np.stack([np.where(z < 0, folded_x, x), np.where(z < 0, folded_y, y), z], axis=-1))
+
+
+def octahedral_encode(directions: Float[ndarray, "*shape 3"]) -> tuple[Float64[ndarray, "*shape"], Float64[ndarray, "*shape"]]:
+    """Octahedral coordinates (u, v) of directions of any length but 0; (0, 0) for a zero vector."""
+    d = np.asarray(directions, np.float64)
+    d = d / np.maximum(np.abs(d).sum(axis=-1, keepdims=True), 1e-30)
+    x, y, z = d[..., 0], d[..., 1], d[..., 2]
+    return np.where(z < 0, (1 - np.abs(y)) * _sign(x), x), np.where(z < 0, (1 - np.abs(x)) * _sign(y), y)
+
+
+def _sign(value: np.ndarray) -> np.ndarray:
+    """+1 for zero, too, so that a fold has two sides only."""
+    return np.where(value < 0, -1.0, 1.0)
+
+
 def _from_z_and_azimuth(z: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
     r = np.sqrt(np.maximum(0, 1 - z**2))
     return np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z], axis=1)

@@ -3,55 +3,99 @@
 from __future__ import annotations
 
 import time
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from srbf.asset import MANIFEST
+from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
-from srbf.cli.parameters import CaptureFolder, Force, Output, parse_spread
+from srbf.cli.parameters import CaptureFolder, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
-from srbf.methods.relighting_map import RelightingMap
+from srbf.fitting import DEFAULT_BUDGET, method_for, settings_of
+
+Method = Annotated[
+    Literal["relighting-map", "eigen-map", "clustered-eigen-map", "auto"],
+    typer.Option(help="How light transport is compressed; auto: the best within --budget."),
+]
+Maps = Annotated[int | None, typer.Option("-k", help="relighting-map: how many maps (25).", show_default=False)]
+Basis = Annotated[
+    Literal["gaussian", "spherical-harmonics", "hemispherical-harmonics", "ptm"] | None,
+    typer.Option(help="relighting-map: Gaussians, or others as baselines.", show_default=False),
+]
+Centers = Annotated[
+    Literal["auto", "hammersley", "hammersley3", "fibonacci"] | None,
+    typer.Option(help="relighting-map: point set of the Gaussians; auto: fibonacci.", show_default=False),
+]
+Scalars = Annotated[int | None, typer.Option(help="eigen-map (28), clustered-eigen-map (8): numbers a texel.", show_default=False)]
+Clusters = Annotated[int | None, typer.Option(help="clustered-eigen-map: how many, at most 256 (64).", show_default=False)]
+Weighting = Annotated[
+    Literal["plain", "relative"] | None,
+    typer.Option(help="eigen-map: plain squared error, or relative to each texel's mean.", show_default=False),
+]
+Domain = Annotated[Literal["auto", "sphere", "hemisphere"], typer.Option(help="Where light can come from; auto: where the lights are.")]
+Spread = Annotated[str, typer.Option(help="auto, a number of radians; relighting-map also mean or min.")]
+Ridge = Annotated[str, typer.Option(help="auto, or what is added to the diagonal of the normal equations.")]
+Encoding = Annotated[
+    Literal["half", "float", "uint8"] | None, typer.Option(help="Of the maps on disk (half; auto: uint8).", show_default=False)
+]
+Budget = Annotated[int | None, typer.Option(help=f"auto: bytes a texel, at most ({DEFAULT_BUDGET}).", show_default=False)]
+Psnr = Annotated[float | None, typer.Option(help="auto: dB to reach on unseen lights with the fewest bytes.", show_default=False)]
 
 
 def fit(
     capture: CaptureFolder,
     output: Output,
-    k: Annotated[int, typer.Option("-k", help="How many maps.")] = 25,
-    centers: Annotated[Literal["hammersley", "hammersley3", "fibonacci"], typer.Option(help="Point set of the basis.")] = "fibonacci",
-    domain: Annotated[
-        Literal["auto", "sphere", "hemisphere"], typer.Option(help="Where centers stand; auto: where the lights are.")
-    ] = "auto",
-    spread: Annotated[str, typer.Option(help="mean, min, or a number of radians.")] = "mean",
-    ridge: Annotated[float, typer.Option(help="Added to the diagonal of the normal equations.")] = 0.0,
-    encoding: Annotated[Literal["half", "float", "uint8"], typer.Option(help="Of the maps on disk.")] = "half",
+    method: Method = "relighting-map",
+    k: Maps = None,
+    basis: Basis = None,
+    centers: Centers = None,
+    scalars: Scalars = None,
+    clusters: Clusters = None,
+    weighting: Weighting = None,
+    domain: Domain = "auto",
+    spread: Spread = "auto",
+    ridge: Ridge = "auto",
+    encoding: Encoding = None,
+    budget: Budget = None,
+    psnr: Psnr = None,
     force: Force = False,
 ) -> None:
-    """Fit k relighting maps by least squares and measure their error on every role of the capture.
+    """Fit an asset to the train lights and measure its error on every role of the capture.
 
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
     they are many: `srbf evaluate` reads them all again.
     """
-    method = RelightingMap(k=k, centers=centers, domain=domain, spread=parse_spread(spread), ridge=ridge, encoding=encoding)
+    given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
+    given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
+    settings = settings_of(method, given, domain, spread, ridge)
     check_replaceable(output, force, MANIFEST)
     opened = Capture.open(capture)
     started = time.perf_counter()
+    chosen = method_for(opened, method, settings, note)
     watch = TrainWatch(opened)
     with progress_bar("fit") as update:
-        asset = method.encode(opened, update, watch.look)
+        asset = chosen.encode(opened, update, watch.look)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     asset.save(output, force)
-    facts = asset.manifest["source"]["fit"]
-    condition = f"{facts['condition_number']:.3g}" if facts["condition_number"] is not None else "infinite"
-    note(
-        f"fitted {k} maps to {facts['train_lights']} lights in {fitted - started:.1f} s: spread {asset.basis.spread:.4g} rad, "
-        f"condition {condition}, rank {facts['rank']}, residual {facts['relative_residual']:.3g}"
-    )
+    note(f"fitted {_summary(asset)} to {asset.manifest['source']['fit']['train_lights']} lights in {fitted - started:.1f} s")
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
+
+
+def _summary(asset: Asset) -> str:
+    facts = asset.manifest["source"]["fit"]
+    chosen = f", chosen by {facts['chosen_by']}" if "chosen_by" in facts else ""
+    size = f"{asset.bytes_per_texel()['directional']} bytes a texel"
+    if asset.method != "relighting-map":
+        clusters = f"{asset.clusters} clusters of " if asset.method == "clustered-eigen-map" else ""
+        return f"{clusters}{asset.scalars} scalars ({size}{chosen})"
+    condition = f"{facts['condition_number']:.3g}" if facts["condition_number"] is not None else "infinite"
+    spread = f"spread {asset.basis.spread:.4g} rad, " if asset.manifest["basis"]["kind"] == "gaussian" else ""
+    model = f"{spread}ridge {facts['ridge']:.3g}{chosen}"
+    return f"{asset.k} maps ({size}; {model}; condition {condition}, rank {facts['rank']}, residual {facts['relative_residual']:.3g})"

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, cast, get_args
+from typing import Annotated, Literal
 
 import typer
 
-from srbf.basis.gaussian import SpreadRule
 from srbf.errors import InputError
 
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder to write.", show_default=False)]
@@ -26,16 +25,6 @@ def parse_size(text: str) -> tuple[int, int]:
     if len(words) > 2 or not all(word.isascii() and word.isdecimal() for word in words):
         raise InputError(f"expected --size N or WxH, found {text!r}")
     return int(words[0]), int(words[-1])
-
-
-def parse_spread(text: str) -> SpreadRule | float:
-    """`mean`, `min` or radians."""
-    if text in get_args(SpreadRule):
-        return cast(SpreadRule, text)
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"expected --spread mean, min or a number of radians, found {text!r}") from error
 
 
 def parse_sun_angle(text: str) -> Literal["auto"] | float:

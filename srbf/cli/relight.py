@@ -19,7 +19,7 @@ from srbf.gl.relighter import Relighter
 from srbf.image import write_image, write_picture
 from srbf.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
 from srbf.lights import Light
-from srbf.methods.relighting_map import outside_domain
+from srbf.receivers import outside_domain
 
 FRAMES_MARKER = "0000.exr"
 

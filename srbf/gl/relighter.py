@@ -18,7 +18,7 @@ from srbf.gl.includes import resolve
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import lamp_uniforms, padded
 from srbf.lights import Light, PointLight, moved
-from srbf.methods.relighting_map import folded_weights
+from srbf.methods import folded_weights
 
 if TYPE_CHECKING:
     import moderngl

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from types import ModuleType
 
 import numpy as np
 
 from srbf.asset import Asset
 from srbf.lights import Light
-from srbf.methods import relighting_map
+from srbf.methods import clustered_eigen_map, eigen_map, relighting_map
 
-RELIGHT: dict[str, Callable[[Asset, Sequence[Light]], np.ndarray]] = {"relighting-map": relighting_map.relight}
-DIRECTIONAL: dict[str, Callable[[Asset, np.ndarray], np.ndarray]] = {"relighting-map": relighting_map.directional_responses}
+METHODS: dict[str, ModuleType] = {
+    "relighting-map": relighting_map,
+    "eigen-map": eigen_map,
+    "clustered-eigen-map": clustered_eigen_map,
+}
 
 
 def relight(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
     """The asset under `lights`, (H, W, 3) float32, by the method that it names."""
-    return RELIGHT[asset.method](asset, lights)
+    return METHODS[asset.method].relight(asset, lights)
+
+
+def linear_response(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
+    """The sum over lights before the clamp and without ambient, (H, W, 3) float32."""
+    return METHODS[asset.method].linear_response(asset, lights)
 
 
 def directional_responses(asset: Asset, directions: np.ndarray) -> np.ndarray:
     """(b, H, W, 3) float32 answers to a white light from each of (b, 3) unit directions, before the clamp and without ambient."""
-    return DIRECTIONAL[asset.method](asset, directions)
+    return METHODS[asset.method].directional_responses(asset, directions)
+
+
+def folded_weights(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
+    """One weight a map, or a light function, and colour for all directional and environment lights together, float64."""
+    return METHODS[asset.method].folded_weights(asset, lights)

@@ -2,39 +2,31 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy import ndarray
 
-import srbf
 from srbf.arrays import Float32, Float64
-from srbf.asset import GEOMETRY, Asset
+from srbf.asset import Asset
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of
+from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
 from srbf.capture import Capture, Look
 from srbf.dilation import dilate, nearest_covered
 from srbf.errors import InputError
-from srbf.image import HALF_MAX, Encoding
-from srbf.lights import (
-    DirectionalLight,
-    EnvironmentLight,
-    Light,
-    PointLight,
-    SpotLight,
-    attenuation,
-    environment_samples,
-    moved,
-    spot_cone,
-)
+from srbf.image import Encoding
+from srbf.lights import Light, PointLight
+from srbf.model_selection import RIDGES, Choice, TexelSample, choose, spread_candidates
 from srbf.parallel import each
+from srbf.quantization import layer_entries, quantize, rounding_variance
+from srbf.receivers import CHUNK, carried_images, common_manifest, far_lights, finish, inside, light_vectors, sum_over_lights
 from srbf.solve.least_squares import StreamedLeastSquares
-from srbf.sphere import Domain, PointSet, domain_of, normalize, point_set
+from srbf.sphere import Domain, PointSet, domain_of, point_set
 
-HALF_DIM = 2.0**-6  # below it a hundredth of a map's largest value is already a subnormal half
-CHUNK = 1 << 16  # receivers, or environment texels, weighed at a time: (CHUNK, K) float64 stays in cache-sized memory
+Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
+NOISE_TEXELS = 1024  # on which the loss of an encoding is foretold
 
 
 @dataclass(frozen=True)
@@ -43,32 +35,33 @@ class RelightingMap:
 
     T(p, L) ~ sum_i c_i(p) exp(-acos(L . Q_i)^2 / (2 spread^2))            [Wong2005, eq. 1-2]
 
-    k maps, centers Q_i of a point set on the domain (`auto`: the hemisphere where all lights are above it), spread by rule or in
-    rad, `ridge` added to the normal equations' diagonal, and the encoding of the maps on disk.
+    k maps, centers Q_i of a point set on the domain (`auto`: Fibonacci, on the hemisphere where all lights are above it), spread by rule
+    or in rad, `ridge` added to the normal equations' diagonal, and the encoding of the maps on disk. `auto` spread and ridge: the one
+    pair for all texels that predicts the validation lights best, or train lights left out, the encoding's rounding included.
+    `basis`: other functions in the Gaussians' place, as baselines: k = 4, 9, 16 … harmonics, or the 6 of polynomial texture maps.
     """
 
     k: int = 25
-    centers: PointSet = "fibonacci"
+    centers: Literal["auto"] | PointSet = "auto"
     domain: Literal["auto"] | Domain = "auto"
-    spread: SpreadRule | float = "mean"
-    ridge: float = 0.0
+    spread: Literal["auto"] | SpreadRule | float = "auto"
+    ridge: Literal["auto"] | float = "auto"
     encoding: Encoding = "half"
+    basis: Literal["gaussian"] | HarmonicKind = "gaussian"
 
     def __post_init__(self) -> None:
         if not 1 <= self.k <= 2048:
             raise InputError(f"expected 1 to 2048 maps (the layers of a texture array), found -k {self.k}")
-        if not (np.isfinite(self.ridge) and self.ridge >= 0):
-            raise InputError(f"expected a ridge of 0 or more, found {self.ridge:g}")
+        if self.ridge != "auto" and not (np.isfinite(self.ridge) and self.ridge >= 0):
+            raise InputError(f"expected a ridge of auto, 0 or more, found {self.ridge:g}")
         if self.domain not in ("auto", *get_args(Domain)):
             raise InputError(f"expected a domain of auto, sphere, hemisphere, found {self.domain!r}")
         if self.encoding not in get_args(Encoding):
             raise InputError(f"expected an encoding of half, float, uint8, found {self.encoding!r}")
-
-    def basis_for(self, directions: Float64[ndarray, "L 3"]) -> tuple[GaussianBasis, Domain]:
-        """Centers, spread and domain for a capture whose train lights stand at `directions`."""
-        domain = domain_of(directions) if self.domain == "auto" else self.domain
-        centers = point_set(self.centers, self.k, domain)
-        return GaussianBasis(centers, spread_of(centers, self.spread)), domain
+        if self.basis not in ("gaussian", *HARMONICS):
+            raise InputError(f"expected a basis of gaussian, {', '.join(HARMONICS)}, found {self.basis!r}")
+        if self.basis != "gaussian":
+            HARMONICS[self.basis](self.k)  # says which k it can have
 
     def encode(
         self,
@@ -78,8 +71,9 @@ class RelightingMap:
     ) -> Asset:
         """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
 
-        `look` sees every train image as it streams by (`Capture.stream`). Peak memory, whatever the number of lights: 30 k + 40 bytes
-        a texel, two blocks of `capture.STREAM_BYTES` and some 0.2 GB of libraries.
+        `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`). Peak memory,
+        whatever the number of lights: 18 k + 40 bytes a texel, two blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB
+        of libraries.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
@@ -89,20 +83,19 @@ class RelightingMap:
             raise InputError(f"expected train lights in {capture.folder}, found none")
         if len(train) < self.k and self.ridge == 0:
             raise InputError(
-                f"expected at least as many train lights as maps, found {len(train)} lights for -k {self.k}; lower -k, or add --ridge 0.1"
+                f"expected as many train lights as maps, found {len(train)} lights for -k {self.k}; lower -k, or leave --ridge auto"
             )
         directions = capture.directions(train)
-        basis, domain = self.basis_for(directions)
-        table = r_table(basis.spread)
-        solve = StreamedLeastSquares(basis.evaluate(directions), self.ridge)
+        domain = domain_of(directions) if self.domain == "auto" else self.domain
+        basis, ridge, choice = self.model(capture, domain)
+        solve = StreamedLeastSquares(basis.evaluate(directions), ridge)
         for first, block in capture.stream(train, look):
             solve.add(first, block)
             progress(first + len(block), len(train))
         report = solve.report()
         coefficients = solve.solve().reshape(self.k, capture.height, capture.width, 3)
         del solve  # its sums are as large as the maps
-        coverage = capture.coverage()
-        nearest = nearest_covered(coverage)
+        nearest = nearest_covered(capture.coverage())
         if nearest is not None:
 
             def fill(i: int) -> None:
@@ -110,97 +103,50 @@ class RelightingMap:
 
             each(fill, self.k)
         stored, scale, bias = quantize(coefficients, self.encoding)
-        images = _geometry(capture, coverage, nearest)
-        manifest: dict[str, Any] = {
-            "format": "srbf-asset",
-            "version": 1,
-            "method": "relighting-map",
-            "quantity": capture.quantity,
-            "transport": capture.transport,
-            "width": capture.width,
-            "height": capture.height,
-            "basis": {"kind": "gaussian", "centers": basis.centers.tolist(), "spread": basis.spread},
-            "domain": domain,
-            "maps": [
-                {
-                    "file": f"map_{i:02d}." + ("png" if self.encoding == "uint8" else "exr"),
-                    "encoding": self.encoding,
-                    "scale": scale[i].astype(float).tolist(),
-                    "bias": bias[i].astype(float).tolist(),
-                }
-                for i in range(self.k)
-            ],
-            "r_table": {"file": "r_table.exr", "size": len(table)},
-            **{name: f"{name}.exr" for name in images},
-            "row_origin": "top",
-            "axes": "z-up-right-handed",
-            "asset_from_world": np.eye(4).tolist(),
-            "source": {
-                "srbf": srbf.__version__,
-                **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
-                **{key: made[key] for key in ("scene_sha256",) if key in (made := capture.manifest.get("source", {}))},
-                "settings": asdict(self),
-                "fit": {"train_lights": len(train), **_finite(asdict(report))},
-            },
-        }
-        return Asset(manifest, stored, scale, bias, table, images)
+        images = carried_images(capture, nearest)
+        fit = {"ridge": ridge, **({} if choice is None else {"chosen_by": choice.rule}), **asdict(report)}
+        manifest = common_manifest(capture, "relighting-map", domain, images, asdict(self), fit)
+        manifest["maps"] = layer_entries("map", self.encoding, scale, bias)
+        tables = {}
+        if isinstance(basis, GaussianBasis):
+            tables["r_table"] = r_table(basis.spread)
+            manifest["basis"] = {"kind": "gaussian", "centers": basis.centers.tolist(), "spread": basis.spread}
+            manifest["r_table"] = {"file": "r_table.exr", "size": len(tables["r_table"])}
+        else:
+            manifest["basis"] = {"kind": self.basis}
+        return Asset(manifest, stored, scale, bias, tables, images)
 
+    def model(self, capture: Capture, domain: Domain) -> tuple[Basis, float, Choice | None]:
+        """(basis, ridge, what chose them, if anything was to be chosen)."""
+        if self.basis != "gaussian":
+            basis: Basis = HARMONICS[self.basis](self.k)
+            if self.ridge != "auto":
+                return basis, self.ridge, None
+            sample = TexelSample.of(capture)
+            choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], noise=self._rounding(sample))
+            return basis, choice.ridge, choice
+        centers = point_set("fibonacci" if self.centers == "auto" else self.centers, self.k, domain)
+        if self.spread != "auto" and self.ridge != "auto":
+            return GaussianBasis(centers, spread_of(centers, self.spread)), self.ridge, None
+        sample = TexelSample.of(capture)
+        spreads = spread_candidates(spread_of(centers, "mean")) if self.spread == "auto" else [spread_of(centers, self.spread)]
+        candidates = ((spread, GaussianBasis(centers, spread).evaluate(sample.directions)) for spread in spreads)
+        choice = choose(sample, candidates, RIDGES if self.ridge == "auto" else [self.ridge], self._rounding(sample))
+        return GaussianBasis(centers, choice.spread), choice.ridge, choice
 
-def quantize(
-    coefficients: Float32[ndarray, "K H W 3"], encoding: Encoding
-) -> tuple[ndarray, Float32[ndarray, "K 3"], Float32[ndarray, "K 3"]]:
-    """(stored, scale, bias) with coefficients ~ stored * scale + bias; a uint8 counts as byte / 255.
+    def _rounding(self, sample: TexelSample) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
+        """What the encoding adds to a light's squared error: maps that cancel each other do not survive it."""
+        if self.encoding == "float":
+            return None
+        answers = sample.answers[:NOISE_TEXELS, : sample.train].astype(np.float64).transpose(1, 0, 2)  # (L, n, 3)
+        flat = answers.reshape(sample.train, -1)
 
-    float and half keep scale 1 and bias 0, unless a half would overflow (then that map's channel is scaled down, with a warning) or
-    is so dim that half floats thin out.
-    """
-    k = len(coefficients)
-    scale, bias = np.ones((k, 3), np.float32), np.zeros((k, 3), np.float32)
-    if encoding == "float":
-        return coefficients, scale, bias
-    if encoding == "half":
-        low, high = _extremes(coefficients)
-        largest = np.maximum(-low, high)  # (K, 3)
-        dim = (largest > 0) & (largest < HALF_DIM)
-        scale[dim] = largest[dim]
-        too_large = largest > HALF_MAX
-        if too_large.any():
-            scale[too_large] = (largest[too_large] / (HALF_MAX * 0.999)).astype(np.float32)
-            warnings.warn(
-                f"coefficients reach {largest.max():.3g}, past half float's {HALF_MAX:.0f}: scaled, but such maps cancel each other "
-                "and lose the picture in any half or 8-bit file; add --ridge, or match --domain to the lights",
-                stacklevel=2,
-            )
+        def variance(operator: np.ndarray, weights: np.ndarray) -> np.ndarray:
+            maps = (operator @ flat).reshape(self.k, -1, 3)
+            lost = rounding_variance(maps.min(axis=1), maps.max(axis=1), self.encoding).mean(axis=1)  # (K,)
+            return weights**2 @ lost
 
-        def halves(i: int) -> None:
-            stored[i] = coefficients[i] if (scale[i] == 1).all() else coefficients[i] / scale[i]
-
-        stored = np.empty(coefficients.shape, np.float16)
-        each(halves, k)
-        return stored, scale, bias
-    low, high = _extremes(coefficients)
-    bias = low
-    scale = np.where(high > low, high - low, 1).astype(np.float32)
-    stored = np.empty(coefficients.shape, np.uint8)
-
-    def bytes_of(i: int) -> None:
-        stored[i] = np.round(np.clip((coefficients[i] - bias[i]) / scale[i], 0, 1) * 255)
-
-    each(bytes_of, k)
-    return stored, scale, bias
-
-
-def _extremes(coefficients: Float32[ndarray, "K H W 3"]) -> tuple[Float32[ndarray, "K 3"], Float32[ndarray, "K 3"]]:
-    """Least and largest value of every map and channel; down the rows first, where memory is contiguous."""
-    low, high = np.empty((len(coefficients), 3), np.float32), np.empty((len(coefficients), 3), np.float32)
-
-    def find(i: int) -> None:
-        rows = coefficients[i].reshape(coefficients.shape[1], -1)
-        low[i] = rows.min(axis=0).reshape(-1, 3).min(axis=0)
-        high[i] = rows.max(axis=0).reshape(-1, 3).max(axis=0)
-
-    each(find, len(coefficients))
-    return low, high
+        return variance
 
 
 def relight(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
@@ -209,34 +155,25 @@ def relight(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
     Directional and environment lights fold into one weight a map and colour, so a hundred of them cost as one; a point or
     spot light weighs every receiver by itself [Wong2005, "Directional-Source Relighting", "Point-Source Relighting"].
     """
-    total = linear_response(asset, lights)
-    np.maximum(total, 0, out=total)
-    if "ambient" in asset.images:
-        total += asset.images["ambient"]
-    return total
+    return finish(asset, linear_response(asset, lights))
 
 
 def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
     """The sum over lights before the clamp and without ambient: linear in every light's colour."""
-    total = np.zeros((asset.height, asset.width, 3), np.float32)
-    weights = folded_weights(asset, lights)
-    local = [lamp for light in lights if isinstance(lamp := moved(light, asset.asset_from_world), PointLight)]
-    folded = bool(weights.any())
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height if folded or local else 0, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
-        c = asset.coefficients(rows)  # (K, h, W, 3)
-        if folded:
-            total[rows] += np.einsum("khwc,kc->hwc", c, weights.astype(np.float32), optimize=True)
-        for light in local:
-            total[rows] += _lamp(asset, light, rows, c)
-    return total
+    weights = folded_weights(asset, lights).astype(np.float32)
+
+    def folded(layers: ndarray, rows: slice) -> ndarray:
+        return np.einsum("khwc,kc->hwc", layers, weights, optimize=True)
+
+    def answer(layers: ndarray, rows: slice, unit: ndarray) -> ndarray:
+        return np.einsum("khwc,hwk->hwc", layers, basis_weights(asset, unit).astype(np.float32), optimize=True)
+
+    return sum_over_lights(asset, lights, folded if weights.any() else None, answer)
 
 
 def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
     """`linear_response` to a white light from each of many unit directions: one (b, K) x (K, H W 3) product."""
-    inside = normalize(directions @ asset.asset_from_world[:3, :3].T)
-    weights = lookup(asset.table, inside @ asset.basis.centers.T).astype(np.float32)  # (b, K)
+    weights = basis_weights(asset, inside(asset, directions)).astype(np.float32)  # (b, K)
     images = np.empty((len(weights), asset.height, asset.width, 3), np.float32)
     rows_at_a_time = max(1, CHUNK // asset.width)
     for start in range(0, asset.height, rows_at_a_time):
@@ -246,93 +183,30 @@ def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> 
     return images
 
 
+def basis_weights(asset: Asset, directions: Float64[ndarray, "*shape 3"]) -> Float64[ndarray, "*shape K"]:
+    """R_i of unit directions in the asset's frame, from its table [Wong2005, fig. 9]; harmonics by formula."""
+    basis = asset.map_functions
+    if isinstance(basis, GaussianBasis):
+        return lookup(asset.table, directions @ basis.centers.T)
+    return basis.evaluate(directions.reshape(-1, 3)).reshape(*directions.shape[:-1], asset.k)
+
+
 def folded_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "K 3"]:
     """One weight a map and colour for all directional and environment lights: sum of color R_i(L) and of W_i = int E R_i."""
     weights = np.zeros((asset.k, 3))
-    for light in lights:
-        if isinstance(light, DirectionalLight):
-            weights += directional_weights(asset, np.array(light.direction))[:, None] * light.color
-        elif isinstance(light, EnvironmentLight):
-            weights += environment_weights(asset, light)
+    for directions, colors in far_lights(asset, lights):
+        weights += basis_weights(asset, directions).T @ colors
     return weights
 
 
 def directional_weights(asset: Asset, direction: Float64[ndarray, " 3"]) -> Float64[ndarray, " K"]:
-    """R_i(L) of every map for one unit direction, from the asset's table [Wong2005, fig. 6]."""
-    return lookup(asset.table, asset.basis.centers @ normalize(asset.asset_from_world[:3, :3] @ direction))
-
-
-def environment_weights(asset: Asset, light: EnvironmentLight) -> Float64[ndarray, "K 3"]:
-    """W_i = integral of E(w) R_i(w) over the captured domain: no cosine (T holds it), no normalisation. H W K table reads."""
-    linear = asset.asset_from_world[:3, :3]
-    rotation = linear / np.cbrt(np.linalg.det(linear))
-    directions, solid_angle = environment_samples(light.image, asset.domain, rotation)
-    height, width = light.image.shape[:2]
-    centers = asset.basis.centers
-    weights = np.zeros((asset.k, 3))
-    rows_at_a_time = max(1, CHUNK // width)
-    for start in range(0, height, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
-        radiance = light.image[rows] * solid_angle[rows, :, None]
-        weights += lookup(asset.table, directions[rows].reshape(-1, 3) @ centers.T).T @ radiance.reshape(-1, 3)
-    return weights * light.color
+    """R_i(L) of every map for one unit direction of the world [Wong2005, fig. 6]."""
+    return basis_weights(asset, inside(asset, direction[None]))[0]
 
 
 def receiver_weights(
     asset: Asset, light: PointLight, positions: Float32[ndarray, "*p 3"]
 ) -> tuple[Float64[ndarray, "*p K"], Float64[ndarray, "*p"]]:
     """R_i(L^) and the attenuation (times a spot's cone) for receivers at `positions`, in the asset's frame [Wong2005, fig. 8-10]."""
-    vectors = np.array(light.position) - positions  # L = S - P, eq. 3
-    distance = np.linalg.norm(vectors, axis=-1)
-    unit = vectors / np.maximum(distance, 1e-30)[..., None]
-    weights = lookup(asset.table, unit @ asset.basis.centers.T)
-    strength = attenuation(distance, light)
-    if isinstance(light, SpotLight):
-        cos_angle = -(unit @ np.array(light.direction))
-        strength = strength * spot_cone(cos_angle, np.cos(light.inner), np.cos(light.outer))
-    return weights, strength
-
-
-def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
-    """A line for each light that shines from where nothing was captured; such lights evaluate unchanged."""
-    if asset.domain == "sphere":
-        return []
-    notes = []
-    for i, light in enumerate(lights):
-        light = moved(light, asset.asset_from_world)
-        if isinstance(light, DirectionalLight) and light.direction[2] <= 0:
-            notes.append(f"light {i} comes from below the captured hemisphere (z = {light.direction[2]:.3g}): its answer is extrapolated")
-        elif isinstance(light, PointLight) and "position" in asset.images:
-            heights = asset.images["position"][..., 2]
-            below = float((light.position[2] <= heights[asset.covered]).mean()) if asset.covered.any() else 0.0
-            if below > 0:
-                notes.append(f"light {i} is below {below:.0%} of the receivers, outside the captured hemisphere: extrapolated there")
-    return notes
-
-
-def _lamp(asset: Asset, light: PointLight, rows: slice, c: np.ndarray) -> np.ndarray:
-    if "position" not in asset.images:
-        raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
-    weights, strength = receiver_weights(asset, light, asset.images["position"][rows])
-    weights *= strength[..., None]
-    return np.einsum("khwc,hwk->hwc", c, weights.astype(np.float32), optimize=True) * np.array(light.color, np.float32)
-
-
-def _geometry(capture: Capture, coverage: np.ndarray, nearest: np.ndarray | None) -> dict[str, np.ndarray]:
-    """The receivers' images that go along, dilated as the maps are."""
-    images: dict[str, np.ndarray] = {}
-    for name in GEOMETRY:
-        if name not in capture.manifest:
-            continue
-        if name == "coverage":
-            images[name] = coverage
-        else:
-            image = capture.ambient() if name == "ambient" else capture.geometry(name)  # type: ignore[arg-type]
-            assert image is not None
-            images[name] = dilate(image, nearest)
-    return images
-
-
-def _finite(report: dict[str, Any]) -> dict[str, Any]:
-    """JSON has no infinity: an infinite condition number is written as null."""
-    return {key: value if np.isfinite(value) else None for key, value in report.items()}
+    unit, strength = light_vectors(light, positions)
+    return basis_weights(asset, unit), strength

@@ -25,7 +25,7 @@ from srbf.report.tiles import abrdf_tiles
 MAPS, POSITION = "maps", "position"  # what a picture needs of the asset
 Draw = Callable[[Subject, Path], Picture]
 WITHOUT = {
-    MAPS: "Not drawn: this picture shows the terms of a relighting map, and the asset is of another method.",
+    MAPS: "Not drawn: this picture shows the terms of a relighting map of Gaussians, and the asset holds other functions.",
     POSITION: "Not drawn: the asset has no position map (photographs never have one), and a lamp needs to know where receivers are.",
 }
 DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, how, what it needs
@@ -35,7 +35,7 @@ DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, ho
     ("point_light.png", "A point light", point_light, (MAPS, POSITION)),
     ("point_strip.png", "Point lights", point_strip, (POSITION,)),
     ("spot_strip.png", "Spot lights", spot_strip, (POSITION,)),
-    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, (MAPS,)),
+    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, ()),
     ("centers.png", "Centers and lights", centers, (MAPS,)),
     ("r_curve.png", "The curve R", r_curve, (MAPS,)),
 )
@@ -51,7 +51,7 @@ def write_report(
     timings: Mapping[str, float] | None = None,
     demo_lights: Sequence[Light] | None = None,
     asset_folder: Path | None = None,
-    methods: Sequence[Method] = METHODS,
+    methods: Sequence[Method] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Write pictures, report.md and index.html into `folder`, and return the path of index.html, which holds every figure in itself.
@@ -74,7 +74,7 @@ def write_report(
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
     steps = 4 + len(DRAWN)
-    findings = measure(subject, methods, lambda done, total: progress(done, steps))
+    findings = measure(subject, METHODS if methods is None else methods, lambda done, total: progress(done, steps))
     pictures = []
     for entry in DRAWN:
         pictures.append(_draw(subject, folder, *entry))
@@ -83,7 +83,7 @@ def write_report(
 
 
 def _draw(subject: Subject, folder: Path, file: str, title: str, draw: Draw, needs: tuple[str, ...]) -> Picture:
-    has = {MAPS: subject.asset.method == "relighting-map", POSITION: bool(subject.points)}
+    has = {MAPS: subject.asset.manifest.get("basis", {}).get("kind") == "gaussian", POSITION: bool(subject.points)}
     for need in needs:
         if not has[need]:
             return Picture(file, title, WITHOUT[need], omitted=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -10,16 +9,19 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.capture import Role
+from srbf.asset import Asset
+from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
+from srbf.evaluation import psnr
 from srbf.flip import Flip
 from srbf.methods import directional_responses
-from srbf.motion import Motion, dense_reference, sweep
-from srbf.quality import Method, Score, TexelSample, contest, planes_bound, score_asset, spectrum, texel_sample
+from srbf.motion import TEXELS, Motion, dense_reference, sampled_texels, sweep
+from srbf.quality import Method, Score, contest, planes_bound, score_asset, spectrum
 from srbf.report.subject import Subject, farthest_points
 from srbf.shadow_sampling import ShadowSampling, shadow_sampling
 from srbf.unseen import LIGHTS, Negative, UnseenError, negative, unseen_error
 
+STEPS = 4  # of `measure`, for progress
 WORST = 4  # directions shown side by side
 HELD_BYTES = 256 << 20  # references of unseen lights in memory, and as much of relit pictures
 FEWEST = 8  # of them, however large they are
@@ -68,46 +70,41 @@ class Findings:
 def measure(subject: Subject, methods: Sequence[Method], progress: Callable[[int, int], None] = lambda done, total: None) -> Findings:
     """Measure everything; methods are fitted to a sample of texels, which the sweep and the spectrum look at too."""
     unseen = look_at_unseen(subject)
-    progress(1, 4)
-    with texel_sample(subject.capture) as sample:
-        peak = subject.evaluation[subject.role]["peak"]
-        asset = subject.asset.at(sample.texels)
-        own = score_asset(asset, sample.capture, subject.role, peak)
-        scores: tuple[Score, ...] = ()
-        found: Spectrum | None = None
-        motion: Motion | None = None
-        sampling: ShadowSampling | None = None
-        missing = ""
-        try:
-            sampling = shadow_sampling(sample.capture, np.arange(len(sample.texels)))
-            scores = compare(sample, methods, subject.role, peak)
-            progress(2, 4)
-            found = spectrum_of(sample, score_asset(asset, sample.capture, "train", peak).relative_rmse, peak)
-            progress(3, 4)
-            texels = np.arange(len(sample.texels))
-            motion = sweep(asset, dense_reference(sample.capture, texels), texels)
-        except InputError as error:
-            missing = f"Not measured: {error}."
-        progress(4, 4)
-        return Findings(unseen, len(sample.texels), scores, own, found, motion, sampling, missing)
+    progress(1, STEPS)
+    picked = sampled_texels(subject.covered, TEXELS)
+    sample, asset = subject.capture.kept(picked), subject.asset.at(picked)
+    peak = subject.evaluation[subject.role]["peak"]
+    texels = np.arange(len(picked))
+    own = score_asset(asset, sample, subject.role, peak)
+    scores: tuple[Score, ...] = ()
+    found: Spectrum | None = None
+    motion: Motion | None = None
+    sampling: ShadowSampling | None = None
+    missing = ""
+    try:
+        sampling = shadow_sampling(sample, texels)
+        able = [m for m in methods if getattr(m, "k", getattr(m, "scalars", 0)) <= len(sample.indices("train"))]
+        scores = tuple(contest(sample, able, subject.role, peak))
+        progress(2, STEPS)
+        found = spectrum_of(sample, asset, peak)
+        progress(3, STEPS)
+        motion = sweep(asset, dense_reference(sample, texels), texels)
+    except InputError as error:
+        missing = f"Not measured: {error}."
+    progress(STEPS, STEPS)
+    return Findings(unseen, len(picked), scores, own, found, motion, sampling, missing)
 
 
-def compare(sample: TexelSample, methods: Sequence[Method], role: Role, peak: float) -> tuple[Score, ...]:
-    """The contest of the methods that this capture has enough lights for; what their settings warn of is not this asset's."""
-    able = [method for method in methods if getattr(method, "k", 0) <= len(sample.capture.indices("train"))]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return tuple(contest(sample, able, role, peak))
-
-
-def spectrum_of(sample: TexelSample, relative_rmse: float, peak: float) -> Spectrum:
-    """The spectrum, and the asset's own pooled PSNR from its relative error on the same answers."""
-    train = sample.capture.indices("train")
+def spectrum_of(sample: Capture, asset: Asset, peak: float) -> Spectrum:
+    """The spectrum, and the asset's own pooled PSNR on the same answers before any clamp, as the planes' bound has it."""
+    train = sample.indices("train")
     values = spectrum(sample)
-    answers = len(sample.texels) * 3 * len(train)
-    power = sum(float((np.maximum(block, 0) ** 2).sum(dtype=np.float64)) for _, block in sample.capture.blocks(train))
-    own = 20 * np.log10(max(peak, 1e-30) / max(relative_rmse * np.sqrt(power / answers), 1e-10 * peak))
-    return Spectrum(values, planes_bound(values, answers, peak), float(own))
+    answers = sample.width * sample.height * 3 * len(train)
+    squares = 0.0
+    for first, block in sample.blocks(train):
+        relit = directional_responses(asset, sample.directions(train[first : first + len(block)])).reshape(block.shape)
+        squares += float(((relit - block) ** 2).sum(dtype=np.float64))
+    return Spectrum(values, planes_bound(values, answers, peak), psnr(peak, float(np.sqrt(squares / answers))))
 
 
 def look_at_unseen(subject: Subject) -> Unseen:

@@ -8,8 +8,8 @@ from srbf.motion import Motion
 from srbf.report.inline import Table, figure
 from srbf.report.plot import Axis, Plot, spread_labels
 
-WIDTH, HEIGHT = 940.0, 174.0
-RIGHT = 96.0  # for labels at the lines' ends
+WIDTH, HEIGHT = 940.0, 152.0
+RIGHT = 106.0  # for labels at the lines' ends
 
 
 def motion_figures(motion: Motion) -> Table:
@@ -34,12 +34,18 @@ def motion_curves(motion: Motion) -> str:
     error = 100 * (motion.relit_brightness - motion.reference_brightness) / mean
     ghosts = edge > 0
     plots = [
-        _two("change from frame to frame, over the reference's rms", (motion.relit_change / rms, motion.reference_change / rms)),
-        _two("mean brightness less the reference's, % of its mean", (100 * motion.ripple, error), ("ripple", "error"), last=not ghosts),
+        _two("change from frame to frame, over the reference's rms", frames, (motion.relit_change / rms, motion.reference_change / rms)),
+        _two(
+            "mean brightness less the reference's, % of its mean",
+            frames,
+            (100 * motion.ripple, error),
+            ("ripple", "error"),
+            last=not ghosts,
+        ),
     ]
     if ghosts:
         pair = (motion.ghost / edge, motion.edge / edge)
-        plots.append(_two("change at shadow edges, over the mean of passing ones", pair, ("ghosts", "edges passing"), last=True))
+        plots.append(_two("change at shadow edges, over the mean of passing ones", frames, pair, ("ghosts", "edges passing"), last=True))
     caption = (
         f"{circles * frames} frames of one white light along {circles} great circles (upright lines part them), compared with all train "
         "images interpolated, which is what the capture knows of directions between its own. Ripple is the error less any gain, offset or "
@@ -48,20 +54,22 @@ def motion_curves(motion: Motion) -> str:
     return figure("".join(f'<div class="row">{plot}</div>' for plot in plots), caption)
 
 
-def _two(label: str, curves: tuple[np.ndarray, np.ndarray], names: tuple[str, str] = ("relit", "reference"), last: bool = False) -> str:
+def _two(
+    label: str, frames: int, curves: tuple[np.ndarray, np.ndarray], names: tuple[str, str] = ("relit", "reference"), last: bool = False
+) -> str:
     """Two curves (C, F or F - 1), the first in colour, labelled at their ends; the frames' axis is named on the `last` plot."""
     circles, steps = curves[0].shape
     low, high = (float(f(np.stack(curves))) for f in (np.min, np.max))
     low = 0.0 if low >= 0 else low - 0.06 * (high - low)
     height, bottom = (HEIGHT + 16, 40) if last else (HEIGHT, 24)
-    x = Axis(0, circles * (steps + 1), "frame" if last else "")
+    x = Axis(0, circles * frames, "frame" if last else "")
     plot = Plot(WIDTH, height, x, Axis(low, high + 0.06 * (high - low), label, most=5), (24, RIGHT, bottom, 44))
     if low < 0:
         plot.rule(y=0.0, style="axis")
     for circle in range(circles):
         if circle:
-            plot.rule(x=circle * (steps + 1), style="axis")
-        at = circle * (steps + 1) + np.arange(steps)
+            plot.rule(x=circle * frames, style="axis")
+        at = circle * frames + np.arange(steps)
         plot.line(at, curves[1][circle], "grey")
         plot.line(at, curves[0][circle], "red")
     ends = [float(plot.point(0, curve[-1, -1])[1]) for curve in curves]

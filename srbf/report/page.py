@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from srbf.asset import Asset
 from srbf.capture import ROLES
 from srbf.facts import folder_bytes
 from srbf.files import write_text
 from srbf.image import size_of
-from srbf.quality import scalars_of, texel_bytes
+from srbf.quality import family_of, name_of, scalars_of, texel_bytes
 from srbf.report.by_bytes import by_bytes
 from srbf.report.by_bytes import table as table_of_bytes
 from srbf.report.by_direction import by_direction
@@ -21,6 +22,7 @@ from srbf.report.by_texel import by_texel
 from srbf.report.findings import Findings
 from srbf.report.in_motion import motion_curves, motion_figures
 from srbf.report.inline import Table, data_uri, figure, image, paragraphs
+from srbf.report.light_functions import light_functions
 from srbf.report.spectrum import spectrum_plots
 from srbf.report.subject import Picture, Subject
 from srbf.report.unseen_light import how_measured, table_of_lights, worst_directions
@@ -64,6 +66,8 @@ def write_page(
     ]
     if findings.spectrum is not None:
         sections.append(Section("Spectrum", spectrum_plots(subject, findings, findings.spectrum)))
+    if "light_basis" in asset.manifest:
+        sections.append(Section("Light functions", light_functions(subject)))
     sections += [
         Section("Where the error is", by_texel(subject, findings.unseen)),
         Section("In motion", motion_section(findings, pictures, folder)),
@@ -78,8 +82,7 @@ def write_page(
 
 def kept_words(subject: Subject) -> str:
     """What the asset keeps of a texel, in words."""
-    asset = subject.asset
-    return f"{asset.k} maps" if asset.method == "relighting-map" else f"{scalars_of(asset)} scalars"
+    return f"{family_of(subject.asset)} of {name_of(subject.asset)}"
 
 
 def key_figures(subject: Subject, findings: Findings) -> str:
@@ -115,7 +118,7 @@ def motion_section(findings: Findings, pictures: Sequence[Picture], folder: Path
     if findings.motion is None:
         parts.append(paragraphs(findings.missing))
     else:
-        parts += [motion_curves(findings.motion), motion_figures(findings.motion).html()]
+        parts += [motion_figures(findings.motion).html(), motion_curves(findings.motion)]
     parts += [f'<div class="moving">{drawn(picture, folder)}</div>' for picture in pictures if Path(picture.file).suffix in MOVING]
     return "\n".join(parts)
 
@@ -165,9 +168,9 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
     rows = (
         ("capture on disk", f"{bytes_text(folder_bytes(capture.folder))}, {len(capture.lights)} lights"),
         *([("asset on disk", bytes_text(folder_bytes(asset_folder)))] if asset_folder else []),
-        ("maps, uncompressed", f"{bytes_text(raw)}, {asset.k} maps, {asset.encoding}"),
-        ("lights for each map", f"{len(capture.indices('train')) / asset.k:.1f} train images are folded into one map"),
-        ("read by a shader of the texel's own maps", f"{asset.map_bytes_per_texel()} bytes a texel"),
+        ("texels' own data, uncompressed", f"{bytes_text(raw)}, {name_of(asset)}, {asset.encoding}"),
+        ("train answers for each number kept", f"{3 * len(capture.indices('train')) / scalars_of(asset):.1f}"),
+        ("read by a shader of the texel's own data", f"{texel_bytes(asset)} bytes a texel"),
         ("resident on a GPU, everything", bytes_text(asset.resident_bytes())),
     )
     return Table("Size", ("what", "how much"), rows)
@@ -176,17 +179,36 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
 def fit_facts(subject: Subject) -> Table:
     """What the manifest records of the fit."""
     asset = subject.asset
-    spread = asset.basis.spread
+    spreads = np.array(spreads_of(asset))
     source = asset.manifest.get("source", {})
     rows = [
-        ("maps k", str(asset.k)),
-        ("spread Δ", f"{spread:.4f} rad ({np.degrees(spread):.1f}°)"),
+        ("method", f"{family_of(asset)}, {name_of(asset)}"),
+        *([("spread Δ", spread_words(spreads))] if len(spreads) else []),
         ("domain", asset.domain),
         ("quantity, transport", f"{asset.manifest['quantity']}, {asset.manifest.get('transport', 'combined')}"),
     ]
     rows += [(name.replace("_", " "), _number(value)) for name, value in source.get("fit", {}).items()]
-    rows += [(name.replace("_", " "), _number(value)) for name, value in source.get("settings", {}).items() if name in ("centers", "ridge")]
+    rows += [
+        (name.replace("_", " "), _number(value))
+        for name, value in source.get("settings", {}).items()
+        if name in ("centers", "ridge", "weighting")
+    ]
     return Table("Fit", ("what", "value"), tuple(rows))
+
+
+def spreads_of(asset: Asset) -> list[float]:
+    """Spreads (rad) of the Gaussians that an asset's functions of direction are made of; none where they are others."""
+    if "light_basis" in asset.manifest:
+        return asset.manifest["light_basis"]["spreads"]
+    return [asset.basis.spread] if asset.manifest["basis"]["kind"] == "gaussian" else []
+
+
+def spread_words(spreads: np.ndarray) -> str:
+    """One spread, or the range of several."""
+    low, high = float(spreads.min()), float(spreads.max())
+    if low == high:
+        return f"{low:.4f} rad ({np.degrees(low):.1f}°)"
+    return f"{low:.4f} to {high:.4f} rad ({np.degrees(low):.1f}° to {np.degrees(high):.1f}°)"
 
 
 def errors(subject: Subject) -> Table:
@@ -212,9 +234,11 @@ def errors(subject: Subject) -> Table:
 def limits_of(subject: Subject) -> list[str]:
     """What these pictures do not show, said plainly."""
     asset = subject.asset
+    spreads = spreads_of(asset)
+    finest = f"about the spread, {np.degrees(min(spreads)):.0f}°," if spreads else "its highest harmonics"
     notes = [
-        f"The basis is smooth: features of a receiver's answer finer than about the spread, "
-        f"{np.degrees(asset.basis.spread):.0f}°, are blurred. Hard shadow edges soften and ring; sums below 0 are clamped.",
+        f"The functions of direction are smooth: features of a receiver's answer finer than {finest} are blurred. Hard shadow edges soften "
+        "and ring; sums below 0 are clamped.",
         "A point or spot light inside a scene that was captured under directional lights is the article's approximation: every receiver "
         "uses its answer to a light at infinity, so an occluder beyond the lamp still casts its shadow, and the light that "
         "reaches it by bouncing does not know how far the lamp is from the surfaces that bounced it.",

@@ -44,10 +44,10 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     enough = bound >= spectrum.own
     reach = f", which the {int(np.argmax(enough))} best planes would reach too" if enough.any() else ""
     caption = (
-        f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB{reach}. Singular values are of the "
-        f"answers of {findings.texels} texels to all train lights and colours, less their mean texel; every light weighs alike. The curve "
-        "on the right bounds any one linear model of so many planes on these very answers, not on unseen light; clusters of texels with "
-        "planes of their own may pass it."
+        f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular values "
+        f"are of the answers of {findings.texels} texels to all train lights and colours, less their mean texel; every light weighs "
+        "alike. The curve on the right bounds any one linear model of so many planes on these very answers, not on unseen light; clusters "
+        "of texels with planes of their own may pass it."
     )
     plots = left.svg("Singular values by rank"), right.svg("PSNR that the best planes leave, by their number")
     return figure('<div class="plots row">' + "".join(f'<div style="flex: 1 1 20rem">{p}</div>' for p in plots) + "</div>", caption)

@@ -78,7 +78,7 @@ class StreamedLeastSquares:
         )
 
     def _row_norms(self) -> Float64[ndarray, " K"]:
-        return np.array([float(np.dot(row.astype(np.float64), row)) for row in self._projected.result])
+        return self._projected.row_energies()
 
     def _filter(self) -> Float[ndarray, " K"]:
         gain = np.zeros_like(self._s)

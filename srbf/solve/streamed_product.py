@@ -12,7 +12,7 @@ from srbf.arrays import Float, Float32, Float64
 from srbf.half import finite_to_float32
 from srbf.parallel import cores, one_blas_thread
 
-TILE_BYTES = 1 << 20  # of the converted rows and the product's part at a time: what a core's cache holds
+TILE_BYTES = 1 << 19  # of the converted rows and the product's part at a time: what a core's cache holds
 TASK_COLUMNS = 1 << 15  # of one thread's turn; fixed, so that sums are the same on any number of cores
 
 
@@ -80,6 +80,11 @@ class StreamedProduct:
 
         self._norm_squared += sum(in_tasks(work, columns))
         self._result = result
+
+    def row_energies(self) -> Float64[ndarray, " J"]:
+        """Sum of squares of every row of X, float32 within a piece of columns, float64 over pieces."""
+        result = self.result
+        return np.sum(in_tasks(lambda task: np.array([np.dot(row, row) for row in result[:, task]], np.float64), result.shape[1]), axis=0)
 
     def transform(self, matrix: Float64[ndarray, "I J"]) -> Float32[ndarray, "I M"]:
         """`matrix` X by float64 products of pieces of columns; in X's own memory where `matrix` is square, so that X is gone."""

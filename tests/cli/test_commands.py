@@ -151,13 +151,14 @@ def test_import_to_relight(tmp_path: Path) -> None:
         write_image(tmp_path / f"{i}.png", np.full((4, 5, 3), level, np.uint8), "uint8")
     (tmp_path / "l.lp").write_text("4\n0.png 0 0 1\n1.png 0.6 0 0.8\n2.png -0.6 0 0.8\n3.png 0 0.6 0.8\n")
     ok("import", "--lp", tmp_path / "l.lp", "-o", tmp_path / "capture", "--transfer", "srgb", "--holdout-lp", tmp_path / "l.lp")
-    ok("fit", tmp_path / "capture", "-o", tmp_path / "asset", "-k", 4)
+    ok("fit", tmp_path / "capture", "-o", tmp_path / "asset", "-k", 4, "--spread", "mean", "--ridge", 0)
     result = json.loads(ok("evaluate", tmp_path / "asset", tmp_path / "capture", "--json"))
     assert result["holdout"]["psnr"] > 55 and result["holdout"]["peak"] == 1  # four maps interpolate four lights, up to half floats
     assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
 
 
-def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path) -> None:
+def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.report.METHODS", ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
     page = tmp_path / "page.html"
@@ -182,7 +183,7 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     assert "capture.json" in refused("fit", tmp_path, "-o", out)
     (tmp_path / "file").write_text("")
     assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset")
-    assert "60 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200)
+    assert "60 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200, "--ridge", 0)
     light = capture.folder / capture.lights[3].file
     pixels = capture.image(3).copy()
     pixels[1, 2] = np.nan

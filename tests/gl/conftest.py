@@ -13,7 +13,7 @@ from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
 from srbf.gl.context import compile_program, create_context
 from srbf.gl.includes import resolve, resolve_text
-from srbf.methods.relighting_map import quantize
+from srbf.quantization import quantize
 from srbf.sphere import point_set
 
 WIDEST = 1.0  # rad: wider tables break their own tolerance
@@ -52,7 +52,7 @@ def build_asset(
         "basis": {"kind": "gaussian", "centers": centers.tolist(), "spread": spread},
         "maps": [{"encoding": encoding} for _ in range(k)],
     }
-    return Asset(manifest, stored, scale, bias, r_table(spread), images)
+    return Asset(manifest, stored, scale, bias, {"r_table": r_table(spread)}, images)
 
 
 @pytest.fixture(scope="session")

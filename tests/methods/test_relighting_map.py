@@ -13,7 +13,9 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.evaluation import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
-from srbf.methods.relighting_map import RelightingMap, linear_response, outside_domain, quantize, relight
+from srbf.methods.relighting_map import RelightingMap, folded_weights, linear_response, relight
+from srbf.quantization import quantize
+from srbf.receivers import outside_domain
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
@@ -28,7 +30,7 @@ def lambert(shape: tuple[int, int]):
 
 
 def test_sum_of_known_gaussians_is_recovered(make_capture) -> None:
-    method = RelightingMap(k=12, encoding="float")
+    method = RelightingMap(k=12, ridge=0, encoding="float")
     known = GaussianBasis(point_set("fibonacci", 12, "hemisphere"), 0.6)
     truth = np.random.default_rng(0).normal(size=(12, 5, 6, 3))
     capture = make_capture(lambda d: np.einsum("k,khwc->hwc", known.evaluate(d[None])[0], truth))
@@ -42,7 +44,7 @@ def test_fit_equals_the_slow_twin(make_capture) -> None:
     rng = np.random.default_rng(3)
     images = []
     capture = make_capture(lambda d: images.append(rng.random((4, 3, 3)).astype(np.float32)) or images[-1], lights=40, holdout=0)
-    asset = RelightingMap(k=9, centers="hammersley", spread="min", encoding="float").encode(capture)
+    asset = RelightingMap(k=9, centers="hammersley", spread="min", ridge=0, encoding="float").encode(capture)
     matrix = GaussianBasis(asset.basis.centers, asset.basis.spread).evaluate(capture.directions())
     for row in range(4):
         for column in range(3):
@@ -98,14 +100,12 @@ def test_lambert_under_a_constant_sky(plane: Asset) -> None:
 
 def test_environment_weight_is_the_integral_of_r(plane: Asset) -> None:
     # A constant sky's weight of center i is the integral of R over the hemisphere; compare with a fine quadrature of its own.
-    from srbf.methods.relighting_map import environment_weights
-
     z = (np.arange(400) + 0.5) / 400
     azimuth = 2 * np.pi * (np.arange(200) + 0.5) / 200
     r = np.sqrt(1 - z**2)
     grid = np.stack([r[:, None] * np.cos(azimuth), r[:, None] * np.sin(azimuth), np.repeat(z[:, None], 200, axis=1)], axis=-1)
     exact = plane.basis.evaluate(grid.reshape(-1, 3)).mean(axis=0) * 2 * np.pi
-    got = environment_weights(plane, EnvironmentLight(np.ones((128, 256, 3), np.float32)))
+    got = folded_weights(plane, [EnvironmentLight(np.ones((128, 256, 3), np.float32))])
     np.testing.assert_allclose(got, np.repeat(exact[:, None], 3, axis=1), rtol=2e-3)
 
 
@@ -158,8 +158,8 @@ def test_weights_read_the_assets_own_table(plane: Asset) -> None:
 def test_too_few_lights(make_capture) -> None:
     capture = make_capture(lambert((3, 3)), lights=10)
     with pytest.raises(InputError, match="10 lights for -k 25"):
-        RelightingMap(k=25).encode(capture)
-    assert RelightingMap(k=25, ridge=0.1).encode(capture).k == 25
+        RelightingMap(k=25, ridge=0).encode(capture)
+    assert RelightingMap(k=25).encode(capture).k == 25
 
 
 def test_domain_follows_the_lights(make_capture) -> None:

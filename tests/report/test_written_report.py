@@ -18,6 +18,7 @@ from srbf.evaluation import evaluate
 from srbf.image import encode_srgb, read_image, size_of
 from srbf.lights import PointLight
 from srbf.methods import relight
+from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 from srbf.report.canvas import UNCOVERED, shown, shown_signed
@@ -30,6 +31,7 @@ LAMPS = {"point_light.png", "point_strip.png", "spot_strip.png"}
 MakeCapture = Callable[..., Capture]
 PAGES = {"report.md", "index.html"}
 BYTE = 1 / 255
+COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(scalars=4))
 MAX_ANIMATION_BYTES = 2 << 20
 
 
@@ -42,7 +44,7 @@ class Case:
     evaluation: dict[str, Any]
 
     def write(self, folder: Path, **options: Any) -> Path:
-        return write_report(self.asset, self.capture, folder, evaluation=self.evaluation, **options)
+        return write_report(self.asset, self.capture, folder, evaluation=self.evaluation, **{"methods": COMPARED, **options})
 
 
 def fitted(capture: Capture, k: int = 12) -> Case:
@@ -178,7 +180,7 @@ def test_lamps_stand_in_front_of_a_wall_and_inside_a_room(full: Case) -> None:
             full.asset.stored,
             full.asset.scale,
             full.asset.bias,
-            full.asset.table,
+            full.asset.tables,
             images,
         )
 

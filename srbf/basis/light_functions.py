@@ -1,0 +1,45 @@
+"""Smooth RGB functions of light direction: combinations of a dense set of spherical Gaussians."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float, Float32, Float64
+from srbf.basis.gaussian import weight
+
+
+@dataclass(frozen=True, eq=False)
+class LightFunctions:
+    """F functions w_f(L, c) = sum_b coefficient[f, b, c] exp(-acos(L . Q_b)^2 / (2 spread_f^2)) over B shared centers.
+
+    Each function has a spread of its own, of few distinct ones: what changes slowly with the light is averaged over many images, and
+    what changes fast is not blurred. Every unit direction has an answer.
+    """
+
+    centers: Float64[ndarray, "B 3"]
+    spreads: Float64[ndarray, " F"]
+    coefficients: Float32[ndarray, "F B 3"]
+
+    def evaluate(self, directions: Float[ndarray, "N 3"]) -> Float64[ndarray, "N F 3"]:
+        """All functions at unit directions: N B exponentials for each distinct spread."""
+        values = np.empty((len(directions), len(self.spreads), 3))
+        for chosen, weights in self._by_spread(directions):
+            coefficients = self.coefficients[chosen].transpose(1, 0, 2).reshape(len(self.centers), -1)  # (B, 3 f)
+            values[:, chosen] = (weights @ coefficients).reshape(len(directions), -1, 3)
+        return values
+
+    def fold(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
+        """sum_n color_n w_f(direction_n): what many lights, or the texels of an environment, come to together."""
+        folded = np.empty((len(self.spreads), 3))
+        for chosen, weights in self._by_spread(directions):
+            folded[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)
+        return folded
+
+    def _by_spread(self, directions: Float[ndarray, "N 3"]) -> Iterator[tuple[Bool[ndarray, " F"], Float64[ndarray, "N B"]]]:
+        cosines = np.asarray(directions, np.float64) @ self.centers.T
+        for spread in np.unique(self.spreads):
+            yield self.spreads == spread, weight(cosines, float(spread))

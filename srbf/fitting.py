@@ -1,0 +1,63 @@
+"""From what a user asks for to a method with its settings: by name, by bytes a texel, or by decibels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from srbf.budget import DEFAULT_BUDGET, Planes, within_budget
+from srbf.capture import Capture
+from srbf.errors import InputError
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
+from srbf.methods.eigen_map import EigenMap
+from srbf.methods.relighting_map import RelightingMap
+
+__all__ = ["DEFAULT_BUDGET", "method_for", "settings_of"]
+
+CLASSES: dict[str, type[RelightingMap] | type[EigenMap] | type[ClusteredEigenMap]] = {
+    "relighting-map": RelightingMap,
+    "eigen-map": EigenMap,
+    "clustered-eigen-map": ClusteredEigenMap,
+}
+OF_METHOD = {
+    "relighting-map": {"k", "basis", "centers", "encoding"},
+    "eigen-map": {"scalars", "weighting", "encoding"},
+    "clustered-eigen-map": {"scalars", "clusters", "encoding"},
+    "auto": {"budget", "psnr"},
+}
+
+
+def settings_of(method: str, given: dict[str, Any], domain: str, spread: str, ridge: str) -> dict[str, Any]:
+    """The settings of `method` out of what was `given` (None: not); InputError on one that it does not have."""
+    settings = {name: value for name, value in given.items() if value is not None}
+    for name in settings:
+        if name not in OF_METHOD[method]:
+            others = [other for other, names in OF_METHOD.items() if name in names]
+            flag = "-k" if name == "k" else f"--{name}"
+            raise InputError(f"expected {flag} with --method {' or '.join(others)}, found it with --method {method}")
+    settings |= {"domain": domain, "spread": _spread(spread, method), "ridge": _number("ridge", ridge)}
+    return settings
+
+
+def method_for(
+    capture: Capture, method: str, settings: dict[str, Any], say: Callable[[str], None] = lambda line: None
+) -> RelightingMap | Planes:
+    """The method with its settings; `auto` tries what fits on a sample of the capture."""
+    if method == "auto":
+        return within_budget(capture, say=say, **settings)
+    return CLASSES[method](**settings)
+
+
+def _spread(text: str, method: str) -> Any:
+    if method == "relighting-map" and text in ("mean", "min"):
+        return text
+    return _number("spread", text, ", mean, min" if method == "relighting-map" else "")
+
+
+def _number(name: str, text: str, words: str = "") -> Any:
+    if text == "auto":
+        return text
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(f"expected --{name} auto{words} or a number, found {text!r}") from error

@@ -1,0 +1,145 @@
+"""The clustered eigen map: an eigen map whose light functions are each cluster of texels' own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.asset import Asset
+from srbf.basis.light_functions import LightFunctions
+from srbf.capture import Capture, Look
+from srbf.errors import InputError
+from srbf.image import Encoding
+from srbf.light_space import LightSpace
+from srbf.model_selection import TexelSample, choose_dense, dense_centers, fit_light_functions
+from srbf.receivers import covered_texels
+from srbf.scalar_planes import check_plane_settings, directional_responses, folded_weights, linear_response, planes_asset, relight
+from srbf.solve.clustered_pca import Clusters, cluster
+from srbf.solve.grouped_product import GroupedProduct
+from srbf.solve.pca import principal_axes
+from srbf.solve.streamed_product import StreamedProduct, in_tasks
+from srbf.sphere import Domain, domain_of
+
+__all__ = ["ClusteredEigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
+
+MOST_CLUSTERS = 256  # a texel's index is a byte
+SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
+TEXELS_A_CLUSTER = 96
+FEATURES = 96  # numbers a texel by which it finds its cluster
+
+
+@dataclass(frozen=True)
+class ClusteredEigenMap:
+    """Light transport is low-dimensional locally: texels in clusters, each with a mean and principal components of its own.
+
+    T(p, L, c) ~ w_{m,0}(L, c) + sum_j a_j(p) w_{m,j}(L, c), m the cluster of p, j = 1 … `scalars`     [Sloan2003; Kristensen2005]
+
+    Clusters grow axis by axis on a texel sample with texels re-assigned in between; then every texel joins the cluster that holds
+    it best. A cluster's scalars span its own range, so that bytes serve them as well as half floats. Light functions are smooth as those
+    of the eigen map. Planes must not be filtered across clusters: reconstruct, then filter.
+    """
+
+    clusters: int = 64
+    scalars: int = 8
+    domain: Literal["auto"] | Domain = "auto"
+    spread: Literal["auto"] | float = "auto"
+    ridge: Literal["auto"] | float = "auto"
+    encoding: Encoding = "half"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_plane_settings(self.scalars, self.spread, self.ridge, self.encoding)
+        if not 1 <= self.clusters <= MOST_CLUSTERS:
+            raise InputError(f"expected 1 to {MOST_CLUSTERS} clusters, found {self.clusters}")
+
+    def encode(
+        self,
+        capture: Capture,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+        look: Look = lambda row, image: None,
+    ) -> Asset:
+        """Clusters from a texel sample; a pass over the images to assign every texel, another to project it.
+
+        Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `scalars`) + 40 bytes a texel, two blocks of
+        `capture.STREAM_BYTES`, twice the sample (12 bytes a light and sampled texel), what `look` keeps, and some 0.2 GB of libraries.
+        InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
+        """
+        train = capture.indices("train")
+        if not train:
+            raise InputError(f"expected train lights in {capture.folder}, found none")
+        if self.scalars > 3 * len(train):
+            raise InputError(f"expected at most {3 * len(train)} scalars for {len(train)} lights, found {self.scalars}")
+        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_A_CLUSTER * self.clusters))
+        directions = capture.directions(train)
+        domain = domain_of(directions) if self.domain == "auto" else self.domain
+        space = LightSpace.of(sample, domain, "plain")
+        features, _ = principal_axes(space.centered, FEATURES)
+        found = cluster(space.centered, np.ascontiguousarray(features.T), self.clusters, self.scalars, self.seed)
+        seen = StreamedProduct(space.weights(features))
+        for first, block in capture.stream(train, look):
+            seen.add(first, block)
+            progress(first + len(block), 2 * len(train))
+        index = _assigned(seen.result, space, features, found)
+        del seen
+        axes = found.axes.transpose(0, 2, 1)  # (C, S, M)
+        product = GroupedProduct(np.stack([space.weights(a) for a in axes]).astype(np.float32), index)
+        for first, block in capture.stream(train):
+            product.add(first, block)
+            progress(len(train) + first + len(block), 2 * len(train))
+        planes, values = _in_own_range(product.result, index, covered_texels(capture), space, found)
+        functions = self._functions(sample, values, dense_centers(directions, domain))
+        fit = {"chosen_by": "validation" if sample.validated else "leave-one-light-out"}
+        return planes_asset(capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index)
+
+    def _functions(self, sample: TexelSample, values: Float64[ndarray, "L F 3"], centers: Float64[ndarray, "B 3"]) -> LightFunctions:
+        """Light functions of all clusters: one spread and ridge that predict the validation lights best, or each its own by light left out.
+
+        A cluster's few texels cannot say for each of its functions what it ought to be at the validation lights.
+        """
+        spread = None if self.spread == "auto" else self.spread
+        ridge = None if self.ridge == "auto" else self.ridge
+        if sample.validated and (spread is None or ridge is None):
+            choice = choose_dense(sample, centers, spread, ridge)
+            spread, ridge = choice.spread, choice.ridge
+        return fit_light_functions(sample, values, np.zeros((0, values.shape[1], 3)), centers, spread, ridge)
+
+
+def _assigned(seen: Float32[ndarray, "D P"], space: LightSpace, features: Float32[ndarray, "D M"], found: Clusters) -> Int[ndarray, " P"]:
+    """The cluster of every texel, by its features."""
+    clusters = found.through(np.ascontiguousarray(features.T))
+    offsets = space.offsets(features)
+    index = np.empty(seen.shape[1], np.int64)
+
+    def work(task: slice) -> None:
+        index[task] = clusters.assign(np.ascontiguousarray((seen[:, task] - offsets[:, None]).T) * np.float32(space.scale))[0]
+
+    in_tasks(work, seen.shape[1])
+    return index
+
+
+def _in_own_range(
+    projected: Float32[ndarray, "S P"], index: Int[ndarray, " P"], covered: Bool[ndarray, " P"], space: LightSpace, found: Clusters
+) -> tuple[Float32[ndarray, "S P"], Float64[ndarray, "L F 3"]]:
+    """(planes, values of the functions at the train lights) with every scalar of a cluster spanning -1 to 1 over its covered texels."""
+    count, scalars = len(found.means), len(projected)
+    planes = np.zeros_like(projected)
+    values = np.zeros((space.sample.train, count, scalars + 1, 3))
+    for number in range(count):
+        axes = np.ascontiguousarray(found.axes[number].T)  # (S, M)
+        functions = space.functions(axes, found.means[number])  # (L, S + 1, 3)
+        offsets = space.offsets(axes, found.means[number])
+        members = index == number
+        own = projected[:, members] - offsets[:, None]
+        real = own[:, covered[members]]
+        low, high = (real.min(axis=1), real.max(axis=1)) if real.shape[1] else (np.zeros(scalars), np.zeros(scalars))
+        middle, half = (low + high) / 2, (high - low) / 2
+        half = np.where(half > 0, half, 1)
+        planes[:, members] = np.clip((own - middle[:, None]) / half[:, None], -1, 1)
+        values[:, number, 0] = functions[:, 0] + np.tensordot(functions[:, 1:], middle.astype(np.float64), ([1], [0]))
+        values[:, number, 1:] = functions[:, 1:] * half[:, None]
+    return planes, values.reshape(len(values), -1, 3)

@@ -1,0 +1,94 @@
+"""The eigen map: per texel, reflected light as a sum of a few scalars, each weighed by an RGB function of light direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from srbf.asset import Asset
+from srbf.capture import Capture, Look
+from srbf.errors import InputError
+from srbf.image import Encoding
+from srbf.light_space import LightSpace, Weighting
+from srbf.model_selection import TexelSample, dense_centers, fit_light_functions
+from srbf.scalar_planes import check_plane_settings, directional_responses, folded_weights, linear_response, planes_asset, relight
+from srbf.solve.pca import principal_axes
+from srbf.solve.streamed_product import StreamedProduct
+from srbf.sphere import Domain, domain_of
+
+__all__ = ["EigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
+
+SAMPLE_TEXELS = 1 << 14
+
+
+@dataclass(frozen=True)
+class EigenMap:
+    """Joint-colour principal components of T, their light functions smooth on the sphere.
+
+    T(p, L, c) ~ w_0(L, c) + sum_j a_j(p) w_j(L, c), j = 1 … `scalars`
+
+    The rows of T, (L x 3) numbers a texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
+    number a texel for all three colours. What an axis holds at the lights becomes a function of every direction by ridge
+    regression on a dense set of spherical Gaussians, whose spread and ridge are chosen for each function (`auto`) by what it predicts at
+    the validation lights, or at train lights left out: the leading axes, which hold little noise, are followed closely, the
+    last ones are smoothed. Columns of T are weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives
+    the least squared error, `relative` divides each by its mean, so that dark texels count as much as bright ones.
+    """
+
+    scalars: int = 28
+    domain: Literal["auto"] | Domain = "auto"
+    spread: Literal["auto"] | float = "auto"
+    ridge: Literal["auto"] | float = "auto"
+    weighting: Weighting = "plain"
+    encoding: Encoding = "half"
+
+    def __post_init__(self) -> None:
+        check_plane_settings(self.scalars, self.spread, self.ridge, self.encoding)
+        if self.weighting not in get_args(Weighting):
+            raise InputError(f"expected a weighting of plain, relative, found {self.weighting!r}")
+
+    def encode(
+        self,
+        capture: Capture,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+        look: Look = lambda row, image: None,
+    ) -> Asset:
+        """Axes from a texel sample, then one projection of every texel: each image read once, and some of its rows before.
+
+        Peak memory, whatever the number of lights: about 12 `scalars` + 40 bytes a texel, two blocks of `capture.STREAM_BYTES`, the sample
+        (12 bytes a light and texel of SAMPLE_TEXELS), what `look` keeps, and some 0.2 GB of libraries.
+        InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
+        """
+        train = capture.indices("train")
+        if not train:
+            raise InputError(f"expected train lights in {capture.folder}, found none")
+        if self.scalars > 3 * len(train):
+            raise InputError(f"expected at most {3 * len(train)} scalars for {len(train)} lights, found {self.scalars}")
+        sample = TexelSample.of(capture, SAMPLE_TEXELS)
+        directions = capture.directions(train)
+        domain = domain_of(directions) if self.domain == "auto" else self.domain
+        space = LightSpace.of(sample, domain, self.weighting)
+        axes, values = principal_axes(space.centered * space.row_weights[:, None], self.scalars)
+        product = StreamedProduct(space.weights(axes))
+        for first, block in capture.stream(train, look):
+            product.add(first, block)
+            progress(first + len(block), len(train))
+        planes = product.result - space.offsets(axes)[:, None]
+        sampled = np.concatenate([np.ones((1, len(sample.texels)), np.float32), planes[:, sample.texels]])
+        functions = fit_light_functions(
+            sample,
+            space.functions(axes),
+            space.validation_functions(sampled),
+            dense_centers(directions, domain),
+            None if self.spread == "auto" else self.spread,
+            None if self.ridge == "auto" else self.ridge,
+        )
+        fit = {
+            "chosen_by": "validation" if sample.validated else "leave-one-light-out",
+            "singular_values": (values / max(float(values[0]), 1e-30)).tolist(),
+            "energy_kept": space.energy_kept(values),
+        }
+        return planes_asset(capture, "eigen-map", domain, planes, functions, self.encoding, asdict(self), fit)
