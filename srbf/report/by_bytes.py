@@ -45,9 +45,9 @@ def by_bytes(subject: Subject, findings: Findings) -> str:
     plot.label(own.bytes_per_texel, own.psnr, f"this asset: {own.name}, {own.psnr:.1f} dB", "strong red halo", dx=10, dy=18)
     caption = (
         f"PSNR on {len(subject.capture.indices(subject.role))} {subject.role_words} against bytes a texel, three channels counted as four, "
-        f"half floats unless the table says bytes. All were fitted to the same {findings.texels} random texels and are measured there, this "
-        "asset too. Clusters hold the few texels that a sample leaves them a little better than the many of the whole picture. Dashed: what "
-        "the captured images themselves give, at the bytes of keeping them all."
+        f"half floats unless the table says bytes. All were fitted to the same {findings.texels} random texels and are measured there, "
+        "this asset too. Clusters hold the few texels that a sample leaves them a little better than the many of the whole picture. "
+        "Dashed: what the captured images themselves give, at the bytes of keeping them all."
     )
     return figure(plot.svg("PSNR against bytes a texel"), caption) + table(findings).html()
 

@@ -38,6 +38,7 @@ def discs(subject: Subject, values: np.ndarray) -> str:
     width = len(roles) * (2 * RADIUS + GAP) + 60
     height = HEAD + len(halves) * (2 * RADIUS + 30)
     parts: list[str] = []
+    labels: list[str] = []
     for column, role in enumerate(roles):
         cx = RADIUS + 4 + column * (2 * RADIUS + GAP)
         indices = np.array(subject.capture.indices(role))
@@ -66,6 +67,7 @@ def discs(subject: Subject, values: np.ndarray) -> str:
                     parts.append(
                         f'<text class="strong halo" x="{x:.1f}" y="{py + 4:.1f}" text-anchor="{anchor}">{values[index]:.1f} dB</text>'
                     )
+    parts += labels
     x, top, tall = width - 48, HEAD + 30, 2 * RADIUS - 60
     for step, color in enumerate(colors):
         y = top + tall * (1 - (step + 1) / STEPS)

@@ -28,8 +28,8 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     left = Plot(450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value, of the first", log=True), (24, 20, 42, 58))
     left.line(ranks, relative, "blue")
     left.rule(x=scalars, style="line red thin dash")
-    left.label(scalars, 1.0, f"{scalars} numbers", "strong red", dx=-6, dy=12, anchor="end")
-    left.label(scalars, 1.0, "a texel here", "red", dx=-6, dy=27, anchor="end")
+    left.label(scalars, 1.0, f"{scalars} numbers", "strong red halo", dx=6, dy=12)
+    left.label(scalars, 1.0, "a texel here", "red halo", dx=6, dy=27)
     bound = spectrum.bound[: len(ranks)]
     near = np.flatnonzero(bound <= spectrum.own + ABOVE)[1:]  # planes 1, 2, …
     high = max(float(bound[near].max(initial=0)), spectrum.own) + 1
@@ -42,7 +42,7 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     right.dots(np.array([scalars]), np.array([spectrum.own]), "red", 5)
     right.label(scalars, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
     enough = bound >= spectrum.own
-    reach = f", which the {int(np.argmax(enough))} best planes would reach too" if enough.any() else ""
+    reach = f", which the best {planes_words(int(np.argmax(enough)))} would reach too" if enough.any() else ""
     caption = (
         f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular values "
         f"are of the answers of {findings.texels} texels to all train lights and colours, less their mean texel; every light weighs "
@@ -51,3 +51,8 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     )
     plots = left.svg("Singular values by rank"), right.svg("PSNR that the best planes leave, by their number")
     return figure('<div class="plots row">' + "".join(f'<div style="flex: 1 1 20rem">{p}</div>' for p in plots) + "</div>", caption)
+
+
+def planes_words(count: int) -> str:
+    """So many planes, in words."""
+    return "plane" if count == 1 else f"{count} planes"
