@@ -11,6 +11,7 @@ import json
 import sys
 import time
 import traceback
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,10 @@ def run(job: dict[str, Any], channel: Channel) -> None:
 
     job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
     geometry (bool), ambient {samples, seed} or null, lights [{index, kind, direction | position, samples, seed}].
+    Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
+    by which the tints of translucent materials are chosen.
     """
-    from blender_bake import emission
+    from blender_bake import emission, scene_file, translucency
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
@@ -54,6 +57,9 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     scenes.configure(scene)
     own_light = scenes.OwnLight(scene)
     kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
+    apart = job.get("transport") == "indirect"
+    if apart:
+        scene_file.show_as_rendered(scene)
     receiver = kind(scene, job, channel)
     channel.emit("scene", blender=scenes.version(), receiver=receiver.description(), **receiver.facts())
 
@@ -75,10 +81,26 @@ def run(job: dict[str, Any], channel: Channel) -> None:
         started = time.perf_counter()
         image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
     illuminant = Illuminant(scene, job["sun_angle"])
+    if not apart:
+        for light in job["lights"]:
+            started = time.perf_counter()
+            illuminant.aim(light)
+            image(f"light_{light['index']}", receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+        return
+    translucent = translucency.find(scene)
+    aims = [partial(illuminant.aim, light) for light in job["probes"]]
+    tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
+    seen_by = {receiver.description()["object"]} if job["receiver"]["kind"] == "lightmap" else None
+    (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+    channel.emit("file", file="scene.glb", sampling=receiver.sampling())
+    switch = translucency.Switch(translucent, tints)
     for light in job["lights"]:
         started = time.perf_counter()
         illuminant.aim(light)
-        image(f"light_{light['index']}", receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+        whole, direct = receiver.answers(light["samples"], light["seed"], switch)
+        image(
+            f"light_{light['index']}", whole, started, light=light["index"], direct=hand_over(scratch, f"direct_{light['index']}", direct)
+        )
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ import numpy as np
 
 from blender_bake import materials, unwrap
 from blender_bake.channel import Channel, WorkerError
+from blender_bake.translucency import Switch
 
 NOT_DIFFUSE = 1e-3  # an albedo below this everywhere on a slot leaves Cycles nothing to divide irradiance by
 NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
@@ -55,6 +56,10 @@ class LightmapReceiver:
             facts["uv"] = unwrap.layer_coordinates(self._object.data, self._uv_layer).tolist()
         return facts
 
+    def sampling(self) -> dict[str, Any]:
+        """The side of the square within a texel that its samples spread over."""
+        return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
+
     def geometry(self) -> dict[str, np.ndarray]:
         """World position at texel centres, world normal, albedo and coverage."""
         position = self._bake("POSITION", 1, 0)[:, :, :3]  # one sample stands on the texel centre; more would be summed
@@ -77,6 +82,20 @@ class LightmapReceiver:
             return self._bake("DIFFUSE", samples, seed, pass_filter={"DIRECT", "INDIRECT"})[:, :, :3] * np.float32(math.pi)
         every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
         return self._bake("COMBINED", samples, seed, pass_filter=every)[:, :, :3]
+
+    def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
+        """(`answer`, the direct diffuse light in it with `translucent` on): same seed, so that one is exactly part of the other."""
+        whole = self.answer(samples, seed)
+        translucent.on()
+        part = self.direct(samples, seed)
+        translucent.off()
+        return whole, part
+
+    def direct(self, samples: int, seed: int) -> np.ndarray:
+        """The direct diffuse light alone, in the units of `answer`."""
+        parts = {"DIRECT"} if self._irradiance else {"DIRECT", "COLOR"}
+        scale = math.pi if self._irradiance else 1.0
+        return self._bake("DIFFUSE", samples, seed, pass_filter=parts)[:, :, :3] * np.float32(scale)
 
     def _bake(self, kind: str, samples: int, seed: int, **options: Any) -> np.ndarray:
         self._scene.cycles.samples = samples

@@ -13,9 +13,11 @@ import numpy as np
 from blender_bake import materials
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.exr import read_passes
+from blender_bake.translucency import Switch
 
 GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the centre that its position reprojects onto it
 NOT_DIFFUSE = 1e-3
+LIGHT_PASSES = ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
 
 
 class ViewReceiver:
@@ -29,6 +31,7 @@ class ViewReceiver:
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
         self._coverage: np.ndarray | None = None
+        self._last: dict[str, np.ndarray] = {}
         self._prepare(job["width"], job["height"])
         if self._irradiance:
             self._whiten_if_nothing_is_diffuse(channel)
@@ -47,6 +50,21 @@ class ViewReceiver:
                 "angle_x": data.angle_x,
                 "ortho_scale": data.ortho_scale,
                 "shift": [data.shift_x, data.shift_y],
+            }
+        }
+
+    def sampling(self) -> dict[str, Any]:
+        """How a pixel looks at the scene, where rays of others can do the same: not through a lens, nor a panorama."""
+        data = self._camera.data
+        if data.type not in {"PERSP", "ORTHO"} or data.dof.use_dof:
+            return {}
+        return {
+            "camera": {
+                "type": data.type,
+                "matrix_world": [list(row) for row in self._camera.matrix_world],
+                "frame": [list(corner) for corner in data.view_frame(scene=self._scene)],
+                "filter": self._scene.cycles.pixel_filter_type,
+                "filter_width": self._scene.cycles.filter_width,
             }
         }
 
@@ -78,14 +96,35 @@ class ViewReceiver:
 
         The coverage is that of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
         """
+        passes = self._last = self._render(samples, seed, LIGHT_PASSES)
         if self._irradiance:
-            passes = self._render(samples, seed, ("Diffuse Direct", "Diffuse Indirect"))
             return (passes["Diffuse Direct"] + passes["Diffuse Indirect"])[:, :, :3] * np.float32(math.pi)
+        return self._over_coverage(passes["Combined"][:, :, :3])
+
+    def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
+        """(`answer`, the direct diffuse light in it with `translucent` on): of one render where nothing is translucent, else of two."""
+        whole = self.answer(samples, seed)
+        if not translucent:
+            return whole, self._direct_of(self._last)
+        translucent.on()
+        part = self.direct(samples, seed)
+        translucent.off()
+        return whole, part
+
+    def direct(self, samples: int, seed: int) -> np.ndarray:
+        """The direct diffuse light alone, in the units of `answer`."""
+        return self._direct_of(self._render(samples, seed, ("Diffuse Direct", "Diffuse Color")))
+
+    def _direct_of(self, passes: dict[str, np.ndarray]) -> np.ndarray:
+        if self._irradiance:
+            return passes["Diffuse Direct"][:, :, :3] * np.float32(math.pi)
+        return self._over_coverage((passes["Diffuse Direct"] * passes["Diffuse Color"])[:, :, :3])
+
+    def _over_coverage(self, image: np.ndarray) -> np.ndarray:
         if self._coverage is None:
             self._coverage = np.clip(self._render(self._coverage_samples, 0, ("Combined",))["Combined"][:, :, 3:], 0, 1)
-        combined = self._render(samples, seed, ("Combined",))["Combined"]
         seen = self._coverage > 0
-        return np.where(seen, combined[:, :, :3] / np.where(seen, self._coverage, 1), 0)
+        return np.where(seen, image / np.where(seen, self._coverage, 1), 0)
 
     def _prepare(self, width: int, height: int) -> None:
         render = self._scene.render

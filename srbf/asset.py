@@ -21,7 +21,8 @@ from srbf.sphere import Domain
 
 MANIFEST = "asset.json"
 LAYERS = {"relighting-map": "maps", "eigen-map": "planes", "clustered-eigen-map": "planes"}  # the key of a method's images
-GEOMETRY = ("position", "normal", "coverage", "ambient")
+GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
+SCENE_FILE = "scene.glb"
 UNIT_TOLERANCE = 1e-3
 TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest's spread
 
@@ -44,6 +45,7 @@ class Asset:
     bias: Float32[ndarray, "N C"]
     tables: dict[str, ndarray]
     images: dict[str, ndarray] = field(default_factory=dict)
+    scene: bytes | None = None  # scene.glb of an indirect asset: what casts the shadows of the light to be added
 
     @property
     def method(self) -> str:
@@ -155,12 +157,13 @@ class Asset:
         return {"directional": own, "point": own, "spot": own, "environment": own}
 
     def resident_bytes(self) -> int:
-        """Everything the folder holds, as GPU memory: layers, position, normal, albedo, ambient (RGBA float), coverage and the tables."""
+        """Everything the folder holds, as GPU memory: layers, position, normal, albedo, ambient (RGBA float), coverage, the tables and the
+        scene."""
         texels = self.width * self.height
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
         own = self.bytes_per_texel()["directional"] - (1 if "cluster_index" in self.tables else 0)
         tables = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in self.tables.values())
-        return texels * (own + 4 * channels) + tables
+        return texels * (own + 4 * channels) + tables + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
         """Write the folder whole or not at all; fills in `sha256`."""
@@ -174,6 +177,8 @@ class Asset:
                 images.append((temporary / self.manifest[name]["file"], np.atleast_3d(pixels), _ENCODING[table.dtype.name]))
             images += [(temporary / self.manifest[name], image, "float") for name, image in self.images.items()]
             write_images(images)
+            if self.scene is not None:
+                (temporary / self.manifest["scene"]).write_bytes(self.scene)
             written = sorted(p.name for p in temporary.iterdir())
             self.manifest["sha256"] = {name: files.sha256_of(temporary / name) for name in written}
             schemas.check(self.manifest, "asset", MANIFEST)
@@ -207,7 +212,8 @@ class Asset:
             images["coverage"] = images["coverage"][:, :, 0]
         scale = np.array([entry["scale"] for entry in layers], np.float32)
         bias = np.array([entry["bias"] for entry in layers], np.float32)
-        return Asset(manifest, stored, scale, bias, tables, images)
+        scene = reader.bytes(manifest["scene"]) if "scene" in manifest else None
+        return Asset(manifest, stored, scale, bias, tables, images, scene)
 
 
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
@@ -238,11 +244,21 @@ class _Reader:
             raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
         return pixels
 
-    def _pixels(self, name: str, channels: int) -> np.ndarray:
+    def bytes(self, name: str) -> bytes:
+        path = self._checked(name)
+        if not path.is_file():
+            raise ManifestError(f"expected {path}, found no such file; fit again")
+        return path.read_bytes()
+
+    def _checked(self, name: str) -> Path:
         path = files.inside(self.folder, name, self.folder / MANIFEST)
         expected = self.manifest.get("sha256", {}).get(name)
         if expected and path.is_file() and files.sha256_of(path) != expected:
             raise ImageError(f"expected {path} as it was written, found another checksum: it is damaged or was changed; fit again")
+        return path
+
+    def _pixels(self, name: str, channels: int) -> np.ndarray:
+        path = self._checked(name)
         pixels = read_image(path, channels)
         require_finite(pixels, path)
         return pixels

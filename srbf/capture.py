@@ -21,6 +21,7 @@ from srbf.parallel import cores, each
 
 Role = Literal["train", "validation", "holdout"]
 Quantity = Literal["irradiance", "radiance"]
+Transport = Literal["combined", "indirect"]
 ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
 MANIFEST = "capture.json"
 COVERED = 0.5  # a texel of at least this coverage counts in metrics and figures
@@ -28,16 +29,21 @@ UNIT_TOLERANCE = 1e-3  # of a manifest's directions
 BLOCK_BYTES = 64 << 20  # float32 images of one block: small beside the maps, large enough for a matrix product
 STREAM_BYTES = 192 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
 STRIP = 16  # rows: what the EXRs compress at a time
+Rows = Sequence[tuple[int, int]] | None  # (begin, end) of some, or all
 Look = Callable[[int, ndarray], None]  # (position within the lights asked for, image (P, 3) as stored)
 
 
 @dataclass(frozen=True)
 class CapturedLight:
-    """One illuminant of a capture: a directional light of unit irradiance, and the image that answers it."""
+    """One illuminant of a capture: a directional light of unit irradiance, and the image that answers it.
+
+    `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks.
+    """
 
     direction: tuple[float, float, float]
     role: Role
     file: str
+    direct: str | None = None
 
 
 @dataclass(frozen=True)
@@ -64,9 +70,12 @@ class Capture:
             if not abs(length - 1) <= UNIT_TOLERANCE:
                 raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalise it")
             files.inside(folder, light["file"], path)
+            if "direct" in light:
+                files.inside(folder, light["direct"], path)
             unit = np.asarray(light["direction"], np.float64) / length
-            lights.append(CapturedLight((float(unit[0]), float(unit[1]), float(unit[2])), light["role"], light["file"]))
-        for name in ("position", "normal", "albedo", "coverage", "ambient"):
+            direction = (float(unit[0]), float(unit[1]), float(unit[2]))
+            lights.append(CapturedLight(direction, light["role"], light["file"], light.get("direct")))
+        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene"):
             if name in manifest:
                 files.inside(folder, manifest[name], path)
         return Capture(folder, manifest, tuple(lights))
@@ -84,8 +93,30 @@ class Capture:
         return self.manifest["quantity"]
 
     @property
-    def transport(self) -> str:
+    def transport(self) -> Transport:
         return self.manifest.get("transport", "combined")
+
+    @property
+    def has_direct(self) -> bool:
+        """Whether every light has its direct image beside it, so that the combined answer can be told."""
+        return all(light.direct is not None for light in self.lights)
+
+    def combined(self) -> Capture:
+        """The same capture with the direct light put back; itself where it is combined. ManifestError where direct images lack."""
+        if self.transport == "combined":
+            return self
+        if not self.has_direct:
+            raise ManifestError(f"expected a direct image of every light in {self.folder}, found lights without; bake it again")
+        return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
+
+    def scene(self) -> bytes | None:
+        """The .glb of receivers and occluders, where the capture has one."""
+        if "scene" not in self.manifest:
+            return None
+        path = self.folder / self.manifest["scene"]
+        if not path.is_file():
+            raise ManifestError(f"expected the scene's triangles at {path}, found no such file; bake again")
+        return path.read_bytes()
 
     @property
     def source_bits(self) -> int | None:
@@ -135,16 +166,7 @@ class Capture:
         whole = len(rows) * STRIP >= self.height
 
         def read(row: int) -> None:
-            name = self.lights[indices[row]].file
-            if whole:
-                answers[:, row] = self._stored(indices[row])[texels]
-                return
-            path = self.folder / name
-            if size_of(path) != (self.height, self.width):
-                self._stored(indices[row])  # says what is wrong
-            pixels = read_stored(path, 3, rows)
-            require_finite(pixels, path)
-            answers[:, row] = pixels.reshape(-1, 3)[picked]
+            answers[:, row] = self._stored(indices[row])[texels] if whole else self._stored(indices[row], rows)[picked]
 
         each(read, len(indices))
         return answers
@@ -206,9 +228,19 @@ class Capture:
         finally:
             readers.shutdown(cancel_futures=True)
 
-    def _stored(self, index: int) -> Float[ndarray, "P 3"]:
-        """An image of T as its file has it, float16 or float32, of the right size and finite."""
-        return self._checked(self.lights[index].file, read_stored, 3).reshape(-1, 3)
+    def _stored(self, index: int, rows: Rows = None) -> Float[ndarray, "n 3"]:
+        """An image of T as its file has it, float16 or float32, of the right size and finite; all texels, or those of some rows."""
+        return self._read_rows(self.lights[index].file, rows)
+
+    def _read_rows(self, name: str, rows: Rows) -> Float[ndarray, "n 3"]:
+        if rows is None:
+            return self._checked(name, read_stored, 3).reshape(-1, 3)
+        path = self.folder / name
+        if size_of(path) != (self.height, self.width):
+            self._checked(name, read_stored, 3)  # says what is wrong
+        pixels = read_stored(path, 3, rows)
+        require_finite(pixels, path)
+        return pixels.reshape(-1, 3)
 
     def geometry(self, name: Literal["position", "normal", "albedo"]) -> Float32[ndarray, "H W 3"] | None:
         """World position (m), unit normal or albedo of every receiver, where the capture has it."""
@@ -255,11 +287,27 @@ class _KeptCapture(Capture):
     def coverage(self) -> Float32[ndarray, "H W"]:
         return self.covered
 
-    def _stored(self, index: int) -> Float32[ndarray, "P 3"]:
+    def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "P 3"]:
         return self.answers[:, index]
 
     def _of(self, lights: tuple[CapturedLight, ...], chosen: Sequence[int]) -> Capture:
         return replace(self, lights=lights, answers=self.answers[:, list(chosen)])
+
+
+class CombinedCapture(Capture):
+    """An indirect capture whose images have their direct light added."""
+
+    def image(self, index: int) -> Float32[ndarray, "H W 3"]:
+        return self._stored(index).reshape(self.height, self.width, 3)
+
+    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+        size = max(1, STREAM_BYTES // (self.width * self.height * 12))
+        return self._blocks(indices, size, np.dtype(np.float32), 2, look)
+
+    def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "n 3"]:
+        direct = self.lights[index].direct
+        assert direct is not None
+        return super()._stored(index, rows).astype(np.float32) + self._read_rows(direct, rows)
 
 
 def check_version(manifest: dict[str, Any], expected: str, path: Path) -> None:

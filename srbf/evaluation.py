@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from threading import Lock
 from typing import Any
@@ -12,7 +12,8 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture
+from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.direct.choice import Added, Direct
 from srbf.errors import InputError
 from srbf.half import finite_to_float32
 from srbf.methods import directional_responses
@@ -116,14 +117,16 @@ class TrainWatch:
         self.texels: Int[ndarray, " n"] = texels
         self.peaks = PeakHistogram(int(covered.sum()) * 3 * len(self.lights), PEAK_QUANTILE)
         self._answers: dict[int, ndarray] = {}
+        self._combined = capture.combined() if capture.transport == "indirect" and capture.has_direct else None
 
     def look(self, row: int, image: Float[ndarray, "P 3"]) -> None:
         """See the answer to train light `row`, as stored."""
         self._answers[row] = image[self.texels]
-        self.peaks.add(image, self._rows)
+        whole = image if self._combined is None else self._combined.image(self.lights[row]).reshape(-1, 3)
+        self.peaks.add(whole, self._rows)
 
-    def squares(self, asset: Asset, capture: Capture) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
-        """Sums of squared differences and of squared references, a light, over `texels`."""
+    def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
+        """Sums of squared differences and of squared references, a light, over `texels`, both clamped at `floor`."""
         picked = asset.at(self.texels)
         directions = capture.directions(self.lights)
         sums = np.empty((2, len(self.lights)))
@@ -135,7 +138,7 @@ class TrainWatch:
                 reference = self._answers[row]
                 if reference.dtype == np.float16:
                     reference = finite_to_float32(reference, np.empty(reference.shape, np.float32))
-                sums[:, row] = _squares(answer, reference)
+                sums[:, row] = _squares(answer, reference, floor)
 
         with one_blas_thread():
             each(compare, -(-len(self.lights) // LIGHTS_AT_A_TIME))
@@ -146,41 +149,55 @@ def evaluate(
     asset: Asset,
     capture: Capture,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    direct: Direct = "none",
+    roles: Sequence[Role] = ROLES,
     watch: TrainWatch | None = None,
 ) -> dict[str, Any]:
     """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
 
-    The peak is the 99.9 % quantile of the train references (1 for 8-bit sources). A role without lights is left out. With a
-    `watch` that has seen the train images they are not read again: peak, validation and holdout are the same, and train's error is that
-    of the watched texels, whose number stands beside it as `texels` where they are not all.
-    InputError where asset and capture differ in size.
+    The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
+    and all but `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the clamp
+    comes after the direct light; with it, against the combined answer. With a `watch` that has seen the train images they are not read
+    again: peak, validation and holdout are the same, and train's error is that of the watched texels, whose number stands beside it as
+    `texels` where they are not all. InputError where asset and capture cannot be compared.
     """
+    reference, peak_source = _references(asset, capture, direct)
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
     covered = _covered(capture)
     samples = dict.fromkeys(ROLES, int(covered.sum()) * 3)
+    floor = -np.inf if reference.transport == "indirect" else 0.0
     peaks = PeakHistogram() if watch is None else watch.peaks
+    if watch is None and (peak_source is not reference or "train" not in roles):
+        for _, block in peak_source.blocks(peak_source.indices("train")):
+            peaks.add(block[:, covered])
     squares: dict[int, float] = {}  # sum of squared differences a light
     powers: dict[int, float] = {}  # sum of squared references a light
     if watch is not None:
         samples["train"] = len(watch.texels) * 3
-        for light, square, power in zip(watch.lights, *watch.squares(asset, capture), strict=True):
+        for light, square, power in zip(watch.lights, *watch.squares(asset, capture, floor), strict=True):
             squares[light], powers[light] = float(square), float(power)
-    for role in ROLES:
-        indices = capture.indices(role) if role != "train" or watch is None else []
-        for first, block in capture.blocks(indices):
-            chosen = indices[first : first + len(block)]
-            relit = directional_responses(asset, capture.directions(chosen)).reshape(block.shape)
-            for index, answer, reference in zip(chosen, relit, block, strict=True):
-                reference = reference[covered]
-                if role == "train":
-                    peaks.add(reference)
-                squares[index], powers[index] = _squares(answer[covered], reference)
-                progress(len(squares), len(capture.lights))
+    total = sum(len(capture.indices(role)) for role in roles)
+    with Added(asset, direct) as added:
+        for role in roles:
+            indices = capture.indices(role) if role != "train" or watch is None else []
+            for first, block in reference.blocks(indices):
+                chosen = indices[first : first + len(block)]
+                directions = capture.directions(chosen)
+                relit = directional_responses(asset, directions).reshape(block.shape)
+                for index, direction, answer, true in zip(chosen, directions, relit, block, strict=True):
+                    lit = added.directional(direction[None])
+                    if not isinstance(lit, float):
+                        answer = answer + lit.reshape(answer.shape)
+                    true = true[covered]
+                    if role == "train" and peak_source is reference:
+                        peaks.add(true)
+                    squares[index], powers[index] = _squares(answer[covered], true, floor)
+                    progress(len(squares), total)
     has_train = bool(capture.indices("train"))
     peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
     result: dict[str, Any] = {}
-    for role in ROLES:
+    for role in roles:
         indices = capture.indices(role)
         if indices:
             error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
@@ -190,6 +207,7 @@ def evaluate(
     result["lights"] = [
         {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples[light.role]))}
         for i, light in enumerate(capture.lights)
+        if i in squares
     ]
     return result
 
@@ -201,10 +219,10 @@ def _covered(capture: Capture) -> Bool[ndarray, " P"]:
     return covered
 
 
-def _squares(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"]) -> tuple[float, float]:
-    """Sums of squared differences and of squared references, both images clamped at 0."""
-    reference = np.maximum(reference, 0)
-    difference = np.maximum(answer, 0) - reference
+def _squares(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
+    """Sums of squared differences and of squared references, both images clamped at `floor`."""
+    reference = np.maximum(reference, np.float32(floor))
+    difference = np.maximum(answer, np.float32(floor)) - reference
     return _energy(difference), _energy(reference)
 
 
@@ -212,6 +230,24 @@ def _energy(values: Float32[ndarray, "n 3"]) -> float:
     """Sum of squares: float32 within a piece, float64 over pieces."""
     flat = values.ravel()
     return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + PIECE] for start in range(0, len(flat), PIECE)))
+
+
+def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture, Capture]:
+    """(what the relit images are compared with, what the peak is taken of)."""
+    if asset.transport == "combined":
+        if direct != "none":
+            raise InputError(f"expected an indirect asset for --direct {direct}, found a combined one: it holds the direct light already")
+        combined = capture.combined()
+        return combined, combined
+    whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
+    if direct == "none":
+        if capture.transport == "combined":
+            raise InputError(
+                f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
+                "add its direct light: --direct ray or shadow-map"
+            )
+        return capture, whole
+    return capture.combined(), whole
 
 
 def _role_error(squares: np.ndarray, powers: np.ndarray, samples: int, peak: float) -> RoleError:

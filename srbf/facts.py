@@ -26,6 +26,8 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
     """Size, lights by role, receiver and disk of a capture; every image's header is read."""
     for light in capture.lights:
         size_of(capture.folder / light.file)
+        if light.direct is not None:
+            size_of(capture.folder / light.direct)
     return {
         "format": "srbf-capture",
         "version": 1,

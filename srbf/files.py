@@ -138,5 +138,5 @@ def check_replaceable(path: Path, force: bool, marker: str) -> None:
         raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
     if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
         raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")
-    if others := [p.name for p in path.iterdir() if p.is_dir() and p.name != "lights"]:
+    if others := [p.name for p in path.iterdir() if p.is_dir() and p.name not in ("lights", "direct")]:
         raise OutputExistsError(f"--force would delete the folder {others[0]!r} inside {path}; move it, or choose another -o")

@@ -99,13 +99,17 @@ def nearest_image(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
 
 
 def error_of(answers: Reference, capture: Capture, role: Role, peak: float) -> tuple[float, float]:
-    """(PSNR in dB, mean over images, and relative rmse) of answers to the lights of `role`, both clamped at 0."""
+    """(PSNR in dB, mean over images, and relative rmse) of answers to the lights of `role`.
+
+    Both are clamped at 0, but where the capture is of indirect light: there the clamp comes after the direct light.
+    """
+    floor = -np.inf if capture.transport == "indirect" else 0.0
     indices = capture.indices(role)
     squares: list[float] = []
     power = 0.0
     for first, block in capture.blocks(indices):
-        relit = np.maximum(answers(capture.directions(indices[first : first + len(block)])), 0)
-        for answer, reference in zip(relit, np.maximum(block, 0), strict=True):
+        relit = np.maximum(answers(capture.directions(indices[first : first + len(block)])), floor)
+        for answer, reference in zip(relit, np.maximum(block, floor), strict=True):
             squares.append(float(((answer - reference) ** 2).mean(dtype=np.float64)))
             power += float((reference**2).mean(dtype=np.float64))
     return float(np.mean([psnr(peak, np.sqrt(s)) for s in squares])), float(np.sqrt(sum(squares) / max(power, 1e-30)))

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 import srbf
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.asset import GEOMETRY, Asset
+from srbf.asset import GEOMETRY, SCENE_FILE, Asset
 from srbf.capture import Capture
 from srbf.dilation import dilate
 from srbf.errors import InputError
@@ -27,7 +27,7 @@ def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dic
     """The receivers' images that go along with an asset, dilated as its layers are."""
     images: dict[str, ndarray] = {}
     for name in GEOMETRY:
-        if name not in capture.manifest:
+        if name not in capture.manifest or (name == "albedo" and not needs_albedo(capture)):
             continue
         if name == "coverage":
             images[name] = capture.coverage()
@@ -53,6 +53,7 @@ def common_manifest(
         "height": capture.height,
         "domain": domain,
         **{name: f"{name}.exr" for name in images},
+        **_kept_apart(capture),
         "row_origin": "top",
         "axes": "z-up-right-handed",
         "asset_from_world": np.eye(4).tolist(),
@@ -152,6 +153,24 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
 def covered_texels(capture: Capture) -> Bool[ndarray, " P"]:
     """Which texels, flat, have any coverage: the rest are filled from them."""
     return capture.coverage().ravel() > 0
+
+
+def needs_albedo(capture: Capture) -> bool:
+    """Direct light is added as irradiance; only radiance has the albedo in it."""
+    return capture.transport == "indirect" and capture.quantity == "radiance"
+
+
+def carried_scene(capture: Capture) -> bytes | None:
+    """scene.glb of an indirect capture: what casts the shadows of the light to be added."""
+    return capture.scene() if capture.transport == "indirect" and "scene" in capture.manifest else None
+
+
+def _kept_apart(capture: Capture) -> dict[str, Any]:
+    """What an indirect asset says of the direct light to be added: how it was sampled, and the scene that shadows it."""
+    if capture.transport != "indirect":
+        return {}
+    keys = {"direct": capture.manifest["direct"]} if "direct" in capture.manifest else {}
+    return {**keys, **({"scene": SCENE_FILE} if "scene" in capture.manifest else {})}
 
 
 def _finite(report: dict[str, Any]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from srbf.errors import InputError
 from srbf.image import Encoding
 from srbf.lights import Light
 from srbf.quantization import layer_entries, quantize
-from srbf.receivers import CHUNK, carried_images, common_manifest, far_lights, finish, inside, sum_over_lights
+from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, sum_over_lights
 from srbf.sphere import Domain
 
 CHANNELS = 4  # planes to an image
@@ -149,4 +149,4 @@ def planes_asset(
         manifest["clusters"] = len(functions.spreads) // (scalars + 1)
         manifest["cluster_index"] = {"file": "cluster_index.png"}
         tables["cluster_index"] = dilate(index.reshape(*shape, 1), nearest)[:, :, 0].astype(np.uint8)
-    return Asset(manifest, stored, scale, bias, tables, images)
+    return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))

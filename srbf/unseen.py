@@ -88,13 +88,17 @@ def unseen_error(
     peak: float,
     flip: Flip,
     seed: int = 0,
+    floor: float = 0.0,
 ) -> UnseenError:
-    """Error under `lights` of the S held-out lights at once; `relit` before the clamp. Memory: 2 x SUMS pictures beside the stacks."""
+    """Error under `lights` of the S held-out lights at once; `relit` before the clamp, which is at `floor`.
+
+    Memory: 2 x SUMS pictures beside the stacks.
+    """
     mean = references.mean(axis=0)
     true, shown = sums_of_lights((references, relit), lights, np.random.default_rng([seed, lights]))
     whole, edges = [], []
     for reference, picture in zip(true, shown, strict=True):
-        squares = (np.maximum(picture, 0) - np.maximum(reference, 0)) ** 2
+        squares = (np.maximum(picture, floor) - np.maximum(reference, floor)) ** 2
         whole.append(psnr(peak, float(np.sqrt(squares[covered].mean(dtype=np.float64)))))
         at_edges = shadow_edges(reference, mean, covered)
         if at_edges.any():

@@ -93,6 +93,21 @@ def view(kind="PERSP"):
     camera(kind)
 
 
+def pane():
+    """The square half under a tinted pane 0.4 m up that shadow rays pass, and the black wall."""
+    occluder()
+    glass = quad("Pane", corners=[(-3, -3, 0.4), (-0.1, -3, 0.4), (-0.1, 3, 0.4), (-3, 3, 0.4)])
+    glass.data.materials[0] = material("glass", (0.8, 0.4, 0.2), "ShaderNodeBsdfTransparent")
+
+
+def sharp(kind="PERSP"):
+    """A coloured plane and the wall before a camera without depth of field."""
+    quad("Plane", color=(0.8, 0.4, 0.2))
+    quad("Wall", corners=[(0, 0, 0), (0, 1, 0), (0, 1, 0.5), (0, 0, 0.5)], color=(0.3, 0.5, 0.7))
+    camera(kind)
+    bpy.context.scene.camera.data.dof.use_dof = False
+
+
 def emissive():
     """A white square under a small glowing one."""
     quad("Plane")
@@ -225,6 +240,9 @@ SCENES = {
     "view": view,
     "ortho": lambda: view("ORTHO"),
     "pano": lambda: view("PANO"),
+    "pane": pane,
+    "sharp": sharp,
+    "sharp ortho": lambda: sharp("ORTHO"),
     "emissive": emissive,
     "metal": metal,
     "layers": layers,

@@ -30,7 +30,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
         probes = [{**lights[len(lights) // 3].job(), "index": i, "samples": n} for i, n in enumerate((1, 1, 1 + PROBE_SAMPLES))]
-        job = {**base_job(bake.scene, settings, scratch), "geometry": False, "ambient": None, "lights": probes}
+        job = {**base_job(bake.scene, settings, scratch), "geometry": False, "ambient": None, "lights": probes, "probes": []}
         facts: dict[str, Any] = {}
         seconds, image_bytes = [0.0] * len(probes), 0
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
@@ -41,8 +41,10 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
                     facts = event
                 elif event["event"] == "image":
                     seconds[event["light"]] = event["seconds"]
-                    write_image(scratch / "probe.exr", np.clip(np.load(scratch / event["file"]), -6e4, 6e4), "half")
-                    image_bytes = (scratch / "probe.exr").stat().st_size
+                    image_bytes = 0
+                    for file in (event[key] for key in ("file", "direct") if key in event):
+                        write_image(scratch / "probe.exr", np.clip(np.load(scratch / file), -6e4, 6e4), "half")
+                        image_bytes += (scratch / "probe.exr").stat().st_size
     # The first light also hands the scene to Cycles: the second and third tell what every other one costs.
     per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
     fixed = max(0.0, seconds[1] - per_sample)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from srbf.bake.run import base_job
 from srbf.bake.settings import BakeSettings, Receiver, noise_seed
 from srbf.bake.worker import Worker
 from srbf.errors import InputError
-from srbf.lights import Falloff, PointLight
+from srbf.lights import Falloff, Light, PointLight
 
 FALLOFFS: tuple[Falloff, ...] = ("inverse-square", "linear")
 DISTANCE_BINS = 6
@@ -32,11 +32,13 @@ def compare_with_lamps(
     progress: Callable[[float, float], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
     blender: Path | None = None,
+    direct: Callable[[Sequence[Light]], np.ndarray | None] = lambda lights: None,
 ) -> dict[str, Any]:
     """Error of the point relighter by distance, against `count` random lamps of unit irradiance at 1 m rendered by Cycles.
 
     For each falloff and distance bin: relative RMSE as it stands (a0 = 1 m) and `scaled`, at the one global a0 that fits best.
-    The asset's captured light is directional, so occluders beyond a lamp still cast: this measures that approximation.
+    The asset's captured light is directional, so occluders beyond a lamp still cast: this measures that approximation. `direct` gives
+    the light that an indirect asset leaves out, where that is to be added.
     """
     if count < 1 or samples < 1:
         raise InputError(f"expected at least 1 lamp and 1 sample, found {count} and {samples}")
@@ -61,7 +63,8 @@ def compare_with_lamps(
     for lamp, reference in zip(lamps, references, strict=True):
         distances.append(np.linalg.norm(lamp - positions, axis=1))
         for falloff in FALLOFFS:
-            relit = methods.relight(asset, [PointLight(tuple(lamp), falloff=falloff)])
+            lights = [PointLight(tuple(lamp), falloff=falloff)]
+            relit = methods.relight(asset, lights, direct(lights))
             if "ambient" in asset.images:
                 relit = relit - asset.images["ambient"]
             errors[falloff].append((relit[covered], reference[covered]))

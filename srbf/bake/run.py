@@ -28,8 +28,19 @@ LOCK = ".lock"
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
 GEOMETRY = ("position", "normal", "albedo", "coverage")
-BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights")  # what may be there of a bake that never wrote an image
-WRITTEN = ("lights", "ambient.exr", *(f"{name}.exr" for name in GEOMETRY), "uv.json", SCRATCH, LOG)  # all that a bake leaves
+SCENE_FILE = "scene.glb"
+PROBES = 12  # about so many lights by which the tints of translucent materials are chosen
+BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights", "direct")  # what may be there of a bake that never wrote an image
+WRITTEN = (
+    "lights",
+    "direct",
+    "ambient.exr",
+    *(f"{name}.exr" for name in GEOMETRY),
+    "uv.json",
+    SCENE_FILE,
+    SCRATCH,
+    LOG,
+)  # all that a bake leaves
 
 
 @dataclass
@@ -67,6 +78,8 @@ class Bake:
                 scratch = self.folder / SCRATCH
                 files.make_folder(scratch)
                 files.make_folder(self.folder / "lights")
+                if self.settings.transport == "indirect":
+                    files.make_folder(self.folder / "direct")
                 try:
                     manifest = self._bake(identity, scratch, reporter)
                 except WorkerDiedError as error:
@@ -122,7 +135,7 @@ class Bake:
         done, begun = self.folder / MANIFEST, self.folder / STATE
         if not done.is_file() and not begun.is_file():
             others = [p for p in self.folder.iterdir() if p.name not in BEFORE_IMAGES and ".partial" not in p.name]
-            if others or any((self.folder / "lights").glob("*")):
+            if others or any(any((self.folder / name).glob("*")) for name in ("lights", "direct")):
                 raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
             return
         recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
@@ -157,12 +170,12 @@ class Bake:
     def _sweep(self) -> None:
         """Remove what a killed process left half-written."""
         shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
-        for partial in [*self.folder.glob(".*.partial*"), *(self.folder / "lights").glob(".*.partial*")]:
+        for partial in [*self.folder.glob(".*.partial*"), *self.folder.glob("lights/.*.partial*"), *self.folder.glob("direct/.*.partial*")]:
             partial.unlink()
 
     def _bake(self, identity: dict[str, Any], scratch: Path, reporter: Reporter) -> dict[str, Any]:
         lights = plan_lights(self.settings)
-        missing = [light for light in lights if not self._is_done(self.folder / light.file)]
+        missing = [light for light in lights if not self._is_done(light)]
         images = _Images(self.folder, self.settings, reporter)
         total = float(sum(light.samples for light in lights))
         done = total - sum(light.samples for light in missing)
@@ -172,6 +185,7 @@ class Bake:
             reporter.say(f"going on: {len(lights) - len(missing)} of {len(lights)} lights are done")
         reporter.progress(done, total, "opening the scene")
         facts: dict[str, Any] = {}
+        sampling: dict[str, Any] = {}
         planned = {light.index: light for light in missing}
         with Worker(self._job(missing, scratch), scratch, log, self.blender) as worker:
             for event in worker.events():
@@ -181,6 +195,10 @@ class Bake:
                     facts = event
                     self._record(identity, event["blender"])
                     self._write_uv(event)
+                elif event["event"] == "file":
+                    sampling = event["sampling"]
+                    with files.atomic_path(self.folder / event["file"]) as temporary:
+                        shutil.copyfile(scratch / event["file"], temporary)
                 elif event["event"] == "image":
                     array = np.load(scratch / event["file"])
                     (scratch / event["file"]).unlink()
@@ -188,7 +206,11 @@ class Bake:
                         images.take(event["name"], array)
                         continue
                     light = planned.pop(event["light"])
-                    images.take_light(light, array)
+                    direct = None
+                    if "direct" in event:
+                        direct = np.load(scratch / event["direct"])
+                        (scratch / event["direct"]).unlink()
+                    images.take_light(light, array, direct)
                     done += light.samples
                     reporter.progress(done, total, f"light {len(lights) - len(planned)} of {len(lights)}")
                     with open(log, "a", encoding="utf-8") as lines:
@@ -202,21 +224,26 @@ class Bake:
             )
         with open(log, "a", encoding="utf-8") as lines:
             lines.write(f"srbf: {len(missing)} lights in {time.perf_counter() - started:.1f} s\n")
-        return self._manifest(identity, lights, facts, images)
+        return self._manifest(identity, lights, facts, images, sampling)
 
     def _job(self, missing: list[PlannedLight], scratch: Path) -> dict[str, Any]:
         settings = self.settings
+        train = [light for light in plan_lights(settings) if light.role == "train"]
         return {
             **base_job(self.scene, settings, scratch),
             "geometry": True,
             "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)},
             "lights": [light.job() for light in missing],
+            "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
         }
 
-    def _is_done(self, path: Path) -> bool:
-        """A light's file is whole by construction (renamed into place); a size that is not ours is baked again."""
+    def _is_done(self, light: PlannedLight) -> bool:
+        """A light's files are whole by construction (renamed into place); a size that is not ours is baked again."""
+        paths = [self.folder / light.file]
+        if self.settings.transport == "indirect":
+            paths.append(self.folder / light.direct_file)
         with suppress(ImageError):
-            return path.is_file() and size_of(path) == (self.settings.height, self.settings.width)
+            return all(path.is_file() and size_of(path) == (self.settings.height, self.settings.width) for path in paths)
         return False
 
     def _record(self, identity: dict[str, Any], blender: str) -> None:
@@ -231,23 +258,34 @@ class Bake:
         if "uv" in event:
             files.write_json(self.folder / "uv.json", {"uv_layer": event["made_uv_layer"], "per_loop": event["uv"]})
 
-    def _manifest(self, identity: dict[str, Any], lights: list[PlannedLight], facts: dict[str, Any], images: _Images) -> dict[str, Any]:
+    def _manifest(
+        self, identity: dict[str, Any], lights: list[PlannedLight], facts: dict[str, Any], images: _Images, sampling: dict[str, Any]
+    ) -> dict[str, Any]:
         source = {**identity, "srbf": srbf.__version__, "blender": facts["blender"]}
         if "camera" in facts:
             source["camera"] = facts["camera"]
         if "made_uv_layer" in facts:
             source["uv"] = "uv.json"
+        apart = self.settings.transport == "indirect"
         return {
             "format": "srbf-capture",
             "version": 1,
             "quantity": self.settings.quantity,
-            "transport": "combined",
+            "transport": self.settings.transport,
             "width": self.settings.width,
             "height": self.settings.height,
             "receiver": facts["receiver"],
             "lights": [
-                {"kind": "directional", "direction": list(light.direction), "role": light.role, "file": light.file} for light in lights
+                {
+                    "kind": "directional",
+                    "direction": list(light.direction),
+                    "role": light.role,
+                    "file": light.file,
+                    **({"direct": light.direct_file} if apart else {}),
+                }
+                for light in lights
             ],
+            **({"scene": SCENE_FILE, "direct": {"sun_angle": self.settings.sun_angle, **sampling}} if apart else {}),
             **{name: f"{name}.exr" for name in GEOMETRY},
             **({"ambient": "ambient.exr"} if images.has_ambient else {}),
             "source": source,
@@ -264,6 +302,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "quantity": settings.quantity,
         "keep_lamps": settings.keep_lamps,
         "sun_angle": settings.sun_angle,
+        "transport": settings.transport,
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
     }
@@ -302,25 +341,35 @@ class _Images:
         else:
             self._raw[name] = array
 
-    def take_light(self, light: PlannedLight, array: np.ndarray) -> None:
-        """Write one light's answer: finite, freed of what is left of the scene's own light, half float (fireflies clipped, and said)."""
-        if not np.isfinite(array).all():
+    def take_light(self, light: PlannedLight, array: np.ndarray, direct: np.ndarray | None = None) -> None:
+        """Write one light's answer: finite, freed of what is left of the scene's own light, half float (fireflies clipped, and said).
+
+        With `direct` given that is taken from it and written beside it, first: a light whose image is there has both.
+        """
+        if not (np.isfinite(array).all() and (direct is None or np.isfinite(direct).all())):
             raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
         array = dilate(array, self._nearest)
         if self._left is not None:
             array = array - self._left
+        self._brightest = max(self._brightest, float(array.max()))
+        if direct is not None:
+            direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
+            array = array - direct  # as the file has it, so that the two add up again
+            write_image(self._folder / light.direct_file, direct, "half")
         beyond = int((np.abs(array) > HALF_MAX).sum())
         if beyond:
             self._reporter.say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
             array = np.clip(array, -HALF_MAX, HALF_MAX)
-        self._brightest = max(self._brightest, float(array.max()))
         write_image(self._folder / light.file, array, "half")
 
     def is_all_black(self, lights: list[PlannedLight]) -> bool:
         """Whether no light image of the capture, baked now or earlier, has a texel above 0."""
         if self._brightest > 0:
             return False
-        return all(float(read_image(self._folder / light.file, 3).max()) <= 0 for light in lights)
+        names = [light.file for light in lights]
+        if self._settings.transport == "indirect":
+            names += [light.direct_file for light in lights]
+        return all(float(read_image(self._folder / name, 3).max()) <= 0 for name in names)
 
 
 def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from srbf.capture import Quantity, Role
+from srbf.capture import Quantity, Role, Transport
 from srbf.errors import InputError
 from srbf.light_list import read_light_list
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
@@ -58,6 +58,7 @@ class BakeSettings:
     sun_angle: float = 0.0  # angular diameter of the light
     keep_lamps: bool = False
     light_list: Path | None = None
+    transport: Transport = "combined"
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -79,6 +80,8 @@ class BakeSettings:
     def record(self) -> dict[str, Any]:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
         record = asdict(self)
+        if self.transport == "combined":
+            del record["transport"]  # captures of before there was a choice stay what they were
         if self.light_list is not None:
             read_light_list(self.light_list)
             record["light_list"] = hashlib.sha256(self.light_list.read_bytes()).hexdigest()
@@ -98,6 +101,11 @@ class PlannedLight:
     @property
     def file(self) -> str:
         return f"lights/{self.index:04d}.exr"
+
+    @property
+    def direct_file(self) -> str:
+        """The direct light that an indirect capture's image lacks."""
+        return f"direct/{self.index:04d}.exr"
 
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""

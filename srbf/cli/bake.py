@@ -32,6 +32,9 @@ def bake(
         Literal["radiance", "irradiance"] | None,
         typer.Option(help="Default: irradiance of a lightmap, radiance of a view.", show_default=False),
     ] = None,
+    transport: Annotated[
+        Literal["combined", "indirect"], typer.Option(help="All light, or all but the sun's direct diffuse light.")
+    ] = "combined",
     seed: Annotated[int, typer.Option(help="Of the noise and of the random lights.")] = 0,
     uv_layer: Annotated[str | None, typer.Option(help="UV layer of a lightmap; default: the active one.", show_default=False)] = None,
     light_list: Annotated[
@@ -64,6 +67,7 @@ def bake(
         sun_angle=0.0 if angle == "auto" else angle,
         keep_lamps=keep_lamps,
         light_list=light_list,
+        transport=transport,
     )
     if angle == "auto":
         settings = settings.with_matched_sun()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,6 +12,7 @@ from srbf.bake.point_reference import compare_with_lamps
 from srbf.capture import Capture
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
+from srbf.direct.choice import Added, chosen
 from srbf.evaluation import evaluate as evaluate_capture
 
 
@@ -23,6 +24,13 @@ def evaluate(
     point_reference: Annotated[
         int | None, typer.Option(help="Compare with N true Cycles lamps inside the scene.", show_default=False)
     ] = None,
+    direct: Annotated[
+        Literal["none", "ray", "shadow-map"] | None,
+        typer.Option(
+            help="Direct light added to an indirect asset, to compare with the combined answer; default none, with lamps ray.",
+            show_default=False,
+        ),
+    ] = None,
     samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
     seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
     blender: Blender = None,
@@ -31,8 +39,8 @@ def evaluate(
     """Print the error by role, or by distance from true lamps."""
     opened = Asset.open(asset)
     if point_reference is not None:
-        with progress_bar("lamps") as update:
-            lamps = compare_with_lamps(opened, reference, point_reference, samples, seed, update, note, blender)
+        with Added(opened, chosen(opened, direct)) as added, progress_bar("lamps") as update:
+            lamps = compare_with_lamps(opened, reference, point_reference, samples, seed, update, note, blender, added.answer)
         if json:
             print_json(lamps)
             return
@@ -43,7 +51,7 @@ def evaluate(
             typer.echo(f"{row['from']:7.2f} – {row['to']:6.2f} {cells[0]:>18} {cells[1]:>18} {row['texels']:>10}")
         return
     with progress_bar("evaluate") as update:
-        result = evaluate_capture(opened, Capture.open(reference), update)
+        result = evaluate_capture(opened, Capture.open(reference), update, direct or "none")
     if json:
         print_json(result)
         return

@@ -79,7 +79,7 @@ def fit(
         asset = chosen.encode(opened, update, watch.look)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
-        errors = evaluate(asset, opened, update, watch)
+        errors = evaluate(asset, opened, update, watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     asset.save(output, force)
     note(f"fitted {_summary(asset)} to {asset.manifest['source']['fit']['train_lights']} lights in {fitted - started:.1f} s")

@@ -13,6 +13,7 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
+from srbf.direct.choice import Added, chosen
 from srbf.errors import InputError
 from srbf.files import atomic_folder, check_replaceable
 from srbf.gl.relighter import Relighter
@@ -34,6 +35,10 @@ def relight(
     a0: Annotated[float, typer.Option(help="Distance (m) at which a point or spot light has its colour.")] = 1.0,
     falloff: Annotated[Literal["linear", "inverse-square"], typer.Option(help="Of point and spot lights.")] = "linear",
     lights: Annotated[Path | None, typer.Option(help="FRAMES.json: a folder of images, one a frame.", show_default=False)] = None,
+    direct: Annotated[
+        Literal["none", "ray", "shadow-map"] | None,
+        typer.Option(help="Direct light added to an indirect asset; default: ray, without embreex shadow-map.", show_default=False),
+    ] = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(help="Stops, for PNG.")] = 0.0,
     force: Force = False,
@@ -52,13 +57,19 @@ def relight(
             raise InputError("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
         frames = read_frames(lights)
         opened = Asset.open(asset)
-        with atomic_folder(output, force, FRAMES_MARKER) as folder, progress_bar("relight") as update:
+        with (
+            Added(opened, chosen(opened, direct)) as added,
+            atomic_folder(output, force, FRAMES_MARKER) as folder,
+            progress_bar("relight") as update,
+        ):
             for number, frame in enumerate(frames):
                 for line in outside_domain(opened, frame):
                     note(f"frame {number}: {line}")
-            for number, image in enumerate(_render(opened, frames, renderer)):
+            for number, image in enumerate(_render(opened, frames, renderer, added)):
                 write_image(folder / f"{number:04d}.exr", image, "float")
                 update(number + 1, len(frames))
+            for line in added.notes([light for frame in frames for light in frame]):
+                note(line)
         note(f"wrote {len(frames)} images into {output}")
         return
     if output.suffix.lower() not in (".exr", ".png"):
@@ -67,7 +78,10 @@ def relight(
     opened = Asset.open(asset)
     for line in outside_domain(opened, flags):
         note(line)
-    (image,) = _render(opened, [flags], renderer)
+    with Added(opened, chosen(opened, direct)) as added:
+        (image,) = _render(opened, [flags], renderer, added)
+        for line in added.notes(flags):
+            note(line)
     if output.suffix.lower() == ".png":
         write_picture(output, image, exposure)
     else:
@@ -81,9 +95,9 @@ def check_image_output(path: Path, force: bool) -> None:
         check_replaceable(path, False, "")
 
 
-def _render(asset: Asset, frames: list[list[Light]], renderer: str) -> Iterator[np.ndarray]:
+def _render(asset: Asset, frames: list[list[Light]], renderer: str, added: Added) -> Iterator[np.ndarray]:
     if renderer == "numpy":
-        yield from (methods.relight(asset, lights) for lights in frames)
+        yield from (methods.relight(asset, lights, added.answer(lights)) for lights in frames)
     else:
         with Relighter(asset) as relighter:
-            yield from (relighter.relight(lights) for lights in frames)
+            yield from (relighter.relight(lights, direct=added.answer(lights)) for lights in frames)

@@ -92,16 +92,21 @@ class Relighter:
             if self._owned:
                 self._context.release()
 
-    def relight(self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS) -> Float32[ndarray, "H W 3"]:
+    def relight(
+        self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
+    ) -> Float32[ndarray, "H W 3"]:
         """One frame, read back: row 0 at the top.
 
+        `direct` light, of an indirect asset, is added before the clamp.
         `multipass` is the article's way for GPUs of few texture units: `units` maps a pass, added up by blending. Raises
         InputError on point or spot lights without a position map, or on units that are not 1 to 8.
         """
-        self.draw(lights, multipass=multipass, units=units)
+        self.draw(lights, multipass=multipass, units=units, direct=direct)
         return self.read()
 
-    def draw(self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS) -> None:
+    def draw(
+        self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
+    ) -> None:
         """Draw one frame and leave it on the GPU."""
         most = min(MAX_UNITS, self._limits.texture_units)
         if not 1 <= units <= most:
@@ -122,6 +127,10 @@ class Relighter:
                     self._directional(weights)
             for lamp in lamps:
                 self._lamp(lamp, units if multipass else self._maps_a_pass())
+            if direct is not None:
+                with self._textures.passing(direct) as texture:
+                    texture.use(0)
+                    self._run("add.frag", "SRBF_K", 1, {"light": 0})
             self._finish()
 
     def read(self) -> Float32[ndarray, "H W 3"]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -60,6 +61,17 @@ class AssetTextures:
     def ambient(self) -> moderngl.Texture:
         """The ambient image, or one black texel."""
         return self._plain("ambient", self._asset.images.get("ambient", np.zeros((1, 1, 3), np.float32)))
+
+    @contextmanager
+    def passing(self, pixels: ndarray) -> Iterator[moderngl.Texture]:
+        """An image that is there for one pass alone, (H, W, 3)."""
+        height, width, channels = pixels.shape
+        texture = self._context.texture((width, height), channels, np.ascontiguousarray(pixels, np.float32), alignment=1, dtype="f4")
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        try:
+            yield texture
+        finally:
+            texture.release()
 
     def _plain(self, name: str, pixels: ndarray) -> moderngl.Texture:
         if name not in self._made:

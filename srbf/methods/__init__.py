@@ -10,6 +10,7 @@ import numpy as np
 from srbf.asset import Asset
 from srbf.lights import Light
 from srbf.methods import clustered_eigen_map, eigen_map, relighting_map
+from srbf.receivers import finish
 
 METHODS: dict[str, ModuleType] = {
     "relighting-map": relighting_map,
@@ -18,9 +19,10 @@ METHODS: dict[str, ModuleType] = {
 }
 
 
-def relight(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
-    """The asset under `lights`, (H, W, 3) float32, by the method that it names."""
-    return METHODS[asset.method].relight(asset, lights)
+def relight(asset: Asset, lights: Sequence[Light], direct: np.ndarray | None = None) -> np.ndarray:
+    """The asset under `lights`, (H, W, 3) float32, by the method that it names; `direct` light is added before the one clamp."""
+    total = linear_response(asset, lights)
+    return finish(asset, total if direct is None else total + direct)
 
 
 def linear_response(asset: Asset, lights: Sequence[Light]) -> np.ndarray:

@@ -21,7 +21,7 @@ from srbf.lights import Light, PointLight
 from srbf.model_selection import RIDGES, Choice, TexelSample, choose, spread_candidates
 from srbf.parallel import each
 from srbf.quantization import layer_entries, quantize, rounding_variance
-from srbf.receivers import CHUNK, carried_images, common_manifest, far_lights, finish, inside, light_vectors, sum_over_lights
+from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, light_vectors, sum_over_lights
 from srbf.solve.least_squares import StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, domain_of, point_set
 
@@ -114,7 +114,7 @@ class RelightingMap:
             manifest["r_table"] = {"file": "r_table.exr", "size": len(tables["r_table"])}
         else:
             manifest["basis"] = {"kind": self.basis}
-        return Asset(manifest, stored, scale, bias, tables, images)
+        return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
 
     def model(self, capture: Capture, domain: Domain) -> tuple[Basis, float, Choice | None]:
         """(basis, ridge, what chose them, if anything was to be chosen)."""

@@ -120,7 +120,8 @@ def look_at_unseen(subject: Subject) -> Unseen:
     relit = directional_responses(asset, capture.directions(indices))
     judge = Flip(float(np.log2(subject.gain)))
     peak = subject.evaluation[subject.role]["peak"]
-    errors = tuple(unseen_error(references, relit, subject.covered, n, peak, judge) for n in LIGHTS)
+    floor = -np.inf if capture.transport == "indirect" else 0.0  # as the evaluation has it
+    errors = tuple(unseen_error(references, relit, subject.covered, n, peak, judge, floor=floor) for n in LIGHTS)
     worst = tuple(sorted(range(len(indices)), key=lambda i: subject.psnr_of(indices[i]))[:WORST])
     try:
         flips = tuple(judge.error_map(references[i], relit[i], subject.covered) for i in worst)

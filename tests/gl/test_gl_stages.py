@@ -27,8 +27,9 @@ IDS = [f"{name}-{'-'.join(map(str, defines.values()))}" for name, defines in CAS
 VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]}  # -R gathers loose uniforms into a block
 
 
-def test_there_are_the_five_stages() -> None:
-    assert STAGES == ["accumulate.frag", "directional.frag", "finish.frag", "fullscreen.vert", "point.frag"]
+def test_there_are_the_ten_stages() -> None:
+    lights = ["accumulate.frag", "add.frag", "direct.frag", "directional.frag", "finish.frag", "fullscreen.vert", "point.frag"]
+    assert [*lights, "shadow.vert", "shadow_height.frag", "shadow_tint.frag"] == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
@@ -36,8 +37,8 @@ def test_there_are_the_five_stages() -> None:
 def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[str, object], version: str) -> None:
     if version == "300 es" and "GL_ARB_ES3_compatibility" not in context.extensions:
         pytest.skip("this driver compiles no ES 3.00 on a desktop context")
-    fragment = "finish.frag" if name.endswith(".vert") else name
-    vertex = resolve("stages/fullscreen.vert", version=version)
+    fragment = {"fullscreen.vert": "finish.frag", "shadow.vert": "shadow_height.frag"}.get(name, name)
+    vertex = resolve("stages/shadow.vert" if "shadow" in name else "stages/fullscreen.vert", version=version)
     with context:
         compile_program(context, vertex, resolve(f"stages/{fragment}", version=version, defines=defines)).release()
 

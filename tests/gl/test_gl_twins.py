@@ -13,6 +13,7 @@ import pytest
 
 from srbf.asset import Asset
 from srbf.basis.gaussian import lookup, r_table
+from srbf.direct import shadow
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import lamp_uniforms, padded
 from srbf.lights import DirectionalLight, PointLight, SpotLight, attenuation, spot_cone
@@ -215,6 +216,60 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     found = evaluate("combine/finish.glsl", "vec4(srbfFinish(a.rgb, b.rgb), 0.0)", *rows)[:, :3]
     assert (found == relight(asset, lights)[0]).all()
     assert (linear_response(asset, lights) < 0).any()
+
+
+@twin("combine/direct.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    normal, light = units(N, 11), units(1, 12)[0]
+    visibility = np.random.default_rng(13).random((N, 3)).astype(np.float32)
+    expression = f"vec4(srbfDirect(a.xyz, vec3({', '.join(map(repr, map(float, light)))}), b.rgb), 0.0)"
+    found = evaluate("combine/direct.glsl", expression, vec4(normal), vec4(visibility))[:, :3]
+    np.testing.assert_allclose(found, shadow.direct(normal, light, visibility), atol=UNIT)
+    assert (found == 0).any() and (found > 0).any()
+
+
+@twin("shadow/shadow_place.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    points = np.random.default_rng(14).uniform(-3, 3, (N, 3)).astype(np.float32)
+    frame = shadow.SunFrame.around(points, normalize(np.array([0.3, -0.4, 0.8])))
+    axes = [f"vec3({', '.join(map(repr, axis))})" for axis in (frame.across, frame.up, frame.to_light)]
+    expression = f"vec4(srbfShadowPlace(a.xyz, {', '.join(axes)}, vec2{frame.low!r}, {frame.extent!r}), 0.0)"
+    found = evaluate("shadow/shadow_place.glsl", expression, vec4(points))[:, :3]
+    axes = [np.array(axis) for axis in (frame.across, frame.up, frame.to_light)]
+    expected = shadow.place(points, *axes, np.array(frame.low), frame.extent)
+    np.testing.assert_allclose(found, expected, atol=8 * UNIT)  # sums of three products of numbers up to 3
+    assert (expected[:, :2] > 0).all() and (expected[:, :2] < 1).all()
+
+
+@twin("shadow/shadow_fraction.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    rng = np.random.default_rng(15)
+    heights = rng.uniform(0, 1, (16, 16)).astype(np.float32)
+    uv = ((rng.integers(0, 256, (N, 2)) + 0.5) / 256).astype(np.float32)  # sixteenths of a texel: exact in float32
+    height, slope = rng.uniform(0, 1, N).astype(np.float32), rng.uniform(-0.1, 0.1, (N, 2)).astype(np.float32)
+    found = evaluate(
+        "shadow/shadow_fraction.glsl",
+        "vec4(srbfShadowFraction(heights, a.xy, b.x, b.yz, 0.03125))",
+        vec4(uv),
+        vec4(height, slope),
+        images={"heights": heights[:, :, None]},
+    )[:, 0]
+    np.testing.assert_allclose(found, shadow.fraction(heights, uv, height, slope, 0.03125), atol=UNIT)
+    assert found.min() < 0.1 and found.max() > 0.9
+
+
+@twin("shadow/wall_tint.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    curve = np.random.default_rng(16).uniform(0, 2, (8, 3)).astype(np.float32)
+    cosine = np.linspace(-1, 1, N).astype(np.float32)
+    found = evaluate(
+        "shadow/wall_tint.glsl",
+        "vec4(srbfWallTint(curve, a.x), 0.0)",
+        vec4(cosine),
+        declarations="uniform vec4 curve[8];",
+        arrays={"curve": padded(curve)},
+    )[:, :3]
+    np.testing.assert_allclose(found, shadow.wall_tint(np.broadcast_to(curve, (N, 8, 3)), cosine), atol=16 * UNIT)
 
 
 @twin("methods/relighting_map.glsl")

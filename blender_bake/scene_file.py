@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Receivers and occluders as a binary glTF: triangles in the world's frame, instances and modifiers applied, no lamps, no cameras.
+
+glTF is y-up: the one root node turns Blender's z-up frame into it, and its meshes hold Blender's world coordinates as they are.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+
+from blender_bake.translucency import Curve
+
+SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # kinds of objects with faces
+Z_UP_TO_Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion x, y, z, w: -90 degrees about x
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+FLOAT, UNSIGNED_INT = 5126, 5125
+TRIANGLES = 4
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order."""
+
+    object: str
+    material: str | None
+    casts: bool
+    corners: np.ndarray
+    normals: np.ndarray
+
+
+def show_as_rendered(scene: bpy.types.Scene) -> None:
+    """Make the viewport's scene that of a render: what is shown, and how finely it is divided, so that it can be read from Python."""
+    for collection in bpy.data.collections:
+        collection.hide_viewport = collection.hide_render
+    layers = [bpy.context.view_layer.layer_collection]
+    while layers:
+        layer = layers.pop()
+        layer.hide_viewport = False
+        layers += layer.children
+    for obj in bpy.context.view_layer.objects:
+        obj.hide_set(False)
+    for obj in scene.objects:
+        obj.hide_viewport = obj.hide_render
+        for modifier in obj.modifiers:
+            modifier.show_viewport = modifier.show_render
+            if modifier.type in {"SUBSURF", "MULTIRES"}:
+                modifier.levels = modifier.render_levels
+        if obj.type in {"CURVE", "SURFACE", "FONT"} and getattr(obj.data, "render_resolution_u", 0):
+            obj.data.resolution_u = obj.data.render_resolution_u
+
+
+def parts(receivers: set[str] | None) -> Iterator[Part]:
+    """Every renderable object that casts shadows or receives light (`receivers`: all of them where None), by material."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for instance in depsgraph.object_instances:
+        obj = instance.object
+        if obj.type not in SOLID or obj.hide_render or not (instance.is_instance or instance.show_self):
+            continue
+        casts = obj.visible_shadow
+        name = instance.parent.name if instance.is_instance and instance.parent else obj.name
+        if not (casts or (obj.visible_camera if receivers is None else name in receivers)):
+            continue
+        mesh = obj.to_mesh()
+        if mesh is not None:
+            yield from _by_material(obj, name, casts, mesh, np.array(instance.matrix_world))
+            obj.to_mesh_clear()
+
+
+def _by_material(obj: bpy.types.Object, name: str, casts: bool, mesh: bpy.types.Mesh, matrix: np.ndarray) -> Iterator[Part]:
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    loops = np.empty(count * 3, np.int32)
+    materials = np.empty(count, np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops)
+    mesh.loop_triangles.foreach_get("material_index", materials)
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    points = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get("co", points)
+    normals = np.empty(len(mesh.loops) * 3, np.float32)
+    mesh.corner_normals.foreach_get("vector", normals)
+    corners = points.reshape(-1, 3)[vertices[loops]] @ matrix[:3, :3].T + matrix[:3, 3]
+    turned = normals.reshape(-1, 3)[loops] @ np.linalg.pinv(matrix[:3, :3])
+    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
+    for index in np.unique(materials):
+        chosen = np.repeat(materials == index, 3)
+        slot = obj.material_slots[index].material if index < len(obj.material_slots) else None
+        yield Part(name, slot.name if slot else None, casts, corners[chosen].astype("<f4"), turned[chosen].astype("<f4"))
+
+
+def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
+    """The parts as one .glb; `tints` names the materials that light passes straight, and what one wall of them lets through.
+
+    That is told twice: to any reader as a transmission of the mean tint, to ours by the extras `tint_by_cosine`.
+    An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`.
+    """
+    names = sorted({part.material for part in parts if part.material is not None})
+    meshes: list[dict[str, Any]] = []
+    nodes: list[dict[str, Any]] = []
+    accessors: list[dict[str, Any]] = []
+    views: list[dict[str, Any]] = []
+    body = bytearray()
+
+    def put(array: np.ndarray, component: int, kind: str, target: int, **limits: Any) -> int:
+        views.append({"buffer": 0, "byteOffset": len(body), "byteLength": array.nbytes, "target": target})
+        body.extend(array.tobytes())
+        accessors.append({"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind, **limits})
+        return len(accessors) - 1
+
+    for part in parts:
+        both, index = np.unique(np.concatenate([part.corners, part.normals], axis=1), axis=0, return_inverse=True)
+        corners, normals = np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:])
+        limits = {"min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()}
+        primitive: dict[str, Any] = {
+            "attributes": {
+                "POSITION": put(corners, FLOAT, "VEC3", ARRAY_BUFFER, **limits),
+                "NORMAL": put(normals, FLOAT, "VEC3", ARRAY_BUFFER),
+            },
+            "indices": put(index.ravel().astype("<u4"), UNSIGNED_INT, "SCALAR", ELEMENT_ARRAY_BUFFER),
+            "mode": TRIANGLES,
+        }
+        if part.material is not None:
+            primitive["material"] = names.index(part.material)
+        meshes.append({"name": part.object, "primitives": [primitive]})
+        nodes.append({"name": part.object, "mesh": len(meshes) - 1, **({} if part.casts else {"extras": {"casts_shadow": False}})})
+    root = {"name": "z-up to y-up", "rotation": Z_UP_TO_Y_UP, "children": list(range(len(nodes)))}
+    passing = any(name in tints for name in names)
+    document = {
+        "asset": {"version": "2.0", "generator": "srbf"},
+        **({"extensionsUsed": ["KHR_materials_transmission"]} if passing else {}),
+        "scene": 0,
+        "scenes": [{"nodes": [len(nodes)]}],
+        "nodes": [*nodes, root],
+        "meshes": meshes,
+        **({"materials": [_material(name, tints.get(name)) for name in names]} if names else {}),
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(body)}],
+    }
+    text = json.dumps(document, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    body.extend(b"\0" * (-len(body) % 4))
+    head = struct.pack("<4sIIII", b"glTF", 2, 12 + 8 + len(text) + 8 + len(body), len(text), 0x4E4F534A)
+    return head + text + struct.pack("<II", len(body), 0x004E4942) + bytes(body)
+
+
+def _material(name: str, tint: Curve | None) -> dict[str, Any]:
+    if tint is None:
+        return {"name": name, "doubleSided": True}
+    mean = np.clip(np.mean(tint, axis=0), 0, 1)
+    return {
+        "name": name,
+        "doubleSided": True,
+        "pbrMetallicRoughness": {"baseColorFactor": [*(round(float(m), 5) for m in mean), 1.0], "metallicFactor": 0.0},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}},
+        "extras": {"tint_by_cosine": tint},
+    }

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials that shadow rays pass: each may be traded for walls of a plain tint by angle, which an engine can cast a shadow of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+import bpy
+import numpy as np
+
+Curve = list[tuple[float, float, float]]  # what one wall passes, at KNOTS cosines from 0 to 1
+KNOTS = 8
+CLEAR: Curve = [(1.0, 1.0, 1.0)] * KNOTS
+FINE = 4  # ramp stops between two knots of a probe
+GAUSS_NEWTON = 12
+SMOOTH = 1e-3  # weight of a curve's bends against the light that tells of it
+BRIGHTEST = 8.0  # a wall may gather light, not beyond this
+
+
+class Translucent:
+    """A material with a switch: off, it is as its author made it; on, shadow rays pass it times a tint that their angle decides."""
+
+    def __init__(self, material: bpy.types.Material) -> None:
+        tree = material.node_tree
+        surface = tree.get_output_node("CYCLES").inputs["Surface"]
+        self.name = material.name
+        facing = tree.nodes.new("ShaderNodeLayerWeight")
+        facing.inputs["Blend"].default_value = 0.5
+        cosine = tree.nodes.new("ShaderNodeMath")
+        cosine.operation = "SUBTRACT"
+        cosine.inputs[0].default_value = 1.0
+        tree.links.new(facing.outputs["Facing"], cosine.inputs[1])
+        self._ramp = tree.nodes.new("ShaderNodeValToRGB")
+        tree.links.new(cosine.outputs[0], self._ramp.inputs[0])
+        tint = tree.nodes.new("ShaderNodeBsdfTransparent")
+        tree.links.new(self._ramp.outputs["Color"], tint.inputs["Color"])
+        self._switch = tree.nodes.new("ShaderNodeMath")
+        self._switch.operation = "MULTIPLY"
+        tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Shadow Ray"], self._switch.inputs[0])
+        mix = tree.nodes.new("ShaderNodeMixShader")
+        tree.links.new(self._switch.outputs[0], mix.inputs[0])
+        tree.links.new(surface.links[0].from_socket, mix.inputs[1])
+        tree.links.new(tint.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], surface)
+        self.off()
+
+    def on(self, curve: Curve) -> None:
+        """One wall passes `curve`, linear between even steps of the cosine at which it is met."""
+        stops = self._ramp.color_ramp.elements
+        while len(stops) > 1:
+            stops.remove(stops[-1])
+        for i, tint in enumerate(curve):
+            stop = stops[0] if i == 0 else stops.new(i / (len(curve) - 1))
+            stop.position = i / (len(curve) - 1)
+            stop.color = (*tint, 1)
+        self._switch.inputs[1].default_value = 1.0
+
+    def off(self) -> None:
+        """As the scene has it."""
+        self._switch.inputs[1].default_value = 0.0
+
+
+class Switch:
+    """All translucent materials of a scene together; false where there is none."""
+
+    def __init__(self, translucent: list[Translucent], tints: Mapping[str, Curve]) -> None:
+        self._translucent = translucent
+        self._tints = tints
+
+    def __bool__(self) -> bool:
+        return bool(self._translucent)
+
+    def on(self) -> None:
+        """Shadow rays meet tints by angle."""
+        for one in self._translucent:
+            one.on(self._tints[one.name])
+
+    def off(self) -> None:
+        """The scene as its author made it."""
+        for one in self._translucent:
+            one.off()
+
+
+def find(scene: bpy.types.Scene) -> list[Translucent]:
+    """The scene's materials that let shadow rays through, in order of name, each with a switch now."""
+    used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
+    used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}  # of instances
+    return [Translucent(m) for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
+
+
+def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]) -> dict[str, Curve]:
+    """The tint of each material that comes nearest, in least squares, to the direct light behind it.
+
+    Seen with every other such material clear, under each light that `aims` turn on: a texel whose light d met walls at the cosines c
+    gets d prod m(c). With ln m = sum_k theta_k hat_k(c) that is d exp(sum_k theta_k F_k), where F_k = sum over walls of hat_k(c) is
+    read off a bake whose walls pass 2^-hat_k.
+    """
+    lights = list(aims)
+    tints: dict[str, Curve] = {}
+    for one in translucent:
+        for other in translucent:
+            other.on(CLEAR)
+        walls, whole, passed = [], [], []
+        for aim in lights:
+            aim()
+            one.on(CLEAR)
+            clear = direct()
+            features = []
+            for first in range(0, KNOTS, 3):
+                one.on(_probe(first))
+                features.append(direct())
+            one.off()
+            true = direct()
+            lit = (clear > 0).all(axis=2)
+            for image in features:
+                lit &= (image > 0).all(axis=2)
+            stacked = np.concatenate([np.log2(clear[lit] / image[lit]) for image in features], axis=1)[:, :KNOTS]
+            met = stacked.sum(axis=1) > 0.5
+            walls.append(stacked[met])
+            whole.append(clear[lit][met])
+            passed.append(true[lit][met])
+        tints[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
+        one.off()
+    for one in translucent:
+        one.off()
+    return tints
+
+
+def _probe(first: int) -> Curve:
+    """2^-hat of knots first, first + 1, first + 2 in red, green and blue."""
+    place = np.arange((KNOTS - 1) * FINE + 1) / FINE
+    hats = np.maximum(0, 1 - np.abs(place[:, None] - (first + np.arange(3))))
+    return [(float(r), float(g), float(b)) for r, g, b in 2.0**-hats]
+
+
+def _curve(walls: np.ndarray, whole: np.ndarray, passed: np.ndarray) -> Curve:
+    """Gauss-Newton, a channel at a time, from the constant that fits best; bends are held down where no light tells of them."""
+    if not len(walls):
+        return CLEAR
+    bends = np.diff(np.eye(KNOTS), 2, axis=0)
+    curve = np.ones((KNOTS, 3))
+    for channel in range(3):
+        d, t = whole[:, channel].astype(np.float64), passed[:, channel].astype(np.float64)
+        n = walls.sum(axis=1, dtype=np.float64)
+        constants = np.linspace(0.01, 1, 100)
+        errors = [float(((t - d * m**n) ** 2).sum()) for m in constants]
+        theta = np.full(KNOTS, np.log(constants[int(np.argmin(errors))]))
+        for _ in range(GAUSS_NEWTON):
+            model = d * np.exp(walls @ theta)
+            slope = model[:, None] * walls
+            weight = SMOOTH * float((model * model).sum())
+            left = slope.T @ slope + weight * (bends.T @ bends)
+            right = slope.T @ (t - model) - weight * (bends.T @ (bends @ theta))
+            theta = np.clip(theta + np.linalg.solve(left + 1e-9 * np.trace(left) * np.eye(KNOTS), right), np.log(1e-3), np.log(BRIGHTEST))
+        curve[:, channel] = np.exp(theta)
+    return [(float(r), float(g), float(b)) for r, g, b in np.round(curve, 5)]
+
+
+def _passes(material: bpy.types.Material) -> bool:
+    output = material.node_tree.get_output_node("CYCLES")
+    return output is not None and bool(output.inputs["Surface"].links) and _lets_through(material.node_tree)
+
+
+def _lets_through(tree: bpy.types.NodeTree) -> bool:
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeBsdfTransparent" and any(output.links for output in node.outputs):
+            return True
+        if node.bl_idname == "ShaderNodeBsdfPrincipled" and (node.inputs["Alpha"].links or node.inputs["Alpha"].default_value < 1):
+            return True
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree and _lets_through(node.node_tree):
+            return True
+    return False

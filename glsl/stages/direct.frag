@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// Direct light of one sun on the receivers: N.L times visibility by a shadow map, times the tint of the walls above. Irradiance.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+
+#include "combine/direct.glsl"
+#include "shadow/shadow_fraction.glsl"
+#include "shadow/shadow_place.glsl"
+
+uniform sampler2D points;
+uniform sampler2D normals;
+uniform sampler2D heights;
+uniform sampler2D tints;
+uniform sampler2D wallHeights;
+uniform vec3 across;
+uniform vec3 up;
+uniform vec3 toLight;
+uniform vec2 low;
+uniform float extent;
+uniform float weight;
+
+layout(location = 0) out vec4 answer;
+
+const float STEEPEST = 16.0;  // metres a metre: beyond it a receiver's plane tells nothing
+const float BIAS = 0.5;       // map texels
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec3 normal = texelFetch(normals, at, 0).xyz;
+    vec3 place = srbfShadowPlace(texelFetch(points, at, 0).xyz, across, up, toLight, low, extent);
+    float step = extent / float(textureSize(heights, 0).x);
+    float NoL = max(dot(normal, toLight), 1.0 / STEEPEST);
+    vec2 slope = clamp(-vec2(dot(normal, across), dot(normal, up)) / NoL, -STEEPEST, STEEPEST) * step;
+    float bias = BIAS * step;
+    vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
+    float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
+    visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
+    answer = vec4(srbfDirect(normal, toLight, visibility) * weight, 1.0);
+}

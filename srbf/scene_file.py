@@ -1,0 +1,159 @@
+"""`scene.glb`: receivers and occluders as triangles, read back from binary glTF into the capture's z-up frame."""
+
+from __future__ import annotations
+
+import json
+import struct
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.errors import ManifestError
+
+MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
+TRIANGLES = 4
+KNOTS = 8
+DTYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC3": 3}
+Z_UP_FROM_Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """T triangles: corners and the normals there (T, 3, 3), the material of each, and who casts. World frame, metres.
+
+    `tints` (M, KNOTS, 3) is what one wall of a material lets through of a shadow ray that meets its normal at the cosine
+    0, 1/(KNOTS-1), …, 1; 0 throughout is opaque.
+    """
+
+    corners: Float32[ndarray, "T 3 3"]
+    normals: Float32[ndarray, "T 3 3"]
+    material: Int[ndarray, " T"]
+    casts: Bool[ndarray, " T"]
+    tints: Float32[ndarray, "M KNOTS 3"]
+
+    @property
+    def translucent(self) -> Bool[ndarray, " T"]:
+        """Which triangles pass some light."""
+        return (self.tints > 0).any(axis=(1, 2))[self.material]
+
+    @property
+    def occluders(self) -> Bool[ndarray, " T"]:
+        """Which triangles stop all light that meets them."""
+        return self.casts & ~self.translucent
+
+    @property
+    def filters(self) -> Bool[ndarray, " T"]:
+        """Which triangles tint the light that meets them."""
+        return self.casts & self.translucent
+
+
+def read_triangles(data: bytes, name: str = "scene.glb") -> Triangles:
+    """The triangles of a .glb; ManifestError, in one line, where it is none or of a kind that no bake writes (sparse, compressed)."""
+    try:
+        return _Reader(data).triangles()
+    except (struct.error, ValueError, KeyError, IndexError, TypeError, UnicodeDecodeError, RecursionError) as error:
+        raise ManifestError(
+            f"expected triangles as binary glTF 2.0 in {name}, found {type(error).__name__}: {error}; bake again"
+        ) from error
+
+
+class _Reader:
+    def __init__(self, data: bytes) -> None:
+        magic, version, length = struct.unpack_from("<III", data)
+        if magic != MAGIC or version != 2 or length > len(data):
+            raise ValueError("no glTF 2.0 header, or a file cut short")
+        self._body = memoryview(b"")
+        self._document: dict[str, Any] = {}
+        at = 12
+        while at + 8 <= length:
+            size, kind = struct.unpack_from("<II", data, at)
+            chunk = memoryview(data)[at + 8 : at + 8 + size]
+            if kind == JSON_CHUNK:
+                self._document = json.loads(bytes(chunk))
+            elif kind == BINARY_CHUNK:
+                self._body = chunk
+            at += 8 + size
+
+    def triangles(self) -> Triangles:
+        document = self._document
+        roots = document["scenes"][document.get("scene", 0)]["nodes"]
+        turned = np.eye(4)
+        turned[:3, :3] = Z_UP_FROM_Y_UP
+        found: list[tuple[np.ndarray, ...]] = []
+        for root in roots:
+            self._visit(root, turned, found)
+        if not found:
+            raise ValueError("no triangles in it")
+        corners, normals, material, casts = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        tints = np.stack([np.zeros((KNOTS, 3)), *map(_tint, document.get("materials", []))])
+        if not (np.isfinite(corners).all() and np.isfinite(normals).all()):
+            raise ValueError("corners that are not finite")
+        return Triangles(corners.astype(np.float32), normals.astype(np.float32), material, casts, tints.astype(np.float32))
+
+    def _visit(self, index: int, parent: Float64[ndarray, "4 4"], found: list[tuple[np.ndarray, ...]]) -> None:
+        node = self._document["nodes"][index]
+        matrix = parent @ _local(node)
+        if "mesh" in node:
+            casts = node.get("extras", {}).get("casts_shadow", True)
+            for primitive in self._document["meshes"][node["mesh"]]["primitives"]:
+                if primitive.get("mode", TRIANGLES) == TRIANGLES:
+                    found.append(self._primitive(primitive, matrix, bool(casts)))
+        for child in node.get("children", []):
+            self._visit(child, matrix, found)
+
+    def _primitive(self, primitive: dict[str, Any], matrix: np.ndarray, casts: bool) -> tuple[np.ndarray, ...]:
+        points = self._accessor(primitive["attributes"]["POSITION"]).astype(np.float64)
+        corners = (points @ matrix[:3, :3].T + matrix[:3, 3])[self._indices(primitive, len(points))]
+        if "NORMAL" in primitive["attributes"]:
+            normals = self._accessor(primitive["attributes"]["NORMAL"]).astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
+            normals = normals[self._indices(primitive, len(points))]
+        else:
+            flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            normals = np.repeat(flat[:, None], 3, axis=1)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-30)
+        count = len(corners)
+        return corners, normals, np.full(count, primitive.get("material", -1) + 1), np.full(count, casts)
+
+    def _indices(self, primitive: dict[str, Any], count: int) -> np.ndarray:
+        if "indices" not in primitive:
+            return np.arange(count).reshape(-1, 3)
+        return self._accessor(primitive["indices"]).reshape(-1, 3)
+
+    def _accessor(self, index: int) -> np.ndarray:
+        accessor = self._document["accessors"][index]
+        view = self._document["bufferViews"][accessor["bufferView"]]
+        dtype, width = DTYPES[accessor["componentType"]], WIDTHS[accessor["type"]]
+        if view.get("byteStride", 0) not in (0, width * np.dtype(dtype).itemsize):
+            raise ValueError("interleaved vertices")
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        array = np.frombuffer(self._body, dtype, accessor["count"] * width, start)
+        return array.reshape(-1, width) if width > 1 else array
+
+
+def _tint(material: dict[str, Any]) -> Float64[ndarray, "KNOTS 3"]:
+    """By angle where srbf wrote it, else a transmission's base colour at every angle."""
+    curve = material.get("extras", {}).get("tint_by_cosine")
+    if curve is not None:
+        return np.array(curve, np.float64).reshape(KNOTS, 3)
+    factor = material.get("extensions", {}).get("KHR_materials_transmission", {}).get("transmissionFactor", 0.0)
+    color = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", [1, 1, 1, 1])
+    return np.tile(factor * np.array(color[:3], np.float64), (KNOTS, 1))
+
+
+def _local(node: dict[str, Any]) -> Float64[ndarray, "4 4"]:
+    if "matrix" in node:
+        return np.array(node["matrix"], np.float64).reshape(4, 4).T
+    matrix = np.eye(4)
+    x, y, z, w = node.get("rotation", [0, 0, 0, 1])
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, :3] *= node.get("scale", [1, 1, 1])
+    matrix[:3, 3] = node.get("translation", [0, 0, 0])
+    return matrix

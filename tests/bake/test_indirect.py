@@ -1,0 +1,122 @@
+"""Bakes with direct and indirect apart, by real Cycles: they add up, rays give the direct part back, and bits repeat."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import struct
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_resume import command, contents, wait_for_lights
+
+from srbf.capture import COVERED
+from srbf.direct.ray import RayTracer
+from srbf.direct.receivers import Receivers
+from srbf.evaluation import evaluate
+from srbf.methods.relighting_map import RelightingMap
+from srbf.scene_file import read_triangles
+
+pytestmark = pytest.mark.blender
+
+HALF = 2.0**-10  # of a sum of two halves
+
+
+@pytest.mark.parametrize(
+    ("scene", "receiver", "settings"),
+    [
+        ("occluder", "lightmap:Plane", {}),
+        ("occluder", "lightmap:Plane", {"quantity": "radiance"}),
+        ("emissive", "lightmap:Plane", {}),
+        ("pane", "lightmap:Plane", {"quantity": "irradiance"}),
+        ("view", "view", {}),
+        ("view", "view", {"quantity": "irradiance"}),
+    ],
+)
+def test_indirect_and_direct_add_up_to_combined(bake, scene: str, receiver: str, settings: dict) -> None:
+    combined = bake(scene, receiver, "combined", **settings).capture
+    apart = bake(scene, receiver, "apart", transport="indirect", **settings).capture
+    assert (combined.transport, apart.transport) == ("combined", "indirect")
+    whole = apart.combined()
+    for index in range(len(apart.lights)):
+        np.testing.assert_allclose(whole.image(index), combined.image(index), rtol=HALF, atol=1e-4)
+    for name in ("position", "normal", "albedo"):
+        np.testing.assert_array_equal(apart.geometry(name), combined.geometry(name))
+
+
+@pytest.mark.parametrize(
+    ("scene", "receiver"), [("occluder", "lightmap:Plane"), ("pane", "lightmap:Plane"), ("sharp", "view"), ("sharp ortho", "view")]
+)
+def test_rays_give_the_direct_light_back(bake, scene: str, receiver: str) -> None:
+    """Cycles' own direct light of 64 samples a texel, but for its noise at the shadow's edge."""
+    size = 32 if receiver != "view" else 96
+    capture = bake(scene, receiver, width=size, height=size, transport="indirect", holdout=3, holdout_samples=64).capture
+    tracer = RayTracer(Receivers.of(capture))
+    covered = capture.coverage() >= COVERED
+    for index in capture.indices("holdout"):
+        true = capture.combined().image(index) - capture.image(index)
+        found = tracer.directional(capture.directions([index]))[0]
+        error = np.abs(found - true)[covered].max(axis=1)
+        assert np.median(error) < 2e-3 * true.max()
+        assert (error > 0.1 * true.max()).mean() < 0.01
+
+
+def test_glass_leaves_little_in_the_images(bake) -> None:
+    """What a pane lets through is traded for its tint by angle: light behind it is direct light then, not caustic."""
+    capture = bake("pane", "lightmap:Plane", transport="indirect", lights=24).capture
+    direct = np.mean([np.abs(capture.combined().image(i) - capture.image(i)).mean() for i in capture.indices("train")])
+    left = np.mean([np.abs(capture.image(i)).mean() for i in capture.indices("train")])
+    assert left < 0.02 * direct
+    triangles = read_triangles(capture.scene())
+    (tint,) = [t for t in triangles.tints if t.any()]
+    np.testing.assert_allclose(tint[4:], np.tile([0.8, 0.4, 0.2], (4, 1)), atol=0.02)  # steep light met it everywhere
+
+
+def test_an_indirect_asset_is_measured_with_and_without_direct_light(bake) -> None:
+    capture = bake("occluder", "lightmap:Plane", transport="indirect", lights=40, samples=4, holdout=4, holdout_samples=64).capture
+    asset = RelightingMap(k=9).encode(capture)
+    assert asset.scene == capture.scene() and "albedo" not in asset.images
+    combined = RelightingMap(k=9).encode(capture.combined())
+    exact = evaluate(asset, capture, direct="ray")["holdout"]["psnr"]
+    mapped = evaluate(asset, capture, direct="shadow-map")["holdout"]["psnr"]
+    assert exact > 30 and mapped > 28
+    assert exact > evaluate(combined, capture)["holdout"]["psnr"] + 6
+
+
+def test_the_scene_is_valid_gltf_of_the_evaluated_scene(bake) -> None:
+    capture = bake("scattered", "lightmap:Plane", transport="indirect", lights=2).capture
+    data = capture.scene()
+    magic, version, length, size, kind = struct.unpack_from("<4sIIII", data)
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), 0x4E4F534A) and size % 4 == 0
+    document = json.loads(data[20 : 20 + size])
+    assert {"cameras", "lights"} & set(document) == set()
+    for accessor in document["accessors"]:
+        view = document["bufferViews"][accessor["bufferView"]]
+        assert view["byteOffset"] % 4 == 0 and view["byteOffset"] + view["byteLength"] <= document["buffers"][0]["byteLength"]
+    triangles = read_triangles(data)
+    plates = triangles.corners[
+        (np.abs(triangles.corners[..., :2]) < 0.31).all(axis=(1, 2)) & (triangles.corners[..., 2] > 0.29).all(axis=1)
+    ]
+    assert len(plates) == 2  # the instance, where its modifier puts it
+    position = capture.geometry("position")[capture.coverage() > 0]
+    lowest, highest = triangles.corners.min(axis=(0, 1)), triangles.corners.max(axis=(0, 1))
+    assert (position >= lowest - 1e-4).all() and (position <= highest + 1e-4).all()
+    np.testing.assert_allclose(np.linalg.norm(triangles.normals, axis=2), 1, atol=1e-4)
+
+
+def test_a_killed_indirect_bake_goes_on_to_the_same_bits(blend, tmp_path: Path) -> None:
+    whole, folder = tmp_path / "whole", tmp_path / "capture"
+    run = [*command(blend("pane"), whole), "--transport", "indirect"]
+    subprocess.run(run, check=True, capture_output=True)
+    run[run.index(str(whole))] = str(folder)
+    process = subprocess.Popen(run, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    wait_for_lights(folder, 9, process)
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate(timeout=60)
+    (folder / "direct" / "0002.exr").unlink()  # a light lacks its half: it is baked again
+    subprocess.run(run, check=True, capture_output=True)
+    assert contents(folder) == contents(whole)
+    assert "direct/0002.exr" in contents(whole) and "scene.glb" in contents(whole)

@@ -1,0 +1,129 @@
+"""--direct as a user has it: on an indirect asset of a lit plane that also bounces a fifth of its light."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_forms import glb, quad
+from test_commands import ok, refused, srbf
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.image import read_image, write_image
+from srbf.lights import DirectionalLight
+from srbf.methods.relighting_map import relight
+
+BOUNCE = np.array([0.2, 0.1, 0.05])
+
+
+@pytest.fixture
+def capture(make_capture, plane_positions: np.ndarray) -> Capture:
+    """An indirect capture: what bounces in `lights/`, the cosine in `direct/`, and the plane in scene.glb."""
+    up = np.zeros_like(plane_positions)
+    up[..., 2] = 1
+    made = make_capture(lambda d: np.full((10, 14, 3), d[2]) * BOUNCE, position=plane_positions, normal=up)
+    (made.folder / "direct").mkdir()
+    for light in made.manifest["lights"]:
+        light["direct"] = light["file"].replace("lights", "direct")
+        write_image(made.folder / light["direct"], np.full((10, 14, 3), light["direction"][2], np.float32), "float")
+    (made.folder / "scene.glb").write_bytes(glb(quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])))
+    made.manifest.update(transport="indirect", scene="scene.glb", direct={"sun_angle": 0.0, "footprint": 0.5})
+    files.write_json(made.folder / "capture.json", made.manifest)
+    return Capture.open(made.folder)
+
+
+@pytest.fixture
+def asset(capture: Capture, tmp_path: Path) -> Path:
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 16)
+    return tmp_path / "asset"
+
+
+def test_an_indirect_asset_carries_its_scene(capture: Capture, asset: Path) -> None:
+    opened = Asset.open(asset)
+    assert opened.transport == "indirect" and opened.scene == capture.scene()
+    assert opened.manifest["direct"] == {"sun_angle": 0.0, "footprint": 0.5} and "scene.glb" in opened.manifest["sha256"]
+    data = bytearray((asset / "scene.glb").read_bytes())
+    data[-1] ^= 1
+    (asset / "scene.glb").write_bytes(bytes(data))
+    assert "damaged" in refused("relight", asset, "-o", asset.parent / "x.exr", "--directional", "0,0,1")
+
+
+@pytest.mark.parametrize("renderer", ["numpy", "gl"])
+@pytest.mark.parametrize("direct", [None, "ray", "shadow-map", "none"])
+def test_relight_adds_direct_light_and_says_so(asset: Path, tmp_path: Path, direct: str | None, renderer: str) -> None:
+    flags = [] if direct is None else ["--direct", direct]
+    done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--directional", "0.6,0,0.8,2,1,1", "--renderer", renderer, *flags)
+    assert done.exit_code == 0, done.stderr
+    assert {"none": "wrote", "shadow-map": "by a shadow map"}.get(direct or "ray", "exact direct light by rays") in done.stderr
+    alone = relight(Asset.open(asset), [DirectionalLight((0.6, 0.0, 0.8), (2.0, 1.0, 1.0))])
+    added = 0.0 if direct == "none" else 0.8 * np.array([2, 1, 1])
+    np.testing.assert_allclose(read_image(tmp_path / "lit.exr", 3), alone + added, rtol=1e-4, atol=1e-5)
+
+
+def test_frames_and_lamps_take_rays(asset: Path, tmp_path: Path) -> None:
+    lamp = {"kind": "point", "position": [0, 0, 1]}
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [lamp]}, {"lights": []}]}))
+    done = srbf("relight", asset, "-o", tmp_path / "frames", "--lights", tmp_path / "frames.json")
+    assert done.exit_code == 0 and "exact direct light by rays" in done.stderr
+    position = Asset.open(asset).images["position"]
+    distance = np.sqrt((position**2).sum(axis=2) + 1)
+    lit = read_image(tmp_path / "frames" / "0000.exr", 3)
+    assert (lit[..., 0] > 0.99 / distance**2).all()
+    assert (read_image(tmp_path / "frames" / "0001.exr", 3) == 0).all()
+    assert "--direct ray" in refused("relight", asset, "-o", tmp_path / "x.exr", "--point", "0,0,1", "--direct", "shadow-map")
+
+
+def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
+    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
+    done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--environment", tmp_path / "sky.exr")
+    assert done.exit_code == 0 and "environment's direct light is not added" in done.stderr
+
+
+def test_evaluate_compares_with_what_was_asked_for(asset: Path, capture: Capture, make_capture, plane_positions: np.ndarray) -> None:
+    alone = json.loads(ok("evaluate", asset, capture.folder, "--json"))["holdout"]
+    highest = capture.directions(capture.indices("train"))[:, 2].max()
+    assert alone["peak"] == pytest.approx(1.2 * highest, rel=0.01)  # of the combined answer
+    whole = make_capture(lambda d: np.full((10, 14, 3), d[2]) * (1 + BOUNCE), name="combined", position=plane_positions)
+    for direct in ("ray", "shadow-map"):
+        for reference in (capture, whole):
+            error = json.loads(ok("evaluate", asset, reference.folder, "--direct", direct, "--json"))["holdout"]
+            assert error["rmse"] == pytest.approx(alone["rmse"], rel=0.01)  # direct light adds no error of its own here
+            assert error["relative_rmse"] < alone["relative_rmse"]
+    assert "--direct ray" in refused("evaluate", asset, whole.folder)
+
+
+def test_a_combined_asset_takes_no_direct_light(capture: Capture, make_capture, tmp_path: Path) -> None:
+    whole = make_capture(lambda d: np.full((10, 14, 3), d[2]), name="combined")
+    ok("fit", whole.folder, "-o", tmp_path / "combined asset", "-k", 9)
+    combined = tmp_path / "combined asset"
+    for command in (("relight", combined, "-o", tmp_path / "x.exr"), ("evaluate", combined, whole.folder)):
+        assert "holds the direct light already" in refused(*command, "--direct", "ray")
+
+
+def test_without_embreex_a_shadow_map_stands_in(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore_scene"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert "pip install embreex" in refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--direct", "ray")
+    assert "by a shadow map" in srbf("relight", asset, "-o", tmp_path / "y.exr", "--directional", "0,0,1").stderr
+
+
+def test_what_the_asset_lacks_is_named(asset: Path, tmp_path: Path) -> None:
+    manifest = files.read_json(asset / "asset.json")
+    del manifest["normal"]
+    files.write_json(asset / "asset.json", manifest)
+    assert "normal" in refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1")
+    del manifest["scene"]
+    files.write_json(asset / "asset.json", manifest)
+    assert "scene.glb" in refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--direct", "ray")
+
+
+def test_a_capture_without_direct_images_has_no_combined_answer(asset: Path, capture: Capture) -> None:
+    del capture.manifest["lights"][3]["direct"]
+    files.write_json(capture.folder / "capture.json", capture.manifest)
+    assert "direct image" in refused("evaluate", asset, capture.folder, "--direct", "ray")
+    ok("evaluate", asset, capture.folder)

@@ -1,0 +1,65 @@
+"""The shadow map against rays, away from edges and everywhere on average; and what it refuses."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_forms import ball, build_plane, quad
+from scipy import ndimage
+
+from srbf.direct.ray import RayTracer
+from srbf.errors import InputError
+from srbf.gl.shadow_map import ShadowMapper
+from srbf.lights import DirectionalLight, EnvironmentLight, PointLight
+from srbf.sphere import random_directions
+
+NEAR = 1e-5  # sums in single precision
+EDGES = 0.05  # rms where 3 x 3 texels of a 2048-texel map are softer than a ray
+
+
+@pytest.fixture(scope="module")
+def scene() -> Any:
+    pane = quad([0.2, -0.9, 0.3], [0.9, -0.9, 0.5], [0.9, 0.9, 0.5], [0.2, 0.9, 0.3])
+    tint = np.linspace(0.2, 1.2, 24).reshape(8, 3)
+    return build_plane(ball(0.4, [-0.4, 0, 0.6]), panes=(pane, pane + np.float32([0, 0, 0.2])), tint=tint, size=64, footprint=1.0)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_it_equals_rays_away_from_edges(context: Any, scene: Any, number: int) -> None:
+    direction = random_directions(4, "hemisphere", np.random.default_rng(5))[number]
+    direction = (direction + [0, 0, 0.3]) / np.linalg.norm(direction + [0, 0, 0.3])
+    rays = RayTracer(scene).directional(direction[None])[0]
+    with ShadowMapper(scene, context=context) as mapper:
+        mapped = mapper.directional(direction[None])[0]
+    spread = ndimage.maximum_filter(rays, (5, 5, 1)) - ndimage.minimum_filter(rays, (5, 5, 1))
+    inside = spread.max(axis=2) < 0.02
+    assert inside.mean() > 0.5 and rays[inside].min() < rays[inside].max()
+    np.testing.assert_allclose(mapped[inside], rays[inside], atol=0.01)  # half floats of the tints
+    assert np.sqrt(((mapped - rays) ** 2).mean()) < EDGES
+
+
+def test_an_open_plane_never_shades_itself(context: Any) -> None:
+    receivers = build_plane(size=64)
+    with ShadowMapper(receivers, context=context) as mapper:
+        for z in (1.0, 0.5, 0.1):
+            light = DirectionalLight((np.sqrt(1 - z * z), 0.0, z), (1.0, 2.0, 3.0))
+            expected = np.broadcast_to(z * np.array([1, 2, 3]), (64, 64, 3))
+            np.testing.assert_allclose(mapper.answer([light]), expected, rtol=NEAR)
+
+
+def test_a_wide_sun_softens_it(context: Any) -> None:
+    roof = quad([-9, -9, 0.5], [0, -9, 0.5], [0, 9, 0.5], [-9, 9, 0.5])
+    receivers = build_plane(roof, footprint=0.05, sun_angle=0.8)
+    up = np.array([[0.0, 0.0, 1.0]])
+    with ShadowMapper(receivers, context=context) as mapper:
+        mapped = mapper.directional(up)[0, ..., 0]
+    np.testing.assert_allclose(mapped.mean(axis=0), RayTracer(receivers).directional(up)[0, ..., 0].mean(axis=0), atol=0.05)
+
+
+def test_lamps_are_refused_and_environments_pass(context: Any) -> None:
+    with ShadowMapper(build_plane(), context=context) as mapper:
+        with pytest.raises(InputError, match="--direct ray"):
+            mapper.answer([PointLight((0.0, 0.0, 1.0))])
+        assert (mapper.answer([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
