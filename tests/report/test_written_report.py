@@ -211,3 +211,14 @@ def test_display_values() -> None:
     assert (display[0, 1] == UNCOVERED).all() and (display[1, 0] == UNCOVERED).all() and (display[1, 1] == 0).all()
     assert np.allclose(shown_signed(np.array([[[-2.0, 0, 1]]], np.float32), 2.0), [[[0, 0.5, 0.75]]])
     assert difference_gain(np.full(9, 0.2), 1.0) == 4 and difference_gain(np.zeros(9), 1.0) == 64
+
+
+def test_the_pages_numbers_are_the_evaluations(full: Case, report: Path) -> None:
+    html = (report / "index.html").read_text()
+    for role in ("train", "validation", "holdout"):
+        error = full.evaluation[role]
+        row = next(line for line in html.splitlines() if line.startswith(f"<tr><td>{role}</td>"))
+        for shown_as in (f"{error['rmse']:.4g}", f"{100 * error['relative_rmse']:.2f} %", f"{error['psnr']:.2f} dB"):
+            assert f">{shown_as}<" in row
+    one = next(line for line in html.splitlines() if line.startswith('<tr><td>1</td><td class="number">8</td>'))
+    assert f">{full.evaluation['holdout']['psnr']:.2f} dB<" in one  # every held-out light alone: the same mean by another way
