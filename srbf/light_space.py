@@ -88,7 +88,7 @@ class LightSpace:
 def solid_angles(directions: Float64[ndarray, "L 3"]) -> Float64[ndarray, " L"]:
     """Share of the sky that each light stands for, 1 in the mean: one over the density of lights about it.
 
-    The density counts lights nearer than half the spacing of the set, the less the farther: equal on a lattice, doubled for two in one place.
+    The density counts lights nearer than half the spacing of the set, the less the farther: equal on a lattice, twice for two in one.
     A light at the edge of a dome stands for no more than its like, not for the part of the sky that was never lit.
     """
     angles = np.arccos(np.clip(directions @ directions.T, -1, 1))

@@ -27,7 +27,8 @@ from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
 
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
 NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold
-ROUNDING_MARGIN = 16  # unseen lights lost 3 to 15 times as much as these texels foretell: the rest reach farther
+ROUNDING_MARGIN = 16  # of bytes: unseen lights lost 3 to 15 times what these texels foretell
+LEAST_BYTE_RIDGE = 3e-3  # with less, maps cancel each other by more than bytes can hold
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class RelightingMap:
             if self.ridge != "auto":
                 return basis, self.ridge, None
             sample = TexelSample.of(capture)
-            choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], noise=self._rounding(sample))
+            choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], self._ridges(), self._rounding(sample))
             return basis, choice.ridge, choice
         centers = point_set("fibonacci" if self.centers == "auto" else self.centers, self.k, domain)
         if self.spread != "auto" and self.ridge != "auto":
@@ -135,8 +136,13 @@ class RelightingMap:
         sample = TexelSample.of(capture)
         spreads = spread_candidates(spread_of(centers, "mean")) if self.spread == "auto" else [spread_of(centers, self.spread)]
         candidates = ((spread, GaussianBasis(centers, spread).evaluate(sample.directions)) for spread in spreads)
-        choice = choose(sample, candidates, RIDGES if self.ridge == "auto" else [self.ridge], self._rounding(sample))
+        choice = choose(sample, candidates, self._ridges(), self._rounding(sample))
         return GaussianBasis(centers, choice.spread), choice.ridge, choice
+
+    def _ridges(self) -> list[float]:
+        if self.ridge != "auto":
+            return [self.ridge]
+        return [ridge for ridge in RIDGES if self.encoding != "uint8" or ridge >= LEAST_BYTE_RIDGE]
 
     def _rounding(self, sample: TexelSample) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
         """What the encoding adds to a light's squared error: maps that cancel each other do not survive it."""
@@ -153,7 +159,7 @@ class RelightingMap:
             lost = rounding_variance(maps.min(axis=1), maps.max(axis=1), self.encoding).mean(axis=1)  # (K,)
             if self.encoding == "uint8":  # rounded together: each map errs by what the maps after it cannot make up for
                 return np.full(len(weights), ROUNDING_MARGIN * (np.diag(metric(weights)) ** 2 @ lost))
-            return ROUNDING_MARGIN * (weights**2 @ lost)
+            return weights**2 @ lost
 
         return variance
 
