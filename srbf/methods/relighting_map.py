@@ -28,7 +28,7 @@ from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
 NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold
 ROUNDING_MARGIN = 16  # of bytes: unseen lights lost 3 to 15 times what these texels foretell
-LEAST_BYTE_RIDGE = 3e-3  # with less, maps cancel each other by more than bytes can hold
+LEAST_BYTE_RIDGE = 1e-2  # with less, maps cancel each other by more than bytes can hold
 
 
 @dataclass(frozen=True)
