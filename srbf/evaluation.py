@@ -138,7 +138,7 @@ class TrainWatch:
                 reference = self._answers[row]
                 if reference.dtype == np.float16:
                     reference = finite_to_float32(reference, np.empty(reference.shape, np.float32))
-                sums[:, row] = _squares(answer, reference, floor)
+                sums[:, row] = squared_errors(answer, reference, floor)
 
         with one_blas_thread():
             each(compare, -(-len(self.lights) // LIGHTS_AT_A_TIME))
@@ -192,7 +192,7 @@ def evaluate(
                     true = true[covered]
                     if role == "train" and peak_source is reference:
                         peaks.add(true)
-                    squares[index], powers[index] = _squares(answer[covered], true, floor)
+                    squares[index], powers[index] = squared_errors(answer[covered], true, floor)
                     progress(len(squares), total)
     has_train = bool(capture.indices("train"))
     peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
@@ -200,7 +200,7 @@ def evaluate(
     for role in roles:
         indices = capture.indices(role)
         if indices:
-            error = _role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
+            error = role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
             result[role] = asdict(error)
     if watch is not None and not watch.exact:
         result["train"]["texels"] = len(watch.texels)
@@ -219,7 +219,7 @@ def _covered(capture: Capture) -> Bool[ndarray, " P"]:
     return covered
 
 
-def _squares(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
+def squared_errors(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
     """Sums of squared differences and of squared references, both images clamped at `floor`."""
     reference = np.maximum(reference, np.float32(floor))
     difference = np.maximum(answer, np.float32(floor)) - reference
@@ -250,7 +250,8 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
     return capture.combined(), whole
 
 
-def _role_error(squares: np.ndarray, powers: np.ndarray, samples: int, peak: float) -> RoleError:
+def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], samples: int, peak: float) -> RoleError:
+    """RoleError from sums of squared differences and of squared references, a light, each over `samples` values."""
     per_image = np.sqrt(squares / samples)
     rmse = float(np.sqrt(squares.sum() / (samples * len(squares))))
     reference = float(np.sqrt(powers.sum() / (samples * len(powers))))

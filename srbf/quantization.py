@@ -126,7 +126,7 @@ def metric(functions: Float64[ndarray, "M K"]) -> Float64[ndarray, "K K"]:
     """Upper triangle R with R^T R the functions' mean products, and a trace of the identity that keeps R_kk from 0."""
     k = functions.shape[1]
     faint = LEAST_SEEN * np.sqrt((functions**2).mean()) * np.eye(k)
-    return np.linalg.qr(np.concatenate([functions / np.sqrt(len(functions)), faint]), mode="r")
+    return np.asarray(np.linalg.qr(np.concatenate([functions / np.sqrt(len(functions)), faint]), mode="r"))
 
 
 def rounding_variance(low: Float64[ndarray, "*shape"], high: Float64[ndarray, "*shape"], encoding: Encoding) -> Float64[ndarray, "*shape"]:

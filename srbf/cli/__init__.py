@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import srbf
-from srbf.cli import bake, demo, evaluate, fit, import_, info, relight, report
+from srbf.cli import bake, demo, evaluate, export, fit, import_, info, relight, report
 from srbf.cli.terminal import Commands
 
 app = typer.Typer(
@@ -32,5 +32,6 @@ app.command("fit")(fit.fit)
 app.command("relight")(relight.relight)
 app.command("evaluate")(evaluate.evaluate)
 app.command("report")(report.report)
+app.command("export")(export.export)
 app.command("info")(info.info)
 app.command("demo")(demo.demo)

@@ -3,24 +3,46 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_lamps
 from srbf.capture import Capture
+from srbf.cli.fit_parameters import (
+    Basis,
+    Budget,
+    Centers,
+    Clusters,
+    Domain,
+    Encoding,
+    Maps,
+    Method,
+    Psnr,
+    Ridge,
+    Scalars,
+    Spread,
+    Weighting,
+)
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.direct.choice import Added, chosen
+from srbf.errors import InputError
 from srbf.evaluation import evaluate as evaluate_capture
+from srbf.fitting import method_for, settings_of
+from srbf.leaving_out import leave_one_out as errors_left_out
 
 
 def evaluate(
     asset: AssetFolder,
     reference: Annotated[
-        Path, typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False)
-    ],
+        Path | None,
+        typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
+    ] = None,
+    leave_one_out: Annotated[
+        bool, typer.Option("--leave-one-out", help="ASSET is a CAPTURE: fit it to all lights but one, for each, by the flags of srbf fit.")
+    ] = False,
     point_reference: Annotated[
         int | None, typer.Option(help="Compare with N true Cycles lamps inside the scene.", show_default=False)
     ] = None,
@@ -33,10 +55,36 @@ def evaluate(
     ] = None,
     samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
     seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
+    method: Method = "relighting-map",
+    k: Maps = None,
+    basis: Basis = None,
+    centers: Centers = None,
+    scalars: Scalars = None,
+    clusters: Clusters = None,
+    weighting: Weighting = None,
+    domain: Domain = "auto",
+    spread: Spread = "auto",
+    ridge: Ridge = "auto",
+    encoding: Encoding = None,
+    budget: Budget = None,
+    psnr: Psnr = None,
     blender: Blender = None,
     json: Json = False,
 ) -> None:
-    """Print the error by role, or by distance from true lamps."""
+    """Print the error by role, by distance from true lamps, or at lights left out of a fit."""
+    given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
+    given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
+    if leave_one_out:
+        if reference is not None or point_reference is not None or direct is not None:
+            raise InputError("expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct")
+        settings = settings_of(method, given, domain, spread, ridge)
+        with progress_bar("leave one out") as update:
+            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
+        return
+    if reference is None:
+        raise InputError("expected an asset and a capture, found one path; or add --leave-one-out to fit a capture")
+    if any(value is not None for value in given.values()) or (method, domain, spread, ridge) != ("relighting-map", "auto", "auto", "auto"):
+        raise InputError("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
     opened = Asset.open(asset)
     if point_reference is not None:
         with Added(opened, chosen(opened, direct)) as added, progress_bar("lamps") as update:
@@ -52,14 +100,18 @@ def evaluate(
         return
     with progress_bar("evaluate") as update:
         result = evaluate_capture(opened, Capture.open(reference), update, direct or "none")
+    _print_errors(result, json)
+
+
+def _print_errors(result: dict[str, Any], json: bool) -> None:
     if json:
         print_json(result)
         return
-    typer.echo(f"{'role':<12}{'lights':>7}{'rmse':>12}{'relative':>10}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
+    typer.echo(f"{'role':<14}{'lights':>7}{'rmse':>12}{'relative':>10}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
     for role, error in result.items():
         if role != "lights":
             count = sum(light["role"] == role for light in result["lights"])
             typer.echo(
-                f"{role:<12}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{error['psnr']:>10.2f}"
+                f"{role:<14}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{error['psnr']:>10.2f}"
                 f"{error['psnr_pooled']:>8.2f}{error['peak']:>8.3g}"
             )
