@@ -13,27 +13,26 @@ import srbf
 from srbf import files
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
+from srbf.budget import within_budget
 from srbf.capture import Capture, Quantity
 from srbf.errors import BakeError, InputError, OutputExistsError
-from srbf.evaluation import evaluate
-from srbf.methods.relighting_map import RelightingMap
+from srbf.evaluation import TrainWatch, evaluate
 from srbf.report import write_report
 
 
 @dataclass(frozen=True)
 class DemoScene:
-    """What the article showed of a scene: its receiver and how many maps."""
+    """What the article showed of a scene: its receiver, and in what quantity."""
 
     receiver: Receiver
     size: tuple[int, int]
     quantity: Quantity
-    k: int
 
 
 HOLDOUT_SAMPLES = 24  # fewer than a bake's default: both scenes are clean by then, and the demo is to take minutes
 SCENES = {
-    "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", 25),
-    "house": DemoScene(Receiver("view"), (256, 192), "radiance", 20),
+    "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance"),
+    "house": DemoScene(Receiver("view"), (256, 192), "radiance"),
 }
 
 
@@ -82,16 +81,18 @@ def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress:
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
-    asset = RelightingMap(k=scene.k).encode(capture, lambda done, total: progress(done, total, "fit"))
+    method = within_budget(capture, say=reporter.say)
+    watch = TrainWatch(capture)
+    asset = method.encode(capture, lambda done, total: progress(done, total, "fit"), watch.look)
     timings["fit"] = clock() - started
     started = clock()
-    errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"))
+    errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
     asset.save(asset_folder, force=True)
     reporter.say("drawing the report")
     files.make_folder(folder / "report")
     page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
-    holdout = asset.manifest["error"]["holdout"]
-    reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {scene.k} maps")
+    holdout, size = asset.manifest["error"]["holdout"], asset.bytes_per_texel()["directional"]
+    reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes a texel")
     return page
