@@ -18,6 +18,6 @@ def nearest_covered(coverage: Float32[ndarray, "H W"]) -> Int[ndarray, "H W"] | 
     return (rows * coverage.shape[1] + columns).astype(np.int64)
 
 
-def dilate(image: Float32[ndarray, "H W C"], nearest: Int[ndarray, "H W"] | None) -> Float32[ndarray, "H W C"]:
-    """`image` with every uncovered texel replaced by its nearest covered one."""
+def dilate(image: ndarray, nearest: Int[ndarray, "H W"] | None) -> ndarray:
+    """`image` (H, W, C) of any type with every uncovered texel replaced by its nearest covered one."""
     return image if nearest is None else image.reshape(-1, image.shape[2])[nearest.ravel()].reshape(image.shape)

@@ -133,6 +133,8 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
     if encoding != "uint8":
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", NO_DATE)
+    else:
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # a fourth channel is data like the others: none is divided by it
     with atomic_path(path) as temporary:
         target = oiio.ImageOutput.create(str(path))
         if target is None or not target.open(str(temporary), spec):

@@ -10,12 +10,11 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.model_selection import TexelSample
-from srbf.sphere import Domain, fibonacci, mean_spacing
+from srbf.sphere import mean_spacing
 
 Weighting = Literal["plain", "relative"]
 
 DARK = 0.02  # of the mean answer: what `relative` adds to a texel's own, so that black texels do not weigh without bound
-CELLS = 1 << 14  # directions by which solid angles are counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +31,10 @@ class LightSpace:
     row_weights: Float32[ndarray, " n"]
 
     @staticmethod
-    def of(sample: TexelSample, domain: Domain, weighting: Weighting) -> LightSpace:
+    def of(sample: TexelSample, weighting: Weighting) -> LightSpace:
         """Weights and mean of a sample's train lights."""
         answers = sample.answers[:, : sample.train]
-        angles = solid_angles(sample.directions[: sample.train], domain)
+        angles = solid_angles(sample.directions[: sample.train])
         rows = np.ones(len(answers), np.float32)
         if weighting == "relative":
             own = np.abs(answers).mean(axis=(1, 2))
@@ -86,13 +85,13 @@ class LightSpace:
         return float((values**2).sum() / max(float(np.einsum("nm,nm->", rows, rows, dtype=np.float64)), 1e-30))
 
 
-def solid_angles(directions: Float64[ndarray, "L 3"], domain: Domain) -> Float64[ndarray, " L"]:
-    """Solid angle nearest to each light within the domain, 1 in the mean; no farther than the lights' spacing, so that the last
-    lights of a list that leaves part of the sky out do not stand for all of it."""
-    cells = fibonacci(CELLS)
-    cells = cells[cells[:, 2] > 0] if domain == "hemisphere" else cells
-    cosines = cells @ directions.T
-    near = cosines.max(axis=1) >= np.cos(min(mean_spacing(directions), np.pi))
-    counts = np.bincount(cosines.argmax(axis=1)[near], minlength=len(directions)).astype(np.float64)
-    counts = np.maximum(counts, 0.05 * counts.mean())  # two lights in one place share it
-    return counts / counts.mean()
+def solid_angles(directions: Float64[ndarray, "L 3"]) -> Float64[ndarray, " L"]:
+    """Share of the sky that each light stands for, 1 in the mean: one over the density of lights about it.
+
+    The density counts lights nearer than half the spacing of the set, the less the farther: equal on a lattice, twice for two in one.
+    A light at the edge of a dome stands for no more than its like, not for the part of the sky that was never lit.
+    """
+    angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
+    density = np.maximum(0, 1 - angles / (0.5 * mean_spacing(directions))).sum(axis=1)
+    shares = 1 / density
+    return shares / shares.mean()

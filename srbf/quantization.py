@@ -13,6 +13,10 @@ from srbf.parallel import each
 
 HALF_DIM = 2.0**-6  # below it a hundredth of a layer's largest value is already a subnormal half
 SUFFIX: dict[Encoding, str] = {"half": "exr", "float": "exr", "uint8": "png"}
+VALUES_AT_A_TIME = 1 << 12
+RANGED_VALUES = 1 << 16  # of a layer, looked at for its range
+CLIPPED = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # shares of values at either end that may be clipped
+LEAST_SEEN = 1e-4  # of a function's rms: what a sum of functions counts at least
 BYTE_STEP = 1 / 255
 HALF_STEP = 2.0**-11  # relative, half a step either way
 
@@ -56,6 +60,73 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
 
     each(bytes_of, n)
     return stored, scale, bias
+
+
+def quantize_together(
+    values: Float32[ndarray, "K H W C"], functions: Float64[ndarray, "M K"]
+) -> tuple[ndarray, Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
+    """`quantize` to bytes, of layers that are only ever seen through sums weighed by `functions`, which overlap.
+
+    What rounding one layer loses is made up for by the layers still to be rounded: Babai's nearest plane in the lattice of bytes under the
+    functions' own metric [Babai1986]. With functions = Q R, layer k then errs by at most half a step times |R_kk|, not times its whole
+    length, which for overlapping Gaussians is many times more. Work: K^2 / 2 multiplications a value.
+    """
+    k, channels = len(values), values.shape[3]
+    upper = metric(functions)
+    low, high = _ranges(values, np.diag(upper) ** 2, (upper**2).sum(axis=0))
+    step = np.where(high > low, (high - low) / 255, 1).astype(np.float32)
+    passed_on = np.triu(upper / np.diag(upper)[:, None], 1).astype(np.float32)  # (K, K): error of layer j seen in layer k < j
+    flat = values.reshape(k, -1, channels)
+    stored = np.empty(flat.shape, np.uint8)
+
+    def work(task: int) -> None:
+        part = slice(task * VALUES_AT_A_TIME, (task + 1) * VALUES_AT_A_TIME)
+        errors = np.zeros((k, len(flat[0, part]), channels), np.float32)
+        for i in reversed(range(k)):
+            wanted = flat[i, part] + np.tensordot(passed_on[i, i + 1 :], errors[i + 1 :], 1)
+            stored[i, part] = np.clip(np.round((wanted - low[i]) / step[i]), 0, 255)
+            errors[i] = flat[i, part] - (stored[i, part] * step[i] + low[i])
+
+    each(work, -(-flat.shape[1] // VALUES_AT_A_TIME))
+    return stored.reshape(values.shape), step * 255, low
+
+
+def _ranges(
+    values: Float32[ndarray, "K H W C"], rounding: Float64[ndarray, " K"], clipping: Float64[ndarray, " K"]
+) -> tuple[Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
+    """The range of every layer and channel that loses least: a few outliers clipped, all else in finer steps.
+
+    `rounding` and `clipping` say how much is seen of a squared error of either kind: others make up for the one, not for the other.
+    """
+    k, channels = len(values), values.shape[3]
+    low, high = np.empty((k, channels), np.float32), np.empty((k, channels), np.float32)
+    every = max(1, values.shape[1] * values.shape[2] // RANGED_VALUES)
+
+    def find(i: int) -> None:
+        for c in range(channels):
+            some = np.sort(values[i, :, :, c].ravel()[::every])
+            least = np.inf
+            for share in CLIPPED:
+                cut = int(share * len(some))
+                bottom, top = some[cut], some[len(some) - 1 - cut]
+                lost = np.square(np.clip(some, bottom, top) - some).mean() * clipping[i]
+                lost += rounding[i] * ((top - bottom) * BYTE_STEP) ** 2 / 12
+                if lost < least:
+                    least, low[i, c], high[i, c] = lost, bottom, top
+
+    each(find, k)
+    exact = _extremes(values)
+    for found, extreme, share in ((low, exact[0], np.minimum), (high, exact[1], np.maximum)):
+        unclipped = found == share(found, extreme)  # a sample's own extreme stands for that of all
+        found[unclipped] = extreme[unclipped]
+    return low, high
+
+
+def metric(functions: Float64[ndarray, "M K"]) -> Float64[ndarray, "K K"]:
+    """Upper triangle R with R^T R the functions' mean products, and a trace of the identity that keeps R_kk from 0."""
+    k = functions.shape[1]
+    faint = LEAST_SEEN * np.sqrt((functions**2).mean()) * np.eye(k)
+    return np.linalg.qr(np.concatenate([functions / np.sqrt(len(functions)), faint]), mode="r")
 
 
 def rounding_variance(low: Float64[ndarray, "*shape"], high: Float64[ndarray, "*shape"], encoding: Encoding) -> Float64[ndarray, "*shape"]:

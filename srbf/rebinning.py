@@ -16,12 +16,12 @@ from scipy.spatial import KDTree
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.basis.gaussian import lookup
 from srbf.capture import COVERED, Capture
 from srbf.errors import InputError
+from srbf.methods import directional_responses
 
 Projection = Literal["equal-area", "orthographic", "latitude-longitude"]
-CHUNK = 1 << 16  # receivers whose coefficients are decoded at a time
+CHUNK = 1 << 16  # receivers; a few times as many answers are asked for at a time
 
 
 def tile_directions(size: int, projection: Projection) -> Float64[ndarray, "h w 3"]:
@@ -118,22 +118,23 @@ def captured_tiles(
 
 
 def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h w 3"]) -> Float32[ndarray, "G h w 3"]:
-    """The same tiles from the fit: sum of c_i R_i at each pixel's own direction, signed, before the clamp [Wong2005, eq. 1, fig. 4].
+    """The same tiles from the fit: the answer at each pixel's own direction, signed, before the clamp [Wong2005, eq. 1, fig. 4].
 
-    The sum is linear in c, so a block's coefficients are averaged once and K (not P) numbers make a tile.
+    By the asset's method, whatever it is: every receiver that a tile has is asked for every direction, CHUNK answers at a time.
     """
-    columns = tiles.tocsc()
-    means = np.zeros((tile_count(tiles), asset.k * 3), np.float32)
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height, rows_at_a_time):
-        c = asset.coefficients(slice(start, start + rows_at_a_time))  # (K, h, W, 3)
-        receivers = slice(start * asset.width, start * asset.width + c.shape[1] * c.shape[2])
-        means += columns[:, receivers] @ c.transpose(1, 2, 0, 3).reshape(-1, asset.k * 3)
-    means[_empty(tiles)] = np.nan
+    receivers = np.unique(tiles.indices)
+    picked, columns = asset.at(receivers), tiles.tocsc()[:, receivers].tocsr()
     inside = np.isfinite(directions[..., 0])
-    weights = lookup(asset.table, directions[inside] @ asset.basis.centers.T).astype(np.float32)  # (N, K)
+    asked = directions[inside]
+    answers = np.full((len(asked), tile_count(tiles), 3), np.nan, np.float32)
+    at_a_time = max(1, 16 * CHUNK // max(1, len(receivers)))
+    for start in range(0, len(asked) if len(receivers) else 0, at_a_time):
+        images = directional_responses(picked, asked[start : start + at_a_time])[:, 0]  # (b, n, 3)
+        means = columns @ images.transpose(1, 0, 2).reshape(len(receivers), -1)
+        answers[start : start + at_a_time] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
+    answers[:, _empty(tiles)] = np.nan
     result = np.full((tile_count(tiles), *inside.shape, 3), np.nan, np.float32)
-    result[:, inside] = weights @ means.reshape(-1, asset.k, 3)
+    result[:, inside] = answers.transpose(1, 0, 2)
     return result
 
 

@@ -55,6 +55,12 @@ def fibonacci(n: int) -> Float64[ndarray, "n 3"]:
     return _from_z_and_azimuth(1 - (2 * i + 1) / n, golden_angle * i)
 
 
+def all_around(domain: Domain, density: int = 2048) -> Float64[ndarray, "n 3"]:
+    """Directions that fill a domain evenly, to integrate or to look for errors over it: `density` Fibonacci points on a sphere."""
+    points = fibonacci(density)
+    return points if domain == "sphere" else points[points[:, 2] > 0]
+
+
 POINT_SETS: dict[str, Callable[[int], np.ndarray]] = {
     "hammersley": lambda n: hammersley(n, base=2),
     "hammersley3": lambda n: hammersley(n, base=3),

@@ -57,3 +57,10 @@ def test_the_first_failure_of_many_is_raised(tmp_path: Path) -> None:
     with pytest.raises((ImageError, WriteError), match=r"1\.exr"):
         write_images([(tmp_path / "0.exr", good, "half"), (tmp_path / "1.exr", good * np.inf, "half"), (tmp_path / "2.exr", good, "half")])
     assert (tmp_path / "0.exr").is_file() and (tmp_path / "2.exr").is_file() and not (tmp_path / "1.exr").exists()
+
+
+def test_four_channels_of_bytes_come_back_as_they_were(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (7, 9, 4), dtype=np.uint8)
+    pixels[0, :, 3] = 0
+    write_image(tmp_path / "planes.png", pixels, "uint8")
+    assert np.array_equal(np.round(read_image(tmp_path / "planes.png", 4) * 255).astype(np.uint8), pixels)

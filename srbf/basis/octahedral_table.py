@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float16, Float32, Float64, Int
 from srbf.basis.light_functions import LightFunctions
-from srbf.sphere import Domain, fibonacci, octahedral_decode, octahedral_encode
+from srbf.sphere import Domain, all_around, octahedral_decode, octahedral_encode
 
 SIZES = (17, 33, 65, 129)
 TABLE_ERROR = 2.0**-5  # rms of the mixed table's error over the rms of the functions: 30 dB below them, where captures hold 20 to 35
@@ -46,8 +46,7 @@ def octahedral_table(functions: LightFunctions, domain: Domain, sizes: tuple[int
     count = len(functions.spreads)
     some = np.unique(np.linspace(0, count - 1, min(PROBED, count)).astype(np.int64))
     probed = LightFunctions(functions.centers, functions.spreads[some], functions.coefficients[some])
-    probes = fibonacci(PROBES)
-    probes = probes[probes[:, 2] > 0] if domain == "hemisphere" else probes
+    probes = all_around(domain, PROBES)
     exact = probed.evaluate(probes)
     scale = max(float(np.sqrt((exact**2).mean())), 1e-30)
     fitting = [size for size in sizes if count * size * size * 8 <= TABLE_BYTES] or [sizes[0]]

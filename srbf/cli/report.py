@@ -2,21 +2,68 @@
 
 from __future__ import annotations
 
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
 from srbf.asset import Asset
-from srbf.capture import Capture
-from srbf.cli.parameters import AssetFolder, CaptureFolder, Force, Output
+from srbf.capture import ROLES, Capture
+from srbf.cli.parameters import AssetFolder, CaptureFolder, Force
+from srbf.cli.relight import check_image_output
 from srbf.cli.terminal import note, progress_bar
+from srbf.direct.choice import Direct
+from srbf.errors import SrbfError
 from srbf.evaluation import evaluate
-from srbf.files import atomic_folder, check_replaceable
+from srbf.files import atomic_folder, check_replaceable, write_text
 from srbf.report import write_report
 
+PAGE = "index.html"
+WITH_DIRECT: dict[str, Direct] = {"direct_ray": "ray", "direct_shadow_map": "shadow-map"}
 
-def report(asset: AssetFolder, capture: CaptureFolder, output: Output, force: Force = False) -> None:
-    """Write a folder to look at: contact sheet, the article's figures, errors, and a page (index.html)."""
-    check_replaceable(output, force, "index.html")
+
+def report(
+    asset: AssetFolder,
+    capture: CaptureFolder,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="OUT.html, or a folder that gets the pictures as files too.", show_default=False)
+    ],
+    force: Force = False,
+) -> None:
+    """Write one page to look at: errors at unseen lights, by bytes and in motion, and the article's figures, all inside it."""
+    single = output.suffix.lower() in (".html", ".htm")
+    if single:
+        check_image_output(output, force)
+    else:
+        check_replaceable(output, force, PAGE)
     opened, images = Asset.open(asset), Capture.open(capture)
+    started = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(opened, images, update)
-    with atomic_folder(output, force, "index.html") as folder:
-        write_report(opened, images, folder, evaluation=errors, asset_folder=asset)
-    note(f"wrote {output / 'index.html'}")
+    errors |= _with_direct(opened, images)
+    timings = {"evaluate, all lights": time.perf_counter() - started}
+    with progress_bar("report") as update:
+        if single:
+            with tempfile.TemporaryDirectory(prefix="srbf-") as name:
+                page = write_report(opened, images, Path(name), evaluation=errors, timings=timings, asset_folder=asset, progress=update)
+                write_text(output, page.read_text(encoding="utf-8"))
+        else:
+            with atomic_folder(output, force, PAGE) as folder:
+                write_report(opened, images, folder, evaluation=errors, timings=timings, asset_folder=asset, progress=update)
+    note(f"wrote {output if single else output / PAGE}")
+
+
+def _with_direct(asset: Asset, capture: Capture) -> dict[str, Any]:
+    """Errors of an indirect asset on the least seen role once its direct light is added, exact and as an engine would; noted where not."""
+    found: dict[str, Any] = {}
+    if asset.transport != "indirect":
+        return found
+    role = next(role for role in ROLES[::-1] if capture.indices(role))
+    for key, direct in WITH_DIRECT.items():
+        try:
+            found[key] = {role: evaluate(asset, capture, direct=direct, roles=(role,))[role]}
+        except SrbfError as error:
+            note(f"no errors with --direct {direct}: {error}")
+    return found

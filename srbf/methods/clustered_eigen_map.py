@@ -77,7 +77,7 @@ class ClusteredEigenMap:
         sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_A_CLUSTER * self.clusters))
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
-        space = LightSpace.of(sample, domain, "plain")
+        space = LightSpace.of(sample, "plain")
         features, _ = principal_axes(space.centered, FEATURES)
         found = cluster(space.centered, np.ascontiguousarray(features.T), self.clusters, self.scalars, self.seed)
         seen = StreamedProduct(space.weights(features))

@@ -70,7 +70,7 @@ class EigenMap:
         sample = TexelSample.of(capture, SAMPLE_TEXELS)
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
-        space = LightSpace.of(sample, domain, self.weighting)
+        space = LightSpace.of(sample, self.weighting)
         axes, values = principal_axes(space.centered * space.row_weights[:, None], self.scalars)
         product = StreamedProduct(space.weights(axes))
         for first, block in capture.stream(train, look):

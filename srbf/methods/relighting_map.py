@@ -20,13 +20,15 @@ from srbf.image import Encoding
 from srbf.lights import Light, PointLight
 from srbf.model_selection import RIDGES, Choice, TexelSample, choose, spread_candidates
 from srbf.parallel import each
-from srbf.quantization import layer_entries, quantize, rounding_variance
+from srbf.quantization import layer_entries, metric, quantize, quantize_together, rounding_variance
 from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, light_vectors, sum_over_lights
 from srbf.solve.least_squares import StreamedLeastSquares
-from srbf.sphere import Domain, PointSet, domain_of, point_set
+from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
 
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
-NOISE_TEXELS = 1024  # on which the loss of an encoding is foretold
+NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold
+ROUNDING_MARGIN = 16  # of bytes: unseen lights lost 3 to 15 times what these texels foretell
+LEAST_BYTE_RIDGE = 3e-3  # with less, maps cancel each other by more than bytes can hold
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,10 @@ class RelightingMap:
                 coefficients[i] = dilate(coefficients[i], nearest)
 
             each(fill, self.k)
-        stored, scale, bias = quantize(coefficients, self.encoding)
+        if self.encoding == "uint8":
+            stored, scale, bias = quantize_together(coefficients, basis.evaluate(all_around(domain)))
+        else:
+            stored, scale, bias = quantize(coefficients, self.encoding)
         images = carried_images(capture, nearest)
         fit = {"ridge": ridge, **({} if choice is None else {"chosen_by": choice.rule}), **asdict(report)}
         manifest = common_manifest(capture, "relighting-map", domain, images, asdict(self), fit)
@@ -123,7 +128,7 @@ class RelightingMap:
             if self.ridge != "auto":
                 return basis, self.ridge, None
             sample = TexelSample.of(capture)
-            choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], noise=self._rounding(sample))
+            choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], self._ridges(), self._rounding(sample))
             return basis, choice.ridge, choice
         centers = point_set("fibonacci" if self.centers == "auto" else self.centers, self.k, domain)
         if self.spread != "auto" and self.ridge != "auto":
@@ -131,19 +136,29 @@ class RelightingMap:
         sample = TexelSample.of(capture)
         spreads = spread_candidates(spread_of(centers, "mean")) if self.spread == "auto" else [spread_of(centers, self.spread)]
         candidates = ((spread, GaussianBasis(centers, spread).evaluate(sample.directions)) for spread in spreads)
-        choice = choose(sample, candidates, RIDGES if self.ridge == "auto" else [self.ridge], self._rounding(sample))
+        choice = choose(sample, candidates, self._ridges(), self._rounding(sample))
         return GaussianBasis(centers, choice.spread), choice.ridge, choice
+
+    def _ridges(self) -> list[float]:
+        if self.ridge != "auto":
+            return [self.ridge]
+        return [ridge for ridge in RIDGES if self.encoding != "uint8" or ridge >= LEAST_BYTE_RIDGE]
 
     def _rounding(self, sample: TexelSample) -> Callable[[np.ndarray, np.ndarray], np.ndarray] | None:
         """What the encoding adds to a light's squared error: maps that cancel each other do not survive it."""
         if self.encoding == "float":
             return None
-        answers = sample.answers[:NOISE_TEXELS, : sample.train].astype(np.float64).transpose(1, 0, 2)  # (L, n, 3)
+        train = sample.answers[:, : sample.train]
+        energy = np.einsum("nlc,nlc->n", train, train)
+        chosen = np.unique(np.concatenate([np.arange(0, len(train), -(-len(train) // NOISE_TEXELS)), energy.argsort()[-NOISE_TEXELS:]]))
+        answers = train[chosen].astype(np.float64).transpose(1, 0, 2)  # (L, n, 3); the brightest set the layers' range
         flat = answers.reshape(sample.train, -1)
 
         def variance(operator: np.ndarray, weights: np.ndarray) -> np.ndarray:
             maps = (operator @ flat).reshape(self.k, -1, 3)
             lost = rounding_variance(maps.min(axis=1), maps.max(axis=1), self.encoding).mean(axis=1)  # (K,)
+            if self.encoding == "uint8":  # rounded together: each map errs by what the maps after it cannot make up for
+                return np.full(len(weights), ROUNDING_MARGIN * (np.diag(metric(weights)) ** 2 @ lost))
             return weights**2 @ lost
 
         return variance

@@ -11,11 +11,13 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
 from srbf.lights import Light
+from srbf.quality import METHODS, Method
 from srbf.report.contact_sheet import contact_sheet
+from srbf.report.findings import measure
 from srbf.report.maps import sum_of_maps
 from srbf.report.page import write_page
 from srbf.report.point_light import point_light
-from srbf.report.sphere import centers, error_by_light, r_curve
+from srbf.report.sphere import centers, r_curve
 from srbf.report.strips import animation, point_strip, spot_strip
 from srbf.report.subject import Picture, Subject, gather
 from srbf.report.tiles import abrdf_tiles
@@ -23,7 +25,7 @@ from srbf.report.tiles import abrdf_tiles
 MAPS, POSITION = "maps", "position"  # what a picture needs of the asset
 Draw = Callable[[Subject, Path], Picture]
 WITHOUT = {
-    MAPS: "Not drawn: this picture shows the terms of a relighting map, and the asset is of another method.",
+    MAPS: "Not drawn: this picture shows the terms of a relighting map of Gaussians, and the asset holds other functions.",
     POSITION: "Not drawn: the asset has no position map (photographs never have one), and a lamp needs to know where receivers are.",
 }
 DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, how, what it needs
@@ -33,12 +35,11 @@ DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, ho
     ("point_light.png", "A point light", point_light, (MAPS, POSITION)),
     ("point_strip.png", "Point lights", point_strip, (POSITION,)),
     ("spot_strip.png", "Spot lights", spot_strip, (POSITION,)),
-    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, (MAPS,)),
-    ("error_by_light.png", "Error by light", error_by_light, ()),
+    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, ()),
     ("centers.png", "Centers and lights", centers, (MAPS,)),
     ("r_curve.png", "The curve R", r_curve, (MAPS,)),
 )
-WRITTEN = (*(file for file, *_ in DRAWN), "animation.gif", "report.md", "index.html")
+WRITTEN = (*(file for file, *_ in DRAWN), "error_by_light.png", "animation.gif", "report.md", "index.html")  # by any version
 
 
 def write_report(
@@ -50,12 +51,15 @@ def write_report(
     timings: Mapping[str, float] | None = None,
     demo_lights: Sequence[Light] | None = None,
     asset_folder: Path | None = None,
+    methods: Sequence[Method] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write pictures, report.md and index.html into `folder`, and return the path of index.html.
+    """Write pictures, report.md and index.html into `folder`, and return the path of index.html, which holds every figure in itself.
 
     `evaluation` is what `srbf.evaluation.evaluate` gave for this asset and capture; `timings` are seconds by step;
     `demo_lights` the point and spot lights to show instead of derived ones (lights of other kinds are not drawn);
-    `asset_folder` is where the asset was saved, for its size. Files of an earlier report in `folder` are replaced.
+    `asset_folder` is where the asset was saved, for its size; `methods` are fitted to a sample of the
+    capture and compared. Files of an earlier report in `folder` are replaced.
     What an asset lacks is left out with a sentence on the page. InputError where sizes or lights do not match,
     MissingLibraryError without matplotlib.
     """
@@ -69,12 +73,17 @@ def write_report(
     for name in WRITTEN:
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
-    pictures = [_draw(subject, folder, *entry) for entry in DRAWN]
-    return write_page(subject, folder, pictures, timings, asset_folder)
+    steps = 4 + len(DRAWN)
+    findings = measure(subject, METHODS if methods is None else methods, lambda done, total: progress(done, steps))
+    pictures = []
+    for entry in DRAWN:
+        pictures.append(_draw(subject, folder, *entry))
+        progress(4 + len(pictures), steps)
+    return write_page(subject, findings, folder, pictures, timings, asset_folder)
 
 
 def _draw(subject: Subject, folder: Path, file: str, title: str, draw: Draw, needs: tuple[str, ...]) -> Picture:
-    has = {MAPS: subject.asset.method == "relighting-map", POSITION: bool(subject.points)}
+    has = {MAPS: subject.asset.manifest.get("basis", {}).get("kind") == "gaussian", POSITION: bool(subject.points)}
     for need in needs:
         if not has[need]:
             return Picture(file, title, WITHOUT[need], omitted=True)

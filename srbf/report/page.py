@@ -1,4 +1,4 @@
-"""The page of a report, as Markdown and as static HTML, from the same sections."""
+"""The page of a report: one file of HTML that holds all its figures, and the same in Markdown beside pictures of its own."""
 
 from __future__ import annotations
 
@@ -9,45 +9,146 @@ from pathlib import Path
 
 import numpy as np
 
+from srbf.asset import Asset
 from srbf.capture import ROLES
 from srbf.facts import folder_bytes
 from srbf.files import write_text
+from srbf.image import size_of
+from srbf.quality import family_of, name_of, scalars_of, texel_bytes
+from srbf.report.by_bytes import by_bytes
+from srbf.report.by_bytes import table as table_of_bytes
+from srbf.report.by_direction import by_direction
+from srbf.report.by_texel import by_texel
+from srbf.report.findings import Findings
+from srbf.report.in_motion import motion_curves, motion_figures
+from srbf.report.inline import Table, data_uri, figure, image, paragraphs
+from srbf.report.light_functions import light_functions
+from srbf.report.spectrum import spectrum_plots
 from srbf.report.subject import Picture, Subject
+from srbf.report.unseen_light import how_measured, table_of_lights, worst_directions
 
-STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; color: #262626; background: #fff; max-width: 1120px; margin: 2.5rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.7rem; margin-bottom: 0.2rem; } h2 { font-size: 1.15rem; margin-top: 2.4rem; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; } td, th { padding: 0.25rem 1.4rem 0.25rem 0; text-align: left; }
-th { color: #707070; font-weight: 500; border-bottom: 1px solid #c9c9c9; } td { border-bottom: 1px solid #eee; }
-figure { margin: 2.2rem 0; } img { max-width: 100%; height: auto; }
-figcaption, .soft { color: #707070; font-size: 0.92rem; max-width: 75ch; }
-li { max-width: 80ch; }
-"""
+STYLE = Path(__file__).with_name("page.css")
+MOVING = (".webp", ".gif")
+WIDE = 1.2  # a sheet so much wider than high shares a printed page with another
+DIRECT = {"direct_ray": "direct light by rays, exact", "direct_shadow_map": "direct light by a shadow map"}  # keys of an evaluation
 
 
 @dataclass(frozen=True)
-class Table:
-    """A heading and rows of text under column names."""
+class Section:
+    """A heading and ready HTML under it."""
 
     title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    body: str
 
 
 def write_page(
-    subject: Subject, folder: Path, pictures: Sequence[Picture], timings: Mapping[str, float] | None, asset_folder: Path | None
+    subject: Subject,
+    findings: Findings,
+    folder: Path,
+    pictures: Sequence[Picture],
+    timings: Mapping[str, float] | None,
+    asset_folder: Path | None,
 ) -> Path:
-    """Write report.md and index.html; returns the latter."""
+    """Write report.md and index.html; returns the latter, which needs no file beside it."""
     asset = subject.asset
-    title = f"Relighting report: {asset.width}×{asset.height} {subject.capture.quantity}, {asset.k} maps"
+    title = f"Relighting report: {asset.width}×{asset.height} {subject.capture.quantity}, {kept_words(subject)}"
     lead = lead_of(subject)
-    tables = [sizes(subject, asset_folder), fit_facts(subject), errors(subject)]
+    facts = [sizes(subject, asset_folder), fit_facts(subject)]
     if timings:
-        tables.insert(1, Table("Times", ("step", "seconds"), tuple((name, f"{value:.2f}") for name, value in timings.items())))
+        facts.insert(1, Table("Times", ("step", "seconds"), tuple((name, f"{value:.2f}") for name, value in timings.items()), numbers=True))
     limits = limits_of(subject)
+    tables = [errors(subject), *split_errors(subject), table_of_lights(findings.unseen), *bytes_and_motion(findings), *facts]
     write_text(folder / "report.md", _markdown(title, lead, tables, pictures, limits))
-    write_text(folder / "index.html", _html(title, lead, tables, pictures, limits))
+    sections = [
+        Section("Under unseen light", unseen_section(subject, findings)),
+        Section("By direction", by_direction(subject)),
+        Section("What a byte buys", by_bytes(subject, findings) if findings.scores else paragraphs(findings.missing)),
+    ]
+    if findings.spectrum is not None:
+        sections.append(Section("Spectrum", spectrum_plots(subject, findings, findings.spectrum)))
+    if "light_basis" in asset.manifest:
+        sections.append(Section("Light functions", light_functions(subject)))
+    sections += [
+        Section("Where the error is", by_texel(subject, findings.unseen)),
+        Section("In motion", motion_section(findings, pictures, folder)),
+    ]
+    sections += [Section(picture.title, drawn(picture, folder)) for picture in pictures if Path(picture.file).suffix not in MOVING]
+    boxes = "".join(f"<div><h3>{html.escape(table.title)}</h3>{table.html()}</div>" for table in facts)
+    sections.append(Section("In figures", f'<div class="facts">{boxes}</div>'))
+    sections.append(Section("Limits", "<ul>\n" + "\n".join(f"<li>{html.escape(note)}</li>" for note in limits) + "\n</ul>"))
+    write_text(folder / "index.html", _html(title, lead, key_figures(subject, findings), sections))
     return folder / "index.html"
+
+
+def kept_words(subject: Subject) -> str:
+    """What the asset keeps of a texel, in words."""
+    return f"{family_of(subject.asset)} of {name_of(subject.asset)}"
+
+
+def key_figures(subject: Subject, findings: Findings) -> str:
+    """The few numbers that one asks for first."""
+    one = findings.unseen.errors[0]
+    figures = [
+        (f"PSNR, {subject.role}", f"{subject.evaluation[subject.role]['psnr']:.2f} dB"),
+        ("worst light", f"{one.worst:.1f} dB"),
+        ("at shadow edges", f"{one.edges:.1f} dB"),
+        ("read of a texel", f"{texel_bytes(subject.asset)} bytes"),
+        ("of the energy is clamped", f"{findings.unseen.negative.energy:.2%}"),
+    ]
+    if findings.motion is not None:
+        figures.append(("largest ripple in motion", f"{findings.motion.largest_ripple:.1%}"))
+    cells = "".join(f"<div><dd>{value}</dd><dt>{name}</dt></div>" for name, value in figures)
+    return f'<dl class="key">{cells}</dl>'
+
+
+def unseen_section(subject: Subject, findings: Findings) -> str:
+    """The worst directions, errors under several lights, errors by role, and with the direct light added where it was left out."""
+    unseen = findings.unseen
+    lights, roles = table_of_lights(unseen), errors(subject)
+    parts = [worst_directions(subject, unseen), f"<h3>{lights.title}</h3>", lights.html(), how_measured(unseen)]
+    parts += [f"<h3>{roles.title}</h3>", roles.html()]
+    for table in split_errors(subject):
+        parts += [f"<h3>{table.title}</h3>", table.html()]
+    return "\n".join(parts)
+
+
+def motion_section(findings: Findings, pictures: Sequence[Picture], folder: Path) -> str:
+    """The sweep, whether the lights are close enough, and the animation."""
+    parts = [] if findings.sampling is None else [paragraphs(_sentence(findings.sampling.sentence()))]
+    if findings.motion is None:
+        parts.append(paragraphs(findings.missing))
+    else:
+        parts += [motion_figures(findings.motion).html(), motion_curves(findings.motion)]
+    parts += [f'<div class="moving">{drawn(picture, folder)}</div>' for picture in pictures if Path(picture.file).suffix in MOVING]
+    return "\n".join(parts)
+
+
+def drawn(picture: Picture, folder: Path) -> str:
+    """A picture's file as an element, or why there is none."""
+    if picture.omitted:
+        return f'<p class="soft">{html.escape(picture.caption)}</p>'
+    path = folder / picture.file
+    height, width = size_of(path) if path.suffix == ".png" else (1, 1)
+    style = "sheet wide" if width > WIDE * height else "sheet"
+    return figure(image(data_uri(path), picture.title, style), picture.caption)
+
+
+def bytes_and_motion(findings: Findings) -> list[Table]:
+    """The tables of the contest and of the sweep, where there are any."""
+    tables = [table_of_bytes(findings)] if findings.scores else []
+    return tables + ([motion_figures(findings.motion)] if findings.motion is not None else [])
+
+
+def split_errors(subject: Subject) -> list[Table]:
+    """Errors with the direct light added, where the evaluation has them: {`direct_ray`, `direct_shadow_map`: {role: RoleError}}."""
+    rows = []
+    for key, words in DIRECT.items():
+        for role in ROLES:
+            if role in (found := subject.evaluation.get(key, {})):
+                e = found[role]
+                rows.append((words, role, f"{e['rmse']:.4g}", f"{100 * e['relative_rmse']:.2f} %", f"{e['psnr']:.2f} dB"))
+    columns = ("indirect maps and", "role", "rmse", "relative rmse", "PSNR")
+    return [Table("With the direct light added", columns, tuple(rows))] if rows else []
 
 
 def lead_of(subject: Subject) -> str:
@@ -67,9 +168,9 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
     rows = (
         ("capture on disk", f"{bytes_text(folder_bytes(capture.folder))}, {len(capture.lights)} lights"),
         *([("asset on disk", bytes_text(folder_bytes(asset_folder)))] if asset_folder else []),
-        ("maps, uncompressed", f"{bytes_text(raw)}, {asset.k} maps, {asset.encoding}"),
-        ("lights for each map", f"{len(capture.indices('train')) / asset.k:.1f} train images are folded into one map"),
-        ("read by a shader of the texel's own maps", f"{asset.bytes_per_texel()['directional']} bytes a texel"),
+        ("texels' own data, uncompressed", f"{bytes_text(raw)}, {name_of(asset)}, {asset.encoding}"),
+        ("train answers for each number kept", f"{3 * len(capture.indices('train')) / scalars_of(asset):.1f}"),
+        ("read by a shader of the texel's own data", f"{texel_bytes(asset)} bytes a texel"),
         ("resident on a GPU, everything", bytes_text(asset.resident_bytes())),
     )
     return Table("Size", ("what", "how much"), rows)
@@ -78,17 +179,36 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
 def fit_facts(subject: Subject) -> Table:
     """What the manifest records of the fit."""
     asset = subject.asset
-    spread = asset.basis.spread
+    spreads = np.array(spreads_of(asset))
     source = asset.manifest.get("source", {})
     rows = [
-        ("maps k", str(asset.k)),
-        ("spread Δ", f"{spread:.4f} rad ({np.degrees(spread):.1f}°)"),
+        ("method", f"{family_of(asset)}, {name_of(asset)}"),
+        *([("spread Δ", spread_words(spreads))] if len(spreads) else []),
         ("domain", asset.domain),
         ("quantity, transport", f"{asset.manifest['quantity']}, {asset.manifest.get('transport', 'combined')}"),
     ]
     rows += [(name.replace("_", " "), _number(value)) for name, value in source.get("fit", {}).items()]
-    rows += [(name.replace("_", " "), _number(value)) for name, value in source.get("settings", {}).items() if name in ("centers", "ridge")]
+    rows += [
+        (name.replace("_", " "), _number(value))
+        for name, value in source.get("settings", {}).items()
+        if name in ("centers", "ridge", "weighting")
+    ]
     return Table("Fit", ("what", "value"), tuple(rows))
+
+
+def spreads_of(asset: Asset) -> list[float]:
+    """Spreads (rad) of the Gaussians that an asset's functions of direction are made of; none where they are others."""
+    if "light_basis" in asset.manifest:
+        return asset.manifest["light_basis"]["spreads"]
+    return [asset.basis.spread] if asset.manifest["basis"]["kind"] == "gaussian" else []
+
+
+def spread_words(spreads: np.ndarray) -> str:
+    """One spread, or the range of several."""
+    low, high = float(spreads.min()), float(spreads.max())
+    if low == high:
+        return f"{low:.4f} rad ({np.degrees(low):.1f}°)"
+    return f"{low:.4f} to {high:.4f} rad ({np.degrees(low):.1f}° to {np.degrees(high):.1f}°)"
 
 
 def errors(subject: Subject) -> Table:
@@ -108,15 +228,17 @@ def errors(subject: Subject) -> Table:
             )
             rows.append(row)
     peak = subject.evaluation[subject.role]["peak"]
-    return Table(f"Errors (peak {peak:.4g})", ("role", "lights", "rmse", "relative rmse", "psnr", "psnr pooled"), tuple(rows))
+    return Table(f"Errors (peak {peak:.4g})", ("role", "lights", "rmse", "relative rmse", "psnr", "psnr pooled"), tuple(rows), numbers=True)
 
 
 def limits_of(subject: Subject) -> list[str]:
     """What these pictures do not show, said plainly."""
     asset = subject.asset
+    spreads = spreads_of(asset)
+    finest = f"about the spread, {np.degrees(min(spreads)):.0f}°," if spreads else "its highest harmonics"
     notes = [
-        f"The basis is smooth: features of a receiver's answer finer than about the spread, "
-        f"{np.degrees(asset.basis.spread):.0f}°, are blurred. Hard shadow edges soften and ring; sums below 0 are clamped.",
+        f"The functions of direction are smooth: features of a receiver's answer finer than {finest} are blurred. Hard shadow edges soften "
+        "and ring; sums below 0 are clamped.",
         "A point or spot light inside a scene that was captured under directional lights is the article's approximation: every receiver "
         "uses its answer to a light at infinity, so an occluder beyond the lamp still casts its shadow, and the light that "
         "reaches it by bouncing does not know how far the lamp is from the surfaces that bounced it.",
@@ -155,8 +277,7 @@ def _number(value: object) -> str:
 def _markdown(title: str, lead: str, tables: Sequence[Table], pictures: Sequence[Picture], limits: Sequence[str]) -> str:
     lines = [f"# {title}", "", lead, ""]
     for table in tables:
-        lines += [f"## {table.title}", "", "| " + " | ".join(table.columns) + " |", "|" + " --- |" * len(table.columns)]
-        lines += ["| " + " | ".join(row) + " |" for row in table.rows] + [""]
+        lines += [f"## {table.title}", "", *table.markdown(), ""]
     lines += ["## Pictures", ""]
     for picture in pictures:
         image = [] if picture.omitted else [f"![{picture.title}]({picture.file})", ""]
@@ -165,27 +286,16 @@ def _markdown(title: str, lead: str, tables: Sequence[Table], pictures: Sequence
     return "\n".join(lines)
 
 
-def _html(title: str, lead: str, tables: Sequence[Table], pictures: Sequence[Picture], limits: Sequence[str]) -> str:
+def _html(title: str, lead: str, key: str, sections: Sequence[Section]) -> str:
     e = html.escape
-    parts = [f'<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<title>{e(title)}</title>']
-    parts += [
-        f'<meta name="viewport" content="width=device-width">\n<style>{STYLE}</style>',
-        f"<h1>{e(title)}</h1>\n<p>{e(lead)}</p>",
+    parts = [
+        f'<!doctype html>\n<html lang="en">\n<meta charset="utf-8">\n<title>{e(title)}</title>',
+        f'<meta name="viewport" content="width=device-width">\n<style>\n{STYLE.read_text(encoding="utf-8")}</style>',
+        f"<h1>{e(title)}</h1>\n<p>{e(lead)}</p>\n{key}",
     ]
-    for picture in pictures[:1]:
-        parts.append(_figure(picture))
-    for table in tables:
-        head = "".join(f"<th>{e(name)}</th>" for name in table.columns)
-        body = "\n".join("<tr>" + "".join(f"<td>{e(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
-        parts.append(f"<h2>{e(table.title)}</h2>\n<table>\n<tr>{head}</tr>\n{body}\n</table>")
-    parts += [_figure(picture) for picture in pictures[1:]]
-    parts.append("<h2>Limits</h2>\n<ul>\n" + "\n".join(f"<li>{e(note)}</li>" for note in limits) + "\n</ul>\n</html>\n")
-    return "\n".join(parts)
+    parts += [f"<section>\n<h2>{e(section.title)}</h2>\n{section.body}\n</section>" for section in sections]
+    return "\n".join(parts) + "\n</html>\n"
 
 
-def _figure(picture: Picture) -> str:
-    e = html.escape
-    if picture.omitted:
-        return f'<h2>{e(picture.title)}</h2>\n<p class="soft">{e(picture.caption)}</p>'
-    image = f'<a href="{e(picture.file)}"><img src="{e(picture.file)}" alt="{e(picture.title)}"></a>'
-    return f"<h2>{e(picture.title)}</h2>\n<figure>{image}\n<figcaption>{e(picture.caption)}</figcaption></figure>"
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]

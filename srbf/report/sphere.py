@@ -1,4 +1,4 @@
-"""The sphere of directions: basis centers, captured lights, the curve R, and the error of each light."""
+"""The sphere of directions: basis centers, captured lights, and the curve R."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from srbf.rebinning import disc_points
 from srbf.report.canvas import INK, MARGIN, ROLE_COLOR, ROLE_MARKER, RULE, SOFT, Sheet, draw_disc
 from srbf.report.subject import Picture, Subject
 
-CENTERS, CURVE, ERROR = "centers.png", "r_curve.png", "error_by_light.png"
+CENTERS, CURVE = "centers.png", "r_curve.png"
 DISC, TOP = 430, 88
 SIZE = {"train": 14, "validation": 30, "holdout": 30}
 LABELLED = 64  # beyond so many centers their numbers would overlap
@@ -94,73 +94,6 @@ def r_curve(subject: Subject, folder: Path) -> Picture:
         "and below it the error of interpolating them (after figure 9)."
     )
     return Picture(CURVE, "The curve R", caption)
-
-
-def error_by_light(subject: Subject, folder: Path) -> Picture:
-    """Write error_by_light.png: the rmse of each light over the discs of directions, and against elevation."""
-    rmse = {entry["file"]: entry["rmse"] for entry in subject.evaluation["lights"]}
-    errors = np.array([rmse[light.file] for light in subject.capture.lights])
-    directions = subject.capture.directions()
-    halves = [1, -1] if (directions[:, 2] < 0).any() else [1]
-    top = max(float(np.quantile(errors, 0.99)), 1e-9)
-    sheet = Sheet(
-        2 * MARGIN + len(halves) * (DISC + 20) + 90 + 430,
-        TOP + DISC + 50,
-        "Error by light direction",
-        f"rmse of the clamped image over covered receivers, in units of the {subject.capture.quantity}; colours end at the 99 % quantile.",
-    )
-    drawn: Any = None
-    for n, half in enumerate(halves):
-        title = "" if len(halves) == 1 else ("z ≥ 0" if half > 0 else "z < 0 (seen through from above)")
-        axes = disc_axes(sheet, MARGIN + n * (DISC + 20), TOP, title)
-        for role in ROLES:
-            indices = np.array(subject.capture.indices(role), np.int64)
-            indices = indices[on_half(directions[indices], half)] if len(indices) else indices
-            if len(indices):
-                points = disc_points(directions[indices])
-                edge = ROLE_COLOR[role] if role != "train" else "none"
-                drawn = axes.scatter(
-                    *points.T,
-                    c=errors[indices],
-                    s=SIZE[role] * 2,
-                    marker=ROLE_MARKER[role],
-                    cmap="viridis",
-                    vmin=0,
-                    vmax=top,
-                    edgecolors=edge,
-                    lw=1.6,
-                    zorder=3,
-                )
-    x = MARGIN + len(halves) * (DISC + 20)
-    bar = sheet.figure.colorbar(drawn, cax=sheet.axes(x, TOP + 60, 12, DISC - 120))
-    bar.outline.set_visible(False)
-    bar.ax.set_title("rmse", fontsize=8, color=SOFT)
-    axes = sheet.axes(x + 124, TOP + 70, 370, DISC - 110)
-    elevation = np.degrees(np.arcsin(directions[:, 2]))
-    for role in ROLES:
-        chosen = subject.capture.indices(role)
-        if chosen:
-            label = f"{role}: {subject.evaluation[role]['rmse']:.3g}, {subject.evaluation[role]['psnr']:.1f} dB"
-            axes.scatter(
-                elevation[chosen],
-                errors[chosen],
-                s=SIZE[role],
-                c=ROLE_COLOR[role],
-                marker=ROLE_MARKER[role],
-                lw=0,
-                label=label,
-                zorder=3 if role != "train" else 2,
-            )
-    axes.set_ylim(0, 1.08 * max(float(errors.max()), 1e-9))
-    axes.set_xlabel("elevation of the light (degrees)", color=SOFT, fontsize=9)
-    axes.set_ylabel("rmse", color=SOFT, fontsize=9)
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 1.0), fontsize=8, frameon=False, labelcolor=SOFT, handletextpad=0.3)
-    sheet.save(folder / ERROR)
-    caption = (
-        "rmse of every light, over the directions (equal-area, seen from above; coloured edges are lights the fit has not seen) "
-        "and against elevation."
-    )
-    return Picture(ERROR, "Error by light", caption)
 
 
 def disc_axes(sheet: Sheet, x: float, y: float, title: str) -> Any:

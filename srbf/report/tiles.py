@@ -9,6 +9,7 @@ from numpy import ndarray
 from scipy.sparse import csr_array, vstack
 
 from srbf.arrays import Float32
+from srbf.quality import name_of
 from srbf.rebinning import (
     Projection,
     block_means,
@@ -73,7 +74,7 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
         f"One tile a block of receivers ({grid[1]}×{grid[0]}); a tile shows {view}; {gain_text(gain)}.",
     )
     sheet.image(MARGIN, top, wide, tall, paper(before, gain, frame), label=f"captured: {len(train)} lights, nearest one a pixel")
-    sheet.image(MARGIN + wide + gap, top, wide, tall, paper(after, gain, frame), label=f"fitted: {asset.k} coefficients a colour")
+    sheet.image(MARGIN + wide + gap, top, wide, tall, paper(after, gain, frame), label=f"fitted: {name_of(asset)}")
     sheet.text(MARGIN, y - 28, "Single receivers whose answers differ most", size=10, va="center", weight="bold")
     brightest = int(np.argmax(subject.references[:, covered].mean(axis=(1, 2))))
     sheet.image(MARGIN, y, picture_w, picture_h, shown(subject.references[brightest], subject.gain, covered))

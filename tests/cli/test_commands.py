@@ -157,9 +157,14 @@ def test_import_to_relight(tmp_path: Path) -> None:
     assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
 
 
-def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path) -> None:
+def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.report.METHODS", ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
+    page = tmp_path / "page.html"
+    ok("report", asset, capture.folder, "-o", page)
+    assert "data:image/" in page.read_text() and not list(tmp_path.glob(".*"))
+    assert "--force" in refused("report", asset, capture.folder, "-o", page)
 
 
 def test_outputs_that_exist_are_refused_unless_forced(asset: Path, capture: Capture, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from srbf.evaluation import evaluate
 from srbf.image import encode_srgb, read_image, size_of
 from srbf.lights import PointLight
 from srbf.methods import relight
+from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 from srbf.report.canvas import UNCOVERED, shown, shown_signed
@@ -24,11 +26,12 @@ from srbf.report.contact_sheet import difference_gain
 from srbf.report.lamps import demonstration_lamps, stage_of
 from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, farthest_points, gather
 
-ALWAYS = {"contact_sheet.png", "sum_of_maps.png", "centers.png", "r_curve.png", "abrdf_tiles.png", "error_by_light.png"}
+ALWAYS = {"contact_sheet.png", "sum_of_maps.png", "centers.png", "r_curve.png", "abrdf_tiles.png"}
 LAMPS = {"point_light.png", "point_strip.png", "spot_strip.png"}
 MakeCapture = Callable[..., Capture]
 PAGES = {"report.md", "index.html"}
 BYTE = 1 / 255
+COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(scalars=4))
 MAX_ANIMATION_BYTES = 2 << 20
 
 
@@ -41,7 +44,7 @@ class Case:
     evaluation: dict[str, Any]
 
     def write(self, folder: Path, **options: Any) -> Path:
-        return write_report(self.asset, self.capture, folder, evaluation=self.evaluation, **options)
+        return write_report(self.asset, self.capture, folder, evaluation=self.evaluation, **{"methods": COMPARED, **options})
 
 
 def fitted(capture: Capture, k: int = 12) -> Case:
@@ -92,11 +95,14 @@ def test_the_animation_moves_and_is_small(report: Path) -> None:
         assert np.abs(np.asarray(animation.convert("RGB")) - first).mean() > 2
 
 
-def test_the_page_names_what_lies_beside_it_and_nothing_else(report: Path) -> None:
+def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report: Path) -> None:
     html, markdown = (report / "index.html").read_text(), (report / "report.md").read_text()
+    sources = re.findall(r'src="([^"]*)"', html)
+    assert len(sources) > len(ALWAYS | LAMPS) and all(source.startswith("data:image/") for source in sources)
+    assert not re.search(r"href=|url\(|@import|<script|<link", html)
     for name in ALWAYS | LAMPS:
-        assert f'src="{name}"' in html and f"]({name})" in markdown
-    for text in (html, markdown):
+        assert f"]({name})" in markdown and name not in html
+    for text in (re.sub(r"data:[^\"]*", "", html), markdown):
         assert "http" not in text and str(report.parent) not in text
         for fact in (
             "condition number",
@@ -205,3 +211,14 @@ def test_display_values() -> None:
     assert (display[0, 1] == UNCOVERED).all() and (display[1, 0] == UNCOVERED).all() and (display[1, 1] == 0).all()
     assert np.allclose(shown_signed(np.array([[[-2.0, 0, 1]]], np.float32), 2.0), [[[0, 0.5, 0.75]]])
     assert difference_gain(np.full(9, 0.2), 1.0) == 4 and difference_gain(np.zeros(9), 1.0) == 64
+
+
+def test_the_pages_numbers_are_the_evaluations(full: Case, report: Path) -> None:
+    html = (report / "index.html").read_text()
+    for role in ("train", "validation", "holdout"):
+        error = full.evaluation[role]
+        row = next(line for line in html.splitlines() if line.startswith(f"<tr><td>{role}</td>"))
+        for shown_as in (f"{error['rmse']:.4g}", f"{100 * error['relative_rmse']:.2f} %", f"{error['psnr']:.2f} dB"):
+            assert f">{shown_as}<" in row
+    one = next(line for line in html.splitlines() if line.startswith('<tr><td>1</td><td class="number">8</td>'))
+    assert f">{full.evaluation['holdout']['psnr']:.2f} dB<" in one  # every held-out light alone: the same mean by another way

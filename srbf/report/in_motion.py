@@ -1,0 +1,78 @@
+"""How the picture moves while a light sweeps between the captured directions: change, brightness and ghosts, frame by frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from srbf.motion import Motion
+from srbf.report.inline import Table, figure
+from srbf.report.plot import Axis, Plot, spread_labels
+
+WIDTH, HEIGHT = 940.0, 152.0
+RIGHT = 106.0  # for labels at the lines' ends
+
+
+def motion_figures(motion: Motion) -> Table:
+    """The figures of a sweep beside those of a perfect relighter."""
+    rows = (
+        ("change of the relit picture over the reference's", f"{motion.change_ratio:.2f}", "1.00", "above 1 it boils, below 1 it drags"),
+        ("largest single step, likewise", f"{motion.largest_step:.2f}", "1.00", "a pop"),
+        ("largest error of the mean brightness", f"{motion.brightness_error:.1%}", "0.0%", "where the reference is bright"),
+        ("largest ripple of the mean brightness", f"{motion.largest_ripple:.1%}", "0.0%", "pulsing, less any gain or tilt"),
+        ("ghosting of shadow edges", f"{motion.ghosting:.2f}", "0.00", "change at the wrong time over all change of edges"),
+        ("shadow edges' motion kept", f"{motion.edge_kept:.2f}", "1.00", "change at the right time"),
+    )
+    return Table("Figures of the sweep", ("what", "here", "perfect", "meaning"), rows)
+
+
+def motion_curves(motion: Motion) -> str:
+    """Three plots over the frames of all circles, one after the other."""
+    circles, frames = motion.relit_brightness.shape
+    rms = float(np.sqrt((motion.reference_change**2).mean()))
+    mean = float(motion.reference_brightness.mean())
+    edge = float(motion.edge.mean())
+    error = 100 * (motion.relit_brightness - motion.reference_brightness) / mean
+    ghosts = edge > 0
+    plots = [
+        _two("change from frame to frame, over the reference's rms", frames, (motion.relit_change / rms, motion.reference_change / rms)),
+        _two(
+            "mean brightness less the reference's, % of its mean",
+            frames,
+            (100 * motion.ripple, error),
+            ("ripple", "error"),
+            last=not ghosts,
+        ),
+    ]
+    if ghosts:
+        pair = (motion.ghost / edge, motion.edge / edge)
+        plots.append(_two("change at shadow edges, over the mean of passing ones", frames, pair, ("ghosts", "edges passing"), last=True))
+    caption = (
+        f"{circles * frames} frames of one white light along {circles} great circles (upright lines part them), compared with all train "
+        "images interpolated, which is what the capture knows of directions between its own. Ripple is the error less any gain, offset or "
+        "tilt. Ghosts are changes at shadow-edge texels while no edge passes them."
+    )
+    return figure("".join(f'<div class="row">{plot}</div>' for plot in plots), caption)
+
+
+def _two(
+    label: str, frames: int, curves: tuple[np.ndarray, np.ndarray], names: tuple[str, str] = ("relit", "reference"), last: bool = False
+) -> str:
+    """Two curves (C, F or F - 1), the first in colour, labelled at their ends; the frames' axis is named on the `last` plot."""
+    circles, steps = curves[0].shape
+    low, high = (float(f(np.stack(curves))) for f in (np.min, np.max))
+    low = 0.0 if low >= 0 else low - 0.06 * (high - low)
+    height, bottom = (HEIGHT + 16, 40) if last else (HEIGHT, 24)
+    x = Axis(0, circles * frames, "frame" if last else "")
+    plot = Plot(WIDTH, height, x, Axis(low, high + 0.06 * (high - low), label, most=5), (24, RIGHT, bottom, 44))
+    if low < 0:
+        plot.rule(y=0.0, style="axis")
+    for circle in range(circles):
+        if circle:
+            plot.rule(x=circle * frames, style="axis")
+        at = circle * frames + np.arange(steps)
+        plot.line(at, curves[1][circle], "grey")
+        plot.line(at, curves[0][circle], "red")
+    ends = [float(plot.point(0, curve[-1, -1])[1]) for curve in curves]
+    for name, y, color in zip(names, spread_labels(ends, 15), ("red", "grey"), strict=True):
+        plot.text(WIDTH - RIGHT + 8, min(y + 4, height - bottom), name, f"strong {color}")
+    return plot.svg(label)
