@@ -13,7 +13,8 @@ vec3 srbfOctahedralLookup(highp sampler2D wTable, int tableSize, int index, vec2
     ivec2 node = clamp(ivec2(floor(fromMiddle + middle)), ivec2(0), ivec2(tableSize - 2));
     vec2 fraction = fromMiddle - (vec2(node) - middle);
     int columns = textureSize(wTable, 0).x / tableSize;
-    ivec2 at = ivec2(index % columns, index / columns) * tableSize + node;
+    int row = int((float(index) + 0.5) / float(columns));  // exact below 2^22 tiles; GPUs divide integers slowly
+    ivec2 at = ivec2(index - row * columns, row) * tableSize + node;
     vec3 top = mix(texelFetch(wTable, at, 0).rgb, texelFetch(wTable, at + ivec2(1, 0), 0).rgb, fraction.x);
     vec3 bottom = mix(texelFetch(wTable, at + ivec2(0, 1), 0).rgb, texelFetch(wTable, at + ivec2(1, 1), 0).rgb, fraction.x);
     return mix(top, bottom, fraction.y);
