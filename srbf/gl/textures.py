@@ -23,35 +23,46 @@ class AssetTextures:
     """Textures of one asset, each made when first asked for; released with `resources`."""
 
     def __init__(self, context: moderngl.Context, asset: Asset, limits: Limits, resources: ExitStack) -> None:
-        side = max(asset.width, asset.height, len(asset.table))
+        looked_up = [table.shape[:2] for name, table in asset.tables.items() if name != "light_coefficients"]  # these stay on the host
+        side = max(asset.width, asset.height, asset.manifest.get("scalars", 0) + 1, *map(max, looked_up))
         if side > limits.texture_size:
             raise ShaderError(f"expected at most {limits.texture_size} texels a side on this GPU, found {side}; shrink the asset")
         self._context, self._asset, self._limits, self._resources = context, asset, limits, resources
         self._made: dict[str, moderngl.Texture] = {}
-        self._maps: moderngl.TextureArray | None = None
+        self._layers: moderngl.TextureArray | None = None
 
-    def maps(self) -> moderngl.TextureArray:
-        """All K maps as stored, one layer a map. ShaderError where the GPU has fewer layers."""
-        if self._maps is None:
-            asset, most = self._asset, self._limits.array_layers
-            if asset.k > most:
-                raise ShaderError(f"expected at most {most} maps on this GPU (array layers), found {asset.k}; fit with fewer")
-            dtype = _DTYPES[asset.stored.dtype.name]
-            size = (asset.width, asset.height, asset.k)
-            texture = self._context.texture_array(size, 3, np.ascontiguousarray(asset.stored), alignment=1, dtype=dtype)
+    def layers(self) -> moderngl.TextureArray:
+        """All stored layers, maps or planes four by four, as an array. ShaderError where the GPU has fewer layers."""
+        if self._layers is None:
+            stored, most = self._asset.stored, self._limits.array_layers
+            if len(stored) > most:
+                what = "maps" if self._asset.method == "relighting-map" else "images of planes"
+                raise ShaderError(f"expected at most {most} {what} on this GPU (array layers), found {len(stored)}; fit with fewer")
+            layers, height, width, channels = stored.shape
+            dtype = _DTYPES[stored.dtype.name]
+            pixels = np.ascontiguousarray(stored)
+            texture = self._context.texture_array((width, height, layers), channels, pixels, alignment=1, dtype=dtype)
             texture.filter = (self._context.NEAREST, self._context.NEAREST)
             texture.repeat_x = texture.repeat_y = False
             self._resources.callback(texture.release)
-            self._maps = texture
-        return self._maps
+            self._layers = texture
+        return self._layers
 
-    def map(self, i: int) -> moderngl.Texture:
-        """Map i alone as a plain 2D texture, for the article's multi-pass variant."""
-        return self._plain(f"map {i}", self._asset.stored[i])
+    def layer(self, i: int) -> moderngl.Texture:
+        """Layer i alone as a plain 2D texture, for the article's multi-pass variant."""
+        return self._plain(f"layer {i}", self._asset.stored[i])
 
-    def table(self) -> moderngl.Texture:
+    def r_table(self) -> moderngl.Texture:
         """The R table, n x 1."""
-        return self._plain("table", self._asset.table[None, :, None])
+        return self._plain("r_table", self._asset.table[None, :, None])
+
+    def w_table(self) -> moderngl.Texture:
+        """The atlas of light functions over the octahedral square."""
+        return self._plain("w_table", self._asset.tables["w_table"])
+
+    def clusters(self) -> moderngl.Texture:
+        """The cluster of every texel, R8."""
+        return self._plain("cluster_index", self._asset.tables["cluster_index"][..., None])
 
     def positions(self) -> moderngl.Texture:
         """The position map, RGBA32F."""
@@ -64,7 +75,7 @@ class AssetTextures:
 
     @contextmanager
     def passing(self, pixels: ndarray) -> Iterator[moderngl.Texture]:
-        """An image that is there for one pass alone, (H, W, 3)."""
+        """An image that is there for one pass alone, (H, W, C)."""
         height, width, channels = pixels.shape
         texture = self._context.texture((width, height), channels, np.ascontiguousarray(pixels, np.float32), alignment=1, dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)

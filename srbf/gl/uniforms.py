@@ -11,6 +11,7 @@ from srbf.arrays import Float, Float32
 from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE
+VECTORS_KEPT_FREE = 32  # vec4 for the lamp and what drivers take for themselves
 NO_CONE = (3.0, 4.0)  # versines past every angle: the cone of a point light is 1 everywhere
 
 

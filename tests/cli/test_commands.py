@@ -108,6 +108,20 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
     assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
 
 
+@pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
+def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
+    waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
+    capture = make_capture(lambda d: 1 + np.sin(waves @ d), position=plane_positions)
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "--method", *flags)
+    images = []
+    for renderer in ("numpy", "gl"):
+        out = tmp_path / f"{renderer}.exr"
+        ok("relight", tmp_path / "asset", "-o", out, "--directional", "0,1,1", "--point", "0.2,0.1,0.8", "--renderer", renderer)
+        images.append(read_image(out))
+    assert images[0].max() > 0.5
+    np.testing.assert_allclose(*images, atol=1e-5 * 60)  # 1e-5 of the sum of |a w|, below 60 here
+
+
 def test_frames(asset: Path, tmp_path: Path) -> None:
     write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
     spot = {"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, -1], "inner": 0.1, "outer": 0.4}

@@ -137,7 +137,7 @@ def test_more_maps_than_uniforms_hold_take_several_passes(context: Any, make_ass
     asset = make_asset(25, "uint8")
     with Relighter(asset, context=context) as relighter:
         lights = LIGHTS["several"]
-        assert relighter._maps_a_pass() == 10
+        assert relighter._passes.layers_a_pass == 10
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
@@ -239,6 +239,21 @@ def test_lamps_need_positions(context: Any, make_asset: Callable[..., Asset]) ->
             relighter.relight(LIGHTS["spot"])
 
 
+def test_harmonics_relight_far_lights_and_refuse_lamps(context: Any, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(9)
+    asset.manifest["basis"] = {"kind": "spherical-harmonics"}
+    asset.tables.clear()
+    lights = [*LIGHTS["directional"], *LIGHTS["environment"]]
+    with Relighter(asset, context=context) as relighter:
+        bound = np.einsum("khwc,kc->hwc", np.abs(asset.coefficients()), np.abs(folded_weights(asset, lights)))
+        for multipass in (False, True):
+            found = relighter.relight(lights, multipass=multipass)
+            assert found.max() > 0
+            assert (np.abs(found - methods.relight(asset, lights)) <= FLOAT * bound).all()
+        with pytest.raises(InputError, match="found spherical-harmonics; relight them by numpy"):
+            relighter.relight(LIGHTS["spot"])
+
+
 @pytest.mark.parametrize(
     ("limit", "text"), [({"array_layers": 5}, "at most 5 maps .* found 7"), ({"texture_size": 8}, "at most 8 texels a side")]
 )
@@ -257,8 +272,8 @@ def test_wrong_settings_are_refused(context: Any, make_asset: Callable[..., Asse
         Relighter(asset, target="double", context=context)  # type: ignore[arg-type]
     with Relighter(asset, context=context) as relighter, pytest.raises(InputError, match="1 to 8 texture units"):
         relighter.relight([], multipass=True, units=9)
-    asset.manifest["method"] = "eigen-map"
-    with pytest.raises(InputError, match="relighting-map"):
+    asset.manifest["method"] = "hologram"
+    with pytest.raises(InputError, match="relighting-map.*found hologram"):
         Relighter(asset, context=context)
 
 

@@ -17,9 +17,12 @@ from srbf.gl.includes import resolve, resolve_text, shader_root
 ROOT = shader_root()
 STAGES = sorted(path.name for path in (ROOT / "stages").iterdir())
 FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if path.suffix in (".glsl", ".vert", ".frag"))
+# 384 scalars are 96 layers, 192 of the 224 vec4 that ES 3.00 promises; more take passes of some layers
+PLANES: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 384)] + [{"SRBF_SCALARS": 1024, "SRBF_LAYERS": 64}]
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
     "point.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
+    **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
     "accumulate.frag": [{}, *({"SRBF_UNITS": units} for units in range(1, 9))],
 }
 CASES = [(name, defines) for name in STAGES for defines in DEFINES.get(name, [{}])]
@@ -27,9 +30,11 @@ IDS = [f"{name}-{'-'.join(map(str, defines.values()))}" for name, defines in CAS
 VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]}  # -R gathers loose uniforms into a block
 
 
-def test_there_are_the_ten_stages() -> None:
-    lights = ["accumulate.frag", "add.frag", "direct.frag", "directional.frag", "finish.frag", "fullscreen.vert", "point.frag"]
-    assert [*lights, "shadow.vert", "shadow_height.frag", "shadow_tint.frag"] == STAGES
+def test_there_are_the_stages_of_every_method_and_of_shadows() -> None:
+    maps = ["accumulate.frag", "directional.frag", "point.frag"]
+    planes = [f"{method}_{lights}.frag" for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")]
+    shadows = ["direct.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
+    assert sorted([*maps, *planes, *shadows, "add.frag", "finish.frag", "fullscreen.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
@@ -65,9 +70,16 @@ def test_every_file_states_its_licence_and_only_stages_have_a_main(file: str) ->
     assert "texture(" not in text  # implicit derivatives: undefined in loops and branches
 
 
-def test_a_pass_without_its_count_says_which_define_is_missing(context: Any) -> None:
-    with context, pytest.raises(ShaderError, match=r"combine/directional\.glsl:\d+.*SRBF_K"):
-        compile_program(context, resolve("stages/fullscreen.vert"), resolve("stages/directional.frag"))
+@pytest.mark.parametrize(
+    ("stage", "complaint"),
+    [
+        ("directional", r"combine/directional\.glsl:\d+.*SRBF_K"),
+        ("eigen_map_point", r"combine/planes_directional\.glsl:\d+.*SRBF_SCALARS"),
+    ],
+)
+def test_a_pass_without_its_count_says_which_define_is_missing(context: Any, stage: str, complaint: str) -> None:
+    with context, pytest.raises(ShaderError, match=complaint):
+        compile_program(context, resolve("stages/fullscreen.vert"), resolve(f"stages/{stage}.frag"))
 
 
 def test_the_readme_lists_every_file() -> None:
@@ -75,11 +87,11 @@ def test_the_readme_lists_every_file() -> None:
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
-def test_the_readme_snippet_compiles(context: Any, version: str) -> None:
-    snippet = re.search(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)
-    assert snippet is not None
+@pytest.mark.parametrize("which", [0, 1])
+def test_the_readme_snippets_compile(context: Any, version: str, which: int) -> None:
+    snippet = re.findall(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)[which]
     head = "precision highp float; precision highp int;\n"
     tail = "out vec4 o;\nvoid main() { o = relitLightmap(vec2(0.5), vec3(1.0)).rgbr; }\n"
     vertex = resolve("stages/fullscreen.vert", version=version)
     with context:
-        compile_program(context, vertex, resolve_text(head + snippet[1] + tail, "README.md", version=version)).release()
+        compile_program(context, vertex, resolve_text(head + snippet + tail, "README.md", version=version)).release()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,14 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from srbf import scalar_planes
 from srbf.asset import Asset
+from srbf.basis import octahedral_table
 from srbf.basis.gaussian import lookup, r_table
 from srbf.direct import shadow
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import lamp_uniforms, padded
 from srbf.lights import DirectionalLight, PointLight, SpotLight, attenuation, spot_cone
 from srbf.methods.relighting_map import linear_response, receiver_weights, relight
-from srbf.sphere import normalize
+from srbf.receivers import light_vectors
+from srbf.scalar_planes import first_function
+from srbf.sphere import normalize, octahedral_encode
 
 ROOT = shader_root()
 FUNCTIONS = sorted(p.relative_to(ROOT).as_posix() for p in ROOT.rglob("*.glsl") if p.parent.name != "stages")
@@ -33,12 +38,13 @@ UNIT = 4 * EPS  # a few roundings of numbers near 1
 SUM = 1e-5  # the contract, of sum |c_i R_i|
 
 N = 97
+M = 64  # texels a row of planes: their centres are exact in float32
 K = 5
 SPOT = SpotLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.7, falloff="inverse-square")
 POINT = PointLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, radius=0.7)
 
 Evaluate = Callable[..., np.ndarray]
-Twin = Callable[[Evaluate, Callable[..., Asset]], None]
+Twin = Callable[..., None]
 TWINS: dict[str, Twin] = {}
 
 
@@ -286,10 +292,143 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
         np.testing.assert_array_less(np.abs(found - linear_response(asset, [light])[0]), SUM * bound)
 
 
+@twin("basis/octahedral_encode.glsl")
+def _(evaluate: Evaluate) -> None:
+    axes = np.concatenate([np.eye(3), -np.eye(3), [[1, 1, 0], [-1, 1, 0], [0, -1, -1], [1, 0, -1], [0, 0, 0]]])
+    directions = np.concatenate([units(N, 20) * np.geomspace(1e-3, 1e3, N)[:, None], axes]).astype(np.float32)
+    found = evaluate("basis/octahedral_encode.glsl", "vec4(srbfOctahedralEncode(a.xyz), 0.0, 0.0)", vec4(directions))[:, :2]
+    np.testing.assert_allclose(found, np.stack(octahedral_encode(directions), axis=1), atol=UNIT)
+
+
+@twin("basis/octahedral_lookup.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Nodes of random numbers: a place that is off by one single-precision step moves the result by as much of their difference."""
+    size, columns, count = 9, 3, 7
+    atlas = np.random.default_rng(21).uniform(-1, 1, (3 * size, columns * size, 3)).astype(np.float16)
+    directions = np.concatenate([units(N, 22), np.eye(3), -np.eye(3)]).astype(np.float32)
+    index = np.arange(len(directions)) % count
+    expression = f"vec4(srbfOctahedralLookup(wTable, {size}, int(b.x), srbfOctahedralEncode(a.xyz)), 0.0)"
+    both = "basis/octahedral_encode.glsl", "basis/octahedral_lookup.glsl"
+    found = evaluate(
+        both[0],
+        expression,
+        vec4(directions),
+        vec4(index),
+        declarations=f'#include "{both[1]}"',
+        images={"wTable": atlas.astype(np.float32)},
+    )[:, :3]
+    expected = octahedral_table.lookup(atlas, size, columns, index, directions)
+    np.testing.assert_allclose(found, expected, atol=UNIT + 2 * EPS * size)
+
+
+@twin("combine/decode_planes.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(6, None, "uint8", 1, M)
+    for i in range(2):
+        rows = [np.broadcast_to(x, (M, 4)) for x in (asset.stored[i, 0] / 255, asset.scale[i], asset.bias[i])]
+        found = evaluate("combine/decode_planes.glsl", "srbfDecodePlanes(a, b, c)", *rows)
+        np.testing.assert_allclose(found, asset.coefficients()[i, 0], atol=UNIT * float((asset.scale[i] + np.abs(asset.bias[i])).max()))
+    assert (found[:, 2:] == 0).all()  # past the last scalar
+
+
+@twin("combine/cluster_index.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(3, 256, "float", 1, 256)
+    bytes_ = np.arange(256, dtype=np.uint8)
+    asset.tables["cluster_index"] = bytes_[None]
+    expression = "vec4(srbfClusterIndex(clusters, ivec2(a.x, 0)))"
+    images = {"clusters": (bytes_ / np.float32(255))[None, :, None]}
+    found = evaluate("combine/cluster_index.glsl", expression, vec4(bytes_), images=images)[:, 0]
+    assert (found * (asset.scalars + 1) == first_function(asset, slice(None))[0]).all()
+
+
+SUNS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
+
+
+def _plane_uploads(asset: Asset) -> dict[str, Any]:
+    """Everything that the plane functions read, for one row of M receivers, decoded from floats that are stored / 255."""
+    weights = scalar_planes.folded_weights(asset, SUNS).reshape(asset.clusters, -1, 3)
+    return {
+        "images": {
+            "planes": asset.stored.astype(np.float32) / 255,
+            "weights": np.pad(weights, ((0, 0), (0, 0), (0, 1))),
+            "wTable": asset.tables["w_table"].astype(np.float32),
+            "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
+        },
+        "arrays": {"scale": asset.scale, "bias": asset.bias},
+        "defines": {"SRBF_SCALARS": asset.scalars},
+        "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS];",
+    }
+
+
+def _equals_planes(evaluate: Evaluate, file: str, call: str, asset: Asset, light: PointLight | None, *rows: np.ndarray) -> None:
+    """`call` against linear_response, within the contract's share of |w_0| + sum (|stored scale| + |bias|) |w_j|."""
+    found = evaluate(file, f"vec4({call}, 0.0)", *rows, **_plane_uploads(asset))[:, :3]
+    lights: list[Any] = SUNS if light is None else [light]
+    bias = scalar_planes.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
+    planes = scalar_planes.planes_of(asset.coefficients(), asset.scalars)[:, 0]
+    terms = np.concatenate([np.ones((1, M)), np.abs(planes) + 2 * bias])  # (S + 1, M)
+    function = first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
+    if light is None:
+        weights = scalar_planes.folded_weights(asset, lights)[function]
+    else:
+        positions = asset.images["position"][0]
+        unit, _ = light_vectors(light, positions)
+        strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)  # without the cone
+        size, columns = asset.manifest["w_table"]["size"], asset.manifest["w_table"]["columns"]
+        places = np.broadcast_to(unit[:, None], (*function.shape, 3))
+        weights = octahedral_table.lookup(asset.tables["w_table"], size, columns, function, places) * strength[:, None, None] * light.color
+    bound = np.einsum("fn,nfc->nc", terms, np.abs(weights))
+    assert (np.abs(found - scalar_planes.linear_response(asset, lights)[0]) <= SUM * bound).all()
+    assert (bound > 0).any()
+
+
+@twin("combine/planes_directional.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    call = "srbfCombinePlanesDirectional(planes, uv, 0, weights, int(a.x), scale, bias)"
+    asset = make_planes(K, 7, "uint8", 1, M)
+    _equals_planes(evaluate, "combine/planes_directional.glsl", call, asset, None, vec4(asset.tables["cluster_index"][0]))
+
+
+@twin("combine/planes_point.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, 7, "uint8", 1, M)
+    light = replace(POINT, color=(1.0, 1.0, 1.0))
+    unit, strength = light_vectors(light, asset.images["position"][0])
+    call = "b.x * srbfCombinePlanesPoint(planes, uv, 0, wTable, 17, int(a.w), a.xyz, scale, bias)"
+    rows = vec4(unit, asset.tables["cluster_index"][0]), vec4(strength)
+    _equals_planes(evaluate, "combine/planes_point.glsl", call, asset, light, *rows)
+
+
+@twin("methods/eigen_map.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset, file = make_planes(K, None, "uint8", 1, M), "methods/eigen_map.glsl"
+    positions = vec4(asset.images["position"][0])
+    _equals_planes(evaluate, file, "srbfEigenMapDirectional(planes, uv, 0, weights, scale, bias)", asset, None, positions)
+    for light in (POINT, SPOT):
+        call = f"srbfEigenMapPoint(planes, uv, 0, wTable, 17, scale, bias, a.xyz, {lamp_expression(light)})"
+        _equals_planes(evaluate, file, call, asset, light, positions)
+
+
+@twin("methods/clustered_eigen_map.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    """By texel, and by the place of a texel's centre; what lies between is tested against numpy's filtered picture elsewhere."""
+    asset, file = make_planes(K, 7, "uint8", 1, M), "methods/clustered_eigen_map.glsl"
+    positions = vec4(asset.images["position"][0])
+    for name, place in (("", "at"), ("Filtered", "uv")):
+        call = f"srbfClusteredDirectional{name}(planes, clusters, {place}, 0, weights, scale, bias)"
+        _equals_planes(evaluate, file, call, asset, None, positions)
+        for light in (POINT, SPOT):
+            lamp = f"scale, bias, a.xyz, {lamp_expression(light)}"
+            call = f"srbfClusteredPoint{name}(planes, clusters, {place}, 0, wTable, 17, {lamp})"
+            _equals_planes(evaluate, file, call, asset, light, positions)
+
+
 @pytest.mark.parametrize("file", FUNCTIONS)
-def test_the_shader_function_equals_its_twin(file: str, evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+def test_the_shader_function_equals_its_twin(file: str, request: pytest.FixtureRequest) -> None:
     assert file in TWINS, f"{file} has no twin test: register one here"
-    TWINS[file](evaluate, make_asset)
+    test = TWINS[file]
+    test(*(request.getfixturevalue(name) for name in inspect.signature(test).parameters))
 
 
 def test_every_twin_test_has_its_file() -> None:

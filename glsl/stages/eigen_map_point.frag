@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// One point or spot light a pass over scalar planes, each receiver with its own light vector and weights.
+// Blend ONE, ONE into a float target.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+
+#include "methods/eigen_map.glsl"
+
+uniform sampler2DArray planes;
+uniform sampler2D positions;
+uniform sampler2D wTable;
+uniform int tableSize;
+uniform int firstLayer;
+uniform vec4 scale[SRBF_LAYERS];
+uniform vec4 bias[SRBF_LAYERS];
+uniform SrbfLamp lamp;
+
+layout(location = 0) out vec4 answer;
+
+void main() {
+    vec2 uv = gl_FragCoord.xy / vec2(textureSize(planes, 0).xy);
+    vec3 receiver = texelFetch(positions, ivec2(gl_FragCoord.xy), 0).xyz;
+    answer = vec4(srbfEigenMapPoint(planes, uv, firstLayer, wTable, tableSize, scale, bias, receiver, lamp), 1.0);
+}
