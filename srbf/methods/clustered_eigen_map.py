@@ -30,7 +30,7 @@ __all__ = ["ClusteredEigenMap", "directional_responses", "folded_weights", "line
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_A_CLUSTER = 96
-FEATURES = 96  # numbers a texel by which it finds its cluster
+FEATURES = 48  # numbers a texel by which it finds its cluster
 
 
 @dataclass(frozen=True)

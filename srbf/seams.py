@@ -1,0 +1,106 @@
+"""Whether clusters show: error, and jumps of error, across their borders against those inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float32
+from srbf.asset import Asset
+from srbf.capture import COVERED, Capture, Role
+from srbf.errors import InputError
+from srbf.methods import directional_responses
+
+
+@dataclass(frozen=True)
+class Seams:
+    """Root mean squares over lights of one role, colours and pairs of neighbouring covered texels; e = relit - reference, clamped at 0.
+
+    border       share of the pairs whose texels are of different clusters
+    error        rms of e on either side of a border, and on the texels of the pairs next to them within one cluster
+    jump         rms of e's change over a border, and over those next pairs
+    contrast     rms of the reference's own change over a border: what hides a jump
+
+    A seam is a jump over the border beyond what e changes by from texel to texel just beside it: `jump_ratio` near 1 is none.
+    """
+
+    border: float
+    error_at_border: float
+    error_beside: float
+    jump_at_border: float
+    jump_beside: float
+    contrast_at_border: float
+
+    @property
+    def error_ratio(self) -> float:
+        """Error at the borders over error beside them."""
+        return self.error_at_border / max(self.error_beside, 1e-30)
+
+    @property
+    def jump_ratio(self) -> float:
+        """Jump of the error over a border, over its change beside it."""
+        return self.jump_at_border / max(self.jump_beside, 1e-30)
+
+
+def seams(asset: Asset, capture: Capture, role: Role = "holdout", index: ndarray | None = None) -> Seams:
+    """Seams of a clustered asset; with another's `cluster_index` (H, W) of any asset, at the same places, for comparison.
+
+    InputError where there are no clusters, or no lights of the role.
+    """
+    clusters = asset.tables.get("cluster_index") if index is None else index
+    if clusters is None:
+        raise InputError(f"expected an asset with clusters, found {asset.method}")
+    lights = capture.indices(role)
+    if not lights:
+        raise InputError(f"expected {role} lights in {capture.folder}, found none")
+    covered = capture.coverage() >= COVERED
+    pairs = [_masks(clusters, covered, axis) for axis in (0, 1)]
+    sums = np.zeros(5)
+    for first, block in capture.blocks(lights):
+        relit = np.maximum(directional_responses(asset, capture.directions(lights[first : first + len(block)])), 0)
+        true = np.maximum(block.reshape(relit.shape), 0)
+        for error, reference in zip(relit - true, true, strict=True):
+            for axis, (border, beside) in enumerate(pairs):
+                sums += [
+                    _ends(error, axis, border),
+                    _ends(error, axis, beside),
+                    _changes(error, axis, border),
+                    _changes(error, axis, beside),
+                    _changes(reference, axis, border),
+                ]
+    at, next_to = (sum(int(mask[k].sum()) for mask in pairs) for k in (0, 1))
+    every = sum(int(_both(covered, axis).sum()) for axis in (0, 1))
+    counts = 3 * len(lights) * np.maximum([2 * at, 2 * next_to, at, next_to, at], 1)
+    return Seams(at / max(every, 1), *np.sqrt(sums / counts).tolist())
+
+
+def _masks(clusters: ndarray, covered: Bool[ndarray, "H W"], axis: int) -> tuple[ndarray, ndarray]:
+    """Pairs along an axis over a border, and those within a cluster that share a texel with such a pair."""
+    near, far = _sides(clusters, axis)
+    both = _both(covered, axis)
+    border = (near != far) & both
+    beside = np.zeros_like(border)
+    before, after = _sides(border, axis)
+    _sides(beside, axis)[1][...] |= before
+    _sides(beside, axis)[0][...] |= after
+    return border, beside & ~border & both
+
+
+def _sides(image: ndarray, axis: int) -> tuple[ndarray, ndarray]:
+    return (image[:-1], image[1:]) if axis == 0 else (image[:, :-1], image[:, 1:])
+
+
+def _both(covered: Bool[ndarray, "H W"], axis: int) -> ndarray:
+    near, far = _sides(covered, axis)
+    return near & far
+
+
+def _ends(image: Float32[ndarray, "H W 3"], axis: int, mask: ndarray) -> float:
+    return sum(float(np.square(side[mask], dtype=np.float64).sum()) for side in _sides(image, axis))
+
+
+def _changes(image: Float32[ndarray, "H W 3"], axis: int, mask: ndarray) -> float:
+    near, far = _sides(image, axis)
+    return float(np.square(far[mask] - near[mask], dtype=np.float64).sum())
