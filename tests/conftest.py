@@ -40,12 +40,17 @@ def make_capture(tmp_path: Path) -> Callable[..., Capture]:
         encoding: str = "float",
         name: str = "capture",
         directions: np.ndarray | None = None,
+        validation: int = 0,
         **images: np.ndarray,
     ) -> Capture:
         folder = tmp_path / name
         (folder / "lights").mkdir(parents=True)
         train = point_set("hammersley", lights, domain) if directions is None else directions
-        groups = [("train", train), ("holdout", random_directions(holdout, domain, np.random.default_rng(7)))]
+        groups = [
+            ("train", train),
+            ("validation", random_directions(validation, domain, np.random.default_rng(8))),
+            ("holdout", random_directions(holdout, domain, np.random.default_rng(7))),
+        ]
         entries = []
         for role, chosen in groups:
             for direction in chosen:

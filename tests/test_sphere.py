@@ -7,12 +7,15 @@ import pytest
 
 from srbf.errors import InputError
 from srbf.sphere import (
+    all_around,
     domain_of,
     fibonacci,
     hammersley,
     mean_spacing,
     nearest_neighbour_angles,
     normalize,
+    octahedral_decode,
+    octahedral_encode,
     point_set,
     random_directions,
     van_der_corput,
@@ -98,3 +101,33 @@ def test_mean_spacing_is_the_pitch_of_a_lattice() -> None:
 def test_mean_spacing_of_a_set_is_the_root_of_a_points_area(kind: str, domain: str, area: float) -> None:
     for n in (200, 400, 1000):
         assert mean_spacing(point_set(kind, n, domain)) == pytest.approx(np.sqrt(area / n), rel=0.05)
+
+
+def test_octahedral_coordinates_round_trip() -> None:
+    directions = np.concatenate([random_directions(500, "sphere", np.random.default_rng(1)), np.eye(3), -np.eye(3)])
+    u, v = octahedral_encode(directions)
+    assert (np.abs(u) <= 1).all() and (np.abs(v) <= 1).all()
+    np.testing.assert_allclose(octahedral_decode(u, v), directions, atol=ROUNDING)
+    np.testing.assert_allclose(octahedral_encode(5 * directions), (u, v), atol=ROUNDING)  # of any length
+    above = directions[:, 2] > 1e-9
+    np.testing.assert_array_equal((np.abs(u) + np.abs(v))[above] < 1, True)
+    np.testing.assert_array_equal((np.abs(u) + np.abs(v))[directions[:, 2] < -1e-9] > 1, True)
+    assert [float(t) for t in octahedral_encode(np.zeros(3))] == [0, 0]
+
+
+def test_octahedral_decode_is_continuous_across_the_fold() -> None:
+    t = np.linspace(-0.99, 0.99, 50)
+    for inner, outer in (
+        ((1 - np.abs(t)) * 0.999999, (1 - np.abs(t)) * 1.000001),
+        ((np.abs(t) - 1) * 0.999999, (np.abs(t) - 1) * 1.000001),
+    ):
+        np.testing.assert_allclose(octahedral_decode(t, inner), octahedral_decode(t, outer), atol=1e-5)
+
+
+@pytest.mark.parametrize("domain", ["sphere", "hemisphere"])
+def test_all_around_is_uniform_on_its_domain(domain: str) -> None:
+    points = all_around(domain)
+    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1, atol=ROUNDING)
+    np.testing.assert_allclose(points.mean(axis=0), [0, 0, 0.5 if domain == "hemisphere" else 0], atol=0.01)
+    np.testing.assert_allclose(points.T @ points / len(points), np.eye(3) / 3, atol=0.01)  # second moments, on either domain
+    assert (points[:, 2] > 0).all() == (domain == "hemisphere")

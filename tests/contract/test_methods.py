@@ -1,4 +1,4 @@
-"""What every method owes: linearity, no light, the clamp, determinism, order of receivers, dilation, the disk."""
+"""What every method owes: linearity, no light, the clamp, determinism, order of receivers, dilation, the disk, a place in the world."""
 
 from __future__ import annotations
 
@@ -8,11 +8,26 @@ import numpy as np
 import pytest
 
 from srbf.asset import Asset
-from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
-from srbf.methods import relight
-from srbf.methods.relighting_map import RelightingMap, linear_response
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, environment_samples
+from srbf.methods import directional_responses, folded_weights, linear_response, relight
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
+from srbf.methods.eigen_map import EigenMap
+from srbf.methods.relighting_map import RelightingMap
+from srbf.sphere import random_directions
 
-METHODS = [RelightingMap(k=15), RelightingMap(k=9, centers="hammersley3", spread="min", ridge=0.01)]
+Method = RelightingMap | EigenMap | ClusteredEigenMap
+
+METHODS: dict[str, Method] = {
+    "maps": RelightingMap(k=15),
+    "maps-hammersley3": RelightingMap(k=9, centers="hammersley3", spread="min", ridge=0.01),
+    "maps-bytes": RelightingMap(k=12, encoding="uint8"),
+    "maps-harmonics": RelightingMap(k=9, basis="spherical-harmonics", encoding="float"),
+    "eigen": EigenMap(scalars=6),
+    "eigen-float": EigenMap(scalars=5, encoding="float", spread=0.4, ridge=0.01),
+    "eigen-bytes": EigenMap(scalars=8, encoding="uint8", weighting="relative"),
+    "clustered": ClusteredEigenMap(clusters=3, scalars=4),
+    "clustered-bytes": ClusteredEigenMap(clusters=4, scalars=3, encoding="uint8", spread=0.5, ridge=0.1),
+}
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
 
 
@@ -21,12 +36,12 @@ def lambert(shape: tuple[int, int]):
     return lambda direction: np.broadcast_to(max(0.0, direction[2]) * np.array([0.8, 0.5, 0.2]), (*shape, 3))
 
 
-@pytest.fixture(params=METHODS, ids=lambda method: f"{type(method).__name__}-{method.k}")
-def method(request: pytest.FixtureRequest) -> RelightingMap:
-    return request.param
+@pytest.fixture(params=list(METHODS))
+def method(request: pytest.FixtureRequest) -> Method:
+    return METHODS[request.param]
 
 
-LIGHTS = [
+LIGHTS: list[Light] = [
     DirectionalLight((0.3, 0.2, 0.9), (1, 0.5, 0.2)),
     PointLight((0.2, 0.1, 0.7), (0.4, 1, 0.3), a0=0.8),
     SpotLight((0, -0.5, 1), (1, 1, 0.5), direction=(0, 0.5, -1), inner=0.2, outer=0.7),
@@ -34,21 +49,26 @@ LIGHTS = [
 ]
 
 
+FITTED: dict[Method, Asset] = {}  # the fit is the same for all tests that read it
+
+
 @pytest.fixture
 def asymmetric(make_capture, plane_positions, method) -> Asset:
     """Random, direction-dependent answers with holes, an emissive ambient and curved positions."""
-    rng = np.random.default_rng(5)
-    waves = rng.normal(size=(10, 14, 3, 3))
-    coverage = (rng.random((10, 14)) > 0.2).astype(np.float32)
-    positions = plane_positions.copy()
-    positions[..., 2] = rng.random((10, 14)) * 0.2
-    capture = make_capture(
-        lambda d: 1 + np.sin(waves @ d),
-        position=positions,
-        coverage=coverage,
-        ambient=rng.random((10, 14, 3)).astype(np.float32),
-    )
-    return method.encode(capture)
+    if method not in FITTED:
+        rng = np.random.default_rng(5)
+        waves = rng.normal(size=(10, 14, 3, 3))
+        coverage = (rng.random((10, 14)) > 0.2).astype(np.float32)
+        positions = plane_positions.copy()
+        positions[..., 2] = rng.random((10, 14)) * 0.2
+        capture = make_capture(
+            lambda d: 1 + np.sin(waves @ d),
+            position=positions,
+            coverage=coverage,
+            ambient=rng.random((10, 14, 3)).astype(np.float32),
+        )
+        FITTED[method] = method.encode(capture)
+    return FITTED[method]
 
 
 @pytest.mark.parametrize("light", LIGHTS)
@@ -71,14 +91,72 @@ def test_negative_sums_are_clamped_before_ambient(asymmetric: Asset) -> None:
     np.testing.assert_array_equal(relight(asymmetric, [dark]) >= asymmetric.images["ambient"], True)
 
 
-def test_permuting_receivers_permutes_the_maps(make_capture, method) -> None:
+def test_many_directions_at_once_are_each_by_itself(asymmetric: Asset) -> None:
+    directions = random_directions(7, "sphere", np.random.default_rng(0))
+    together = directional_responses(asymmetric, directions)
+    apart = np.stack([linear_response(asymmetric, [DirectionalLight(tuple(d))]) for d in directions])
+    np.testing.assert_allclose(together, apart, atol=FLOAT32 * np.abs(apart).max() * 10)
+
+
+def test_an_environment_is_the_sum_of_its_texels(asymmetric: Asset) -> None:
+    sky = EnvironmentLight(np.random.default_rng(1).random((6, 12, 3)).astype(np.float32), (1, 2, 0.5))
+    directions, solid_angle = environment_samples(sky.image, asymmetric.domain, np.eye(3))
+    suns: list[Light] = [
+        DirectionalLight(tuple(directions[i, j]), tuple(sky.image[i, j].astype(np.float64) * solid_angle[i, j] * sky.color))
+        for i, j in np.argwhere(solid_angle > 0)
+    ]
+    expected = folded_weights(asymmetric, suns)
+    np.testing.assert_allclose(folded_weights(asymmetric, [sky]), expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_array_equal(linear_response(asymmetric, [sky]).any(), True)
+
+
+def test_rows_at_a_time_make_no_difference(asymmetric: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
+    directions = random_directions(3, "hemisphere", np.random.default_rng(2))
+    whole, many = linear_response(asymmetric, LIGHTS), directional_responses(asymmetric, directions)
+    for module in ("receivers", "scalar_planes", "methods.relighting_map"):
+        monkeypatch.setattr(f"srbf.{module}.CHUNK", 3 * 14)  # does not divide the 10 rows
+    np.testing.assert_allclose(linear_response(asymmetric, LIGHTS), whole, atol=FLOAT32 * np.abs(whole).max() * 10)
+    np.testing.assert_allclose(directional_responses(asymmetric, directions), many, atol=FLOAT32 * np.abs(many).max() * 10)
+
+
+def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
+    at, size = np.array([5.0, -2.0, 1.0]), 2.0
+    to_asset = np.eye(4)
+    to_asset[:3, :3], to_asset[:3, 3] = turn.T / size, -turn.T @ at / size
+    instance = replace(asymmetric, manifest={**asymmetric.manifest, "asset_from_world": to_asset.tolist()})
+    sun, lamp, spot, sky = LIGHTS
+
+    def placed(light: PointLight) -> PointLight:
+        return replace(light, position=tuple(size * turn @ light.position + at), a0=size * light.a0, radius=size * light.radius)
+
+    moved: list[Light] = [
+        replace(sun, direction=tuple(turn @ sun.direction)),
+        placed(lamp),
+        replace(placed(spot), direction=tuple(turn @ spot.direction)),
+        replace(sky, image=np.roll(sky.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
+    ]
+    here = linear_response(asymmetric, LIGHTS)
+    np.testing.assert_allclose(linear_response(instance, moved), here, atol=FLOAT32 * np.abs(here).max() * 10)
+
+
+def test_permuting_receivers_permutes_the_picture(make_capture, method) -> None:
+    if isinstance(method, ClusteredEigenMap):
+        method = replace(method, clusters=1)  # where clusters start depends on the order of the texels
     rng = np.random.default_rng(8)
     waves = rng.normal(size=(6, 5, 3, 3))
     order = rng.permutation(30)
     shuffled = waves.reshape(30, 3, 3)[order].reshape(6, 5, 3, 3)
     one = method.encode(make_capture(lambda d: np.sin(waves @ d), name="a"))
     two = method.encode(make_capture(lambda d: np.sin(shuffled @ d), name="b"))
-    np.testing.assert_array_equal(one.stored.reshape(-1, 30, 3)[:, order], two.stored.reshape(-1, 30, 3))
+    if isinstance(method, RelightingMap):
+        atol = FLOAT32 if method.encoding == "float" else 0
+        np.testing.assert_allclose(two.stored.reshape(-1, 30, 3), one.stored.reshape(-1, 30, 3)[:, order], rtol=0, atol=atol)
+        return
+    directions = random_directions(5, "hemisphere", rng)
+    answers = directional_responses(one, directions).reshape(5, 30, 3)[:, order]
+    step = {"half": 2.0**-11, "float": 1e-4, "uint8": 1 / 255}[method.encoding]  # axes turn by rounding, and planes with them
+    np.testing.assert_allclose(directional_responses(two, directions).reshape(5, 30, 3), answers, atol=4 * step * np.abs(answers).max())
 
 
 def test_uncovered_texels_hold_their_nearest_covered_neighbour(asymmetric: Asset) -> None:
@@ -87,22 +165,39 @@ def test_uncovered_texels_hold_their_nearest_covered_neighbour(asymmetric: Asset
         nearest = np.linalg.norm(covered - [row, column], axis=1)
         candidates = covered[nearest == nearest.min()]
         stored = asymmetric.stored[:, row, column]
-        assert any((asymmetric.stored[:, r, c] == stored).all() for r, c in candidates)
+        index = asymmetric.tables.get("cluster_index", np.zeros_like(asymmetric.covered))
+        assert any((asymmetric.stored[:, r, c] == stored).all() and index[r, c] == index[row, column] for r, c in candidates)
 
 
 @pytest.mark.parametrize("encoding", ["half", "float", "uint8"])
-def test_disk_round_trip_is_exact(make_capture, method, tmp_path, encoding: str) -> None:
-    asset = replace(method, encoding=encoding).encode(make_capture(lambert((7, 9))))
+@pytest.mark.parametrize("name", ["maps", "eigen", "clustered"])
+def test_disk_round_trip_is_exact(make_capture, name: str, tmp_path, encoding: str) -> None:
+    scale = np.random.default_rng(3).random((7, 9, 1))  # Lambert alone is one scalar
+    asset = replace(METHODS[name], encoding=encoding).encode(
+        make_capture(lambda d: lambert((7, 9))(d) * scale + np.maximum(0, d[0] - scale))
+    )
     asset.save(tmp_path / "asset")
     again = Asset.open(tmp_path / "asset")
     np.testing.assert_array_equal(again.stored, asset.stored)
-    np.testing.assert_array_equal(again.table, asset.table)
+    assert set(again.tables) == set(asset.tables)
+    for name, table in asset.tables.items():
+        assert again.tables[name].dtype == table.dtype
+        np.testing.assert_array_equal(again.tables[name], table)
     np.testing.assert_allclose(again.coefficients(), asset.coefficients(), rtol=1e-6)
     assert again.manifest == asset.manifest
+    np.testing.assert_array_equal(relight(again, LIGHTS[:1]), relight(asset, LIGHTS[:1]))
 
 
 def test_fit_is_deterministic(make_capture, method) -> None:
     capture = make_capture(lambert((5, 5)))
     one, two = method.encode(capture), method.encode(capture)
     np.testing.assert_array_equal(one.stored, two.stored)
+    for name, table in one.tables.items():
+        np.testing.assert_array_equal(two.tables[name], table)
     assert one.manifest == two.manifest
+
+
+def test_what_a_capture_says_of_itself_goes_along(asymmetric: Asset, method) -> None:
+    assert asymmetric.encoding == method.encoding
+    assert set(asymmetric.images) == {"position", "coverage", "ambient"}
+    assert asymmetric.domain == "hemisphere" and asymmetric.manifest["source"]["fit"]["train_lights"] == 60
