@@ -174,3 +174,38 @@ def test_facts(saved: Path, capture: Capture) -> None:
     assert asset["bytes_per_texel"]["directional"] == 4 * 4 * 2  # four maps, RGB counted as RGBA, half
     assert asset["resident_bytes"] == 48 * 32 + Asset.open(saved).table.nbytes
     assert describe(capture.folder)["lights"] == {"train": 20, "validation": 0, "holdout": 3}
+
+
+def test_kept_captures_and_other_roles_are_the_images_on_disk(make_capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(9)
+    coverage = (rng.random((6, 8)) > 0.3).astype(np.float32)
+    capture = make_capture(lambda d: rng.normal(size=(6, 8, 3)), lights=10, holdout=3, validation=2, encoding="half", coverage=coverage)
+    whole, texels = capture.kept(), np.array([40, 3, 17])
+    some = capture.kept(texels)
+    roles = ["holdout", None, *["train"] * 8, None, "validation", None, "train", "train"]
+    assert (some.width, some.height) == (3, 1) and "position" not in some.manifest
+    np.testing.assert_array_equal(some.coverage()[0], coverage.ravel()[texels])
+    np.testing.assert_array_equal(whole.coverage(), coverage)
+    indices = [12, 0, 14]
+    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 4 * 6 * 8 * 12)
+    for again in (whole, capture.with_roles(roles), whole.with_roles(roles), some.with_roles(roles)):
+        kept = [i for i, role in enumerate(roles) if role] if len(again.lights) < 15 else list(range(15))
+        assert [light.direction for light in again.lights] == [capture.lights[i].direction for i in kept]
+        chosen = slice(None) if again.width == 8 else texels
+        images = [capture.image(i).reshape(-1, 3)[chosen] for i in kept]
+        wanted = [i for i in indices if i < len(kept)]
+        np.testing.assert_array_equal([again.image(i).reshape(-1, 3) for i in wanted], [images[i] for i in wanted])
+        streamed = np.concatenate([block.copy() for _, block in again.stream(range(len(kept)))])
+        np.testing.assert_array_equal(streamed, images)
+        blocks = np.concatenate([block.copy() for _, block in again.blocks(range(len(kept)))])
+        np.testing.assert_array_equal(blocks, images)
+        picked = np.array([2, 0])
+        np.testing.assert_array_equal(again.sample(wanted, picked), np.stack([images[i][picked] for i in wanted], axis=1))
+    changed = capture.with_roles(roles)
+    assert (changed.indices("holdout"), changed.indices("validation"), len(changed.indices("train"))) == ([0], [9], 10)
+    assert capture.indices("holdout") == [12, 13, 14]  # as it was
+
+
+def test_roles_are_one_a_light(capture: Capture) -> None:
+    assert capture.with_roles([light.role for light in capture.lights]).lights == capture.lights
+    assert not capture.with_roles([None] * 23).lights

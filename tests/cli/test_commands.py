@@ -289,3 +289,67 @@ def test_the_library_needs_numpy_and_scipy_alone() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 30
+
+
+@pytest.mark.parametrize(
+    "flags",
+    [
+        ["--method", "eigen-map", "--scalars", "6", "--weighting", "relative", "--encoding", "uint8"],
+        ["--method", "clustered-eigen-map", "--scalars", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
+        ["--method", "relighting-map", "-k", "9", "--basis", "spherical-harmonics"],
+        ["--method", "relighting-map", "-k", "6", "--basis", "ptm", "--ridge", "0.1"],
+    ],
+)
+def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, flags: list[str]) -> None:
+    ok("fit", capture.folder, "-o", tmp_path / "asset", *flags)
+    asset = Asset.open(tmp_path / "asset")
+    assert asset.method == flags[1]
+    settings = asset.manifest["source"]["settings"]
+    for flag, value in zip(flags[2::2], flags[3::2], strict=True):
+        assert str(settings[flag.lstrip("-")]) == value
+    facts = json.loads(ok("info", tmp_path / "asset", "--json"))
+    assert facts["bytes_per_texel"]["directional"] == asset.bytes_per_texel()["directional"]
+    ok("relight", tmp_path / "asset", "-o", tmp_path / "out.exr", "--directional", "0.3,0,1", "--point", "0,0.2,1")
+    expected = methods.relight(asset, [DirectionalLight((0.3, 0, 1)), PointLight((0, 0.2, 1))])
+    np.testing.assert_array_equal(read_image(tmp_path / "out.exr"), expected)
+    assert set(json.loads(ok("evaluate", tmp_path / "asset", capture.folder, "--json"))) == {"train", "holdout", "lights"}
+
+
+def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
+    done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
+    assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
+    assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--psnr", 20, "--force")
+    assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
+        (["--budget", 8], "--budget with --method auto"),
+        (["--method", "eigen-map", "-k", 9], "-k with --method relighting-map"),
+        (["--method", "eigen-map", "--clusters", 4], "--clusters"),
+        (["--method", "eigen-map", "--psnr", 30], "--psnr with --method auto"),
+        (["--method", "eigen-map", "--basis", "ptm"], "--basis"),
+        (["--method", "eigen-map", "--spread", "mean"], "--spread"),
+        (["--method", "eigen-map", "--ridge", 0], "ridge"),
+        (["--method", "eigen-map", "--scalars", 0], "scalars"),
+        (["--method", "eigen-map", "--scalars", 181], "at most 180 scalars for 60 lights"),
+        (["--method", "clustered-eigen-map", "--weighting", "plain"], "--weighting"),
+        (["--method", "clustered-eigen-map", "--clusters", 300], "256 clusters"),
+        (["--method", "auto", "--encoding", "half"], "--encoding"),
+        (["--method", "auto", "--budget", 3], "at least 4"),
+        (["--method", "auto", "--budget", 8, "--psnr", 30], "found both"),
+        (["--method", "auto", "--psnr", "nan"], "psnr"),
+        (["--basis", "ptm", "-k", 7], "-k 6"),
+        (["--basis", "spherical-harmonics", "-k", 10], "found 10"),
+        (["--ridge", "some"], "--ridge"),
+        (["--ridge", "-1"], "ridge"),
+        (["--spread", "narrow"], "--spread"),
+        (["-k", 0], "-k 0"),
+    ],
+)
+def test_flags_that_do_not_go_together(capture: Capture, tmp_path: Path, flags: list, words: str) -> None:
+    assert words in refused("fit", capture.folder, "-o", tmp_path / "asset", *flags)
+    assert not (tmp_path / "asset").exists()

@@ -1,0 +1,108 @@
+"""The clustered eigen map: planted clusters come back whole, one cluster is an eigen map, and every texel has a cluster."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from srbf.capture import Capture
+from srbf.errors import InputError
+from srbf.evaluation import evaluate
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap, directional_responses
+from srbf.methods.eigen_map import EigenMap
+
+pytest.importorskip("sklearn")
+
+EXACT = 1e-3  # relative: float32 planes and axes, values in a range of their own, a ridge of 1e-9
+HEIGHT, WIDTH = 18, 20
+
+
+def planted(clusters: int, scalars: int, seed: int = 0):
+    """(answer, labels): every texel in one of `clusters`, each with a mean and `scalars` RGB functions of its own."""
+    rng = np.random.default_rng(seed)
+    labels = rng.integers(clusters, size=(HEIGHT, WIDTH))
+    planes = rng.normal(size=(scalars, HEIGHT, WIDTH))
+
+    def answer(direction: np.ndarray) -> np.ndarray:
+        means, functions = rng.normal(size=(clusters, 3)) * 2, rng.normal(size=(clusters, scalars, 3))
+        return means[labels] + np.einsum("jhw,hwjc->hwc", planes, functions[labels])
+
+    return answer, labels
+
+
+@pytest.mark.parametrize(("clusters", "scalars"), [(1, 4), (4, 2), (5, 1)])
+def test_planted_clusters_are_reproduced(make_capture, clusters: int, scalars: int) -> None:
+    answer, labels = planted(clusters, scalars)
+    capture: Capture = make_capture(answer, lights=40, holdout=0)
+    asset = ClusteredEigenMap(clusters, scalars, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
+    expected = np.stack([capture.image(i) for i in capture.indices("train")])
+    got = directional_responses(asset, capture.directions())
+    np.testing.assert_allclose(got, expected, atol=EXACT * np.abs(expected).max())
+    index = asset.tables["cluster_index"]
+    assert len(set(zip(labels.ravel().tolist(), index.ravel().tolist(), strict=True))) == clusters
+    if clusters > 1:  # which as many scalars for all texels do not
+        shared = EigenMap(scalars, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
+        assert np.abs(directional_responses(shared, capture.directions()) - expected).max() > 0.1 * np.abs(expected).max()
+
+
+def test_one_cluster_is_an_eigen_map(make_capture) -> None:
+    rng = np.random.default_rng(2)
+    waves = rng.normal(size=(HEIGHT, WIDTH, 3, 3))
+    capture = make_capture(lambda d: np.sin(waves @ d), lights=60)
+    directions = capture.directions(capture.indices("holdout"))
+    settings = {"scalars": 5, "spread": 0.5, "ridge": 0.01, "encoding": "float"}
+    expected = directional_responses(EigenMap(**settings).encode(capture), directions)
+    # The centre of a cluster's range and the mean of the sample differ, their sums do not; axes come of few steps of iteration.
+    got = directional_responses(ClusteredEigenMap(clusters=1, **settings).encode(capture), directions)
+    assert np.sqrt(((got - expected) ** 2).mean()) < 0.01 * np.sqrt((expected**2).mean())
+
+
+def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
+    answer, _ = planted(4, 3, seed=3)
+    coverage = (np.random.default_rng(4).random((HEIGHT, WIDTH)) > 0.2).astype(np.float32)
+    asset = ClusteredEigenMap(4, 3, encoding="float").encode(make_capture(answer, lights=40, coverage=coverage))
+    planes = asset.coefficients()[0]
+    for number in range(4):
+        own = planes[(asset.tables["cluster_index"] == number) & (coverage > 0)]
+        np.testing.assert_allclose(own[:, :3].min(axis=0), -1, atol=1e-5)
+        np.testing.assert_allclose(own[:, :3].max(axis=0), 1, atol=1e-5)
+    assert not planes[..., 3].any()
+
+
+def test_bytes_cost_little(make_capture) -> None:
+    answer, _ = planted(4, 3, seed=5)
+    capture = make_capture(answer, lights=60, holdout=0).kept()
+    settings = {"spread": 0.3, "ridge": 1e-3}
+    images = np.stack([capture.image(i) for i in capture.indices("train")])
+    assets = [ClusteredEigenMap(4, 3, encoding=encoding, **settings).encode(capture) for encoding in ("float", "uint8")]
+    floats, coded = (directional_responses(asset, capture.directions()) for asset in assets)
+    # A step of 2 / 255 in each of three scalars whose functions are about as large as the pictures.
+    assert np.sqrt(((coded - floats) ** 2).mean()) < 0.01 * images.std()
+
+
+def test_more_clusters_serve_shadows(make_capture) -> None:
+    rng = np.random.default_rng(6)
+    walls = rng.normal(size=(12, 2))
+    walls /= np.linalg.norm(walls, axis=1, keepdims=True)
+    labels, reach = rng.integers(12, size=(HEIGHT, WIDTH)), rng.uniform(0, 0.3, (HEIGHT, WIDTH))
+    capture = make_capture(
+        lambda d: np.where((walls @ d[:2])[labels] > reach, 0, d[2])[..., None] * [1, 0.8, 0.6], lights=80, holdout=20
+    ).kept()
+    one, six = (evaluate(ClusteredEigenMap(c, 2).encode(capture), capture)["holdout"]["psnr"] for c in (1, 6))
+    assert six > one + 3
+
+
+@pytest.mark.parametrize("settings", [{"clusters": 0}, {"clusters": 257}, {"scalars": 0}, {"ridge": 0.0}, {"spread": -1.0}])
+def test_settings_that_no_clustered_eigen_map_has(settings: dict) -> None:
+    with pytest.raises(InputError, match=next(iter(settings))):
+        ClusteredEigenMap(**settings)
+
+
+def test_more_clusters_than_texels(make_capture) -> None:
+    coverage = np.zeros((HEIGHT, WIDTH), np.float32)
+    coverage[3, 4:9] = 1
+    answer, _ = planted(3, 2)
+    capture = make_capture(answer, lights=30, coverage=coverage)
+    asset = ClusteredEigenMap(clusters=16, scalars=3).encode(capture)
+    assert asset.tables["cluster_index"].max() < asset.clusters <= 16
+    assert np.isfinite(directional_responses(asset, capture.directions())).all()
