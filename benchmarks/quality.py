@@ -21,19 +21,22 @@ from typing import get_args
 import numpy as np
 
 from srbf import files
+from srbf.asset import Asset
 from srbf.capture import COVERED, MANIFEST, Capture, Quantity, Role
 from srbf.evaluation import PEAK_QUANTILE, PeakHistogram
-from srbf.image import write_image
+from srbf.image import Encoding, write_image
 from srbf.importing import LightListImport
 from srbf.leaving_out import leave_one_out
 from srbf.methods.clustered_eigen_map import TEXELS_A_CLUSTER, ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.quality import ALL, NEAREST, Score, baselines, planes_bound, score_asset, spectrum
+from srbf.quantization import layer_entries, quantize
 from srbf.sphere import domain_of, normalize, point_set
 
 Method = RelightingMap | EigenMap | ClusteredEigenMap
 
+ENCODINGS: tuple[Encoding, ...] = ("float", "half", "uint8")
 KEPT_BYTES = 2 << 30  # answers in memory; of larger captures as many texels, drawn at random
 BYTE_LOSS = 0.3  # dB that planes of bytes may lose against float ones
 MEAN_SPREAD = "relighting map, k = 25, Hammersley, spread mean"
@@ -96,13 +99,25 @@ class Means:
         return float(np.mean(self.values[name, encoding]))
 
 
-def quiet(method: Method, capture: Capture, role: Role, peak: float) -> Score:
-    """The score of a fit, without its warnings."""
-    started = time.perf_counter()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        asset = method.encode(capture)
-    return score_asset(asset, capture, role, peak, time.perf_counter() - started)
+def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, role: Role, peak: float) -> list[Score]:
+    """A score for each encoding. Planes are fitted once and rounded; relighting maps, whose ridge minds the rounding, each time anew."""
+    scores: list[Score] = []
+    asset: Asset | None = None
+    for encoding in encodings:
+        started = time.perf_counter()
+        if asset is None or isinstance(method, RelightingMap):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                asset = replace(method, encoding=encoding if isinstance(method, RelightingMap) else "float").encode(capture)
+            seconds = time.perf_counter() - started
+        if asset.encoding == encoding:
+            shown = asset
+        else:
+            stored, scale, bias = quantize(asset.coefficients(slice(None)), encoding)
+            manifest = {**asset.manifest, "planes": layer_entries("plane", encoding, scale, bias)}
+            shown = replace(asset, manifest=manifest, stored=stored, scale=scale, bias=bias)
+        scores.append(score_asset(shown, capture, role, peak, seconds))
+    return scores
 
 
 def scalars_of(method: Method) -> int:
@@ -172,10 +187,10 @@ def capture_table(capture: Capture, title: str, bars: Bars, smooth: bool = False
     if smooth:
         methods[MEAN_SPREAD] = RelightingMap(25, centers="hammersley", spread="mean")
     for name, method in methods.items():
-        scores = {encoding: quiet(replace(method, encoding=encoding), sample, role, peak) for encoding in ("float", "half", "uint8")}
-        exact, half, byte = scores["float"], scores["half"], scores["uint8"]
+        scores = scores_of(method, ENCODINGS, sample, role, peak)
+        exact, half, byte = scores
         found[name] = exact.psnr
-        small += [(s.psnr, s.bytes_per_texel, f"{name}, {e}") for e, s in scores.items() if s.bytes_per_texel <= SMALL]
+        small += [(s.psnr, s.bytes_per_texel, f"{name}, {e}") for e, s in zip(ENCODINGS, scores, strict=True) if s.bytes_per_texel <= SMALL]
         bar = bars.at_least(half.psnr, HARD_SUN_MAPS) if hard and name == "relighting map, k = 25" else ""
         figures = (f"{half.bytes_per_texel:.0f}", f"{half.psnr:.2f}", f"{byte.bytes_per_texel:.0f}", f"{byte.psnr:.2f}")
         loss = bars.loss(exact.psnr - byte.psnr)
@@ -217,8 +232,9 @@ def dome_table(root: Path, domes: Sequence[Path], bars: Bars) -> None:
             sample, _ = in_memory(capture)
         lights.add((len(sample.indices("train")), len(sample.indices("holdout"))))
         for method_name, method in LIGHT_LIST_METHODS.items():
-            for encoding in ("float", "uint8"):
-                means.add(method_name, encoding, quiet(replace(method, encoding=encoding), sample, "holdout", 1.0).psnr)
+            exact, byte = scores_of(method, ("float", "uint8"), sample, "holdout", 1.0)
+            means.add(method_name, "float", exact.psnr)
+            means.add(method_name, "uint8", byte.psnr)
         for score in baselines(sample, "holdout", 1.0):
             means.add(score.name, "float", score.psnr)
         line = ", ".join(f"{n} {means.values[n, 'float'][-1]:.2f}" for n in (*LIGHT_LIST_METHODS, NEAREST, ALL))
@@ -232,9 +248,9 @@ def dome_table(root: Path, domes: Sequence[Path], bars: Bars) -> None:
     for name, method in LIGHT_LIST_METHODS.items():
         cells = []
         for place, group in enumerate(order):
-            exact, byte = groups[group].of(name, "float"), groups[group].of(name, "uint8")
-            bar = bars.at_least(exact, wanted[name][place]) if name in wanted else ""
-            cells += [f"{exact:.2f}", f"{byte:.2f}", bars.loss(exact - byte), bar]
+            mean, rounded = groups[group].of(name, "float"), groups[group].of(name, "uint8")
+            bar = bars.at_least(mean, wanted[name][place]) if name in wanted else ""
+            cells += [f"{mean:.2f}", f"{rounded:.2f}", bars.loss(mean - rounded), bar]
         row(name, scalars_of(method), *cells)
     for name in (NEAREST, ALL):
         cells = [text for group in order for text in (f"{groups[group].of(name, 'float'):.2f}", "", "", "")]
