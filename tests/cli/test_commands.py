@@ -47,7 +47,7 @@ def capture(make_capture, plane_positions) -> Capture:
 
 @pytest.fixture
 def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9)
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
     return tmp_path / "asset"
 
 

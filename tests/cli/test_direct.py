@@ -39,7 +39,7 @@ def capture(make_capture, plane_positions: np.ndarray) -> Capture:
 
 @pytest.fixture
 def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 16)
+    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 16, "--spread", "mean", "--ridge", 0)
     return tmp_path / "asset"
 
 
