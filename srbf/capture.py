@@ -75,7 +75,7 @@ class Capture:
             unit = np.asarray(light["direction"], np.float64) / length
             direction = (float(unit[0]), float(unit[1]), float(unit[2]))
             lights.append(CapturedLight(direction, light["role"], light["file"], light.get("direct")))
-        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene"):
+        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene", "seams"):
             if name in manifest:
                 files.inside(folder, manifest[name], path)
         return Capture(folder, manifest, tuple(lights))
@@ -180,7 +180,7 @@ class Capture:
         answers = self.sample(range(len(self.lights)), whole)
         manifest = self.manifest
         if texels is not None:
-            manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient")}
+            manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient", "seams")}
             manifest |= {"width": len(texels), "height": 1}
         coverage = self.coverage() if texels is None else self.coverage().reshape(1, -1)[:, texels]
         return _KeptCapture(self.folder, manifest, self.lights, answers, coverage)
@@ -255,6 +255,15 @@ class Capture:
     def ambient(self) -> Float32[ndarray, "H W 3"] | None:
         """What the scene shows with no light of the capture, where it emits."""
         return self._read(self.manifest["ambient"], 3) if "ambient" in self.manifest else None
+
+    def seam_edges(self) -> Float32[ndarray, "E 8"] | None:
+        """Edges that the UV layer cuts where the surface is smooth, if there are any: u0 v0 u1 v1, v up, on one side, then on the other."""
+        if "seams" not in self.manifest:
+            return None
+        path = self.folder / self.manifest["seams"]
+        edges = read_image(path, 8)
+        require_finite(edges, path)
+        return edges.reshape(-1, 8)
 
     def _read(self, name: str, channels: int) -> np.ndarray:
         return self._checked(name, read_image, channels)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from srbf.asset import Asset
 from srbf.budget import DEFAULT_BUDGET, Planes, within_budget
-from srbf.capture import Capture
+from srbf.capture import Capture, Look
 from srbf.errors import InputError
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
+from srbf.stitch import Stitch
 
-__all__ = ["DEFAULT_BUDGET", "method_for", "settings_of"]
+__all__ = ["DEFAULT_BUDGET", "encode", "method_for", "settings_of"]
 
 CLASSES: dict[str, type[RelightingMap] | type[EigenMap] | type[ClusteredEigenMap]] = {
     "relighting-map": RelightingMap,
@@ -46,6 +48,26 @@ def method_for(
     if method == "auto":
         return within_budget(capture, say=say, **settings)
     return CLASSES[method](**settings)
+
+
+def encode(
+    chosen: RelightingMap | Planes,
+    capture: Capture,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    look: Look = lambda row, image: None,
+    stitched: bool = True,
+    say: Callable[[str], None] = lambda line: None,
+) -> Asset:
+    """The asset of a method, the capture's seams closed where it has any and `stitched` says so.
+
+    Scalars of two clusters weigh different functions and cannot be made to agree: there seams stay, which is said.
+    """
+    stitch = Stitch.of(capture) if stitched else None
+    if isinstance(chosen, ClusteredEigenMap):
+        if stitch is not None:
+            say(f"the UV layer's {stitch.edges} seam edges are not stitched: scalars of two clusters cannot be compared")
+        return chosen.encode(capture, progress, look)
+    return chosen.encode(capture, progress, look, stitch)
 
 
 def _spread(text: str, method: str) -> Any:

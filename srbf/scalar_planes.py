@@ -18,8 +18,9 @@ from srbf.errors import InputError
 from srbf.image import Encoding
 from srbf.lights import Light
 from srbf.quantization import layer_entries, quantize
-from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, sum_over_lights
+from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, seam_report, sum_over_lights
 from srbf.sphere import Domain
+from srbf.stitch import Stitch
 
 CHANNELS = 4  # planes to an image
 MOST_SCALARS = 1024
@@ -120,14 +121,21 @@ def planes_asset(
     settings: dict[str, Any],
     fit: dict[str, Any],
     index: Int[ndarray, " P"] | None = None,
+    stitch: Stitch | None = None,
 ) -> Asset:
-    """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters."""
+    """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters.
+
+    `stitch` closes the seams of the dilated planes, which must be of one cluster then, before they are rounded.
+    """
     scalars, shape = len(planes), (capture.height, capture.width)
     nearest = nearest_covered(capture.coverage())
     images = carried_images(capture, nearest)
     layers = np.zeros((-(-scalars // CHANNELS), *shape, CHANNELS), np.float32)
     for j, plane in enumerate(planes):
         layers[j // CHANNELS, :, :, j % CHANNELS] = dilate(plane.reshape(*shape, 1), nearest)[:, :, 0]
+    loose = layers.reshape(len(layers), -1, CHANNELS)[:, stitch.texels] if stitch is not None else None
+    if stitch is not None:
+        stitch.apply(layers)
     stored, scale, bias = quantize(layers, encoding)
     unused = range(scalars % CHANNELS or CHANNELS, CHANNELS)
     scale[-1, unused], bias[-1, unused] = 0, 0
@@ -149,4 +157,7 @@ def planes_asset(
         manifest["clusters"] = len(functions.spreads) // (scalars + 1)
         manifest["cluster_index"] = {"file": "cluster_index.png"}
         tables["cluster_index"] = dilate(index.reshape(*shape, 1), nearest)[:, :, 0].astype(np.uint8)
-    return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+    asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+    if stitch is not None and loose is not None:
+        manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses)
+    return asset
