@@ -36,6 +36,9 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
         "width": capture.width,
         "height": capture.height,
         "lights": {role: len(capture.indices(role)) for role in ROLES},
+        **(
+            {"light_kind": capture.kind, "fitted_by": "none of the methods: they fit directional lights"} if capture.kind == "point" else {}
+        ),
         **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
         "disk_bytes": folder_bytes(capture.folder),
     }

@@ -44,7 +44,8 @@ def settings_of(method: str, given: dict[str, Any], domain: str, spread: str, ri
 def method_for(
     capture: Capture, method: str, settings: dict[str, Any], say: Callable[[str], None] = lambda line: None
 ) -> RelightingMap | Planes:
-    """The method with its settings; `auto` tries what fits on a sample of the capture."""
+    """The method with its settings; `auto` tries what fits on a sample of the capture. InputError where its lights are not directional."""
+    capture.require_directional(f"--method {method}")
     if method == "auto":
         return within_budget(capture, say=say, **settings)
     return CLASSES[method](**settings)

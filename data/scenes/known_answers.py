@@ -249,6 +249,28 @@ def folded():
     camera()
 
 
+def blocks():
+    """A floor with a closed block, mirrored and of vertices split at its edges, an open crate, and a room's walls, which look inwards."""
+    quad("Plane", corners=[(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)])
+    cube = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]  # outwards
+
+    def box(name, corners, faces):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(corners, [], faces)
+        mesh.materials.append(material(name))
+        obj = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(obj)
+        return obj
+
+    block = box("Block", [cube[i] for side in sides for i in side], [tuple(range(4 * i, 4 * i + 4)) for i in range(6)])
+    block.location, block.scale = (-1, 0, 1), (-0.5, 0.5, 0.5)  # mirrored: x from -1.5 to -0.5, z from 0.5 to 1.5
+    crate = box("Crate", cube, sides[:-1])  # without a lid
+    crate.location, crate.scale = (1, 0, 1), (0.5, 0.5, 0.5)
+    walls = box("Walls", cube, [side[::-1] for side in sides])
+    walls.location, walls.scale = (0, 0, 1.5), (2.5, 2.5, 2)
+
+
 def bake_under_hdri(blend, sky, out):
     """Irradiance of Plane under an equirectangular sky, straight from Cycles, (32, 32, 3), row 0 at the top."""
     bpy.ops.wm.open_mainfile(filepath=blend)
@@ -294,6 +316,7 @@ SCENES = {
     "scattered": scattered,
     "torus": torus,
     "folded": folded,
+    "blocks": blocks,
     "overriding": overriding,
     "no camera": lambda: quad("Plane"),
 }

@@ -277,8 +277,7 @@ class Bake:
             "receiver": facts["receiver"],
             "lights": [
                 {
-                    "kind": "directional",
-                    "direction": list(light.direction),
+                    **light.placed(),
                     "role": light.role,
                     "file": light.file,
                     **({"direct": light.direct_file} if apart else {}),
