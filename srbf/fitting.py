@@ -57,18 +57,9 @@ def encode(
     progress: Callable[[int, int], None] = lambda done, total: None,
     look: Look = lambda row, image: None,
     stitched: bool = True,
-    say: Callable[[str], None] = lambda line: None,
 ) -> Asset:
-    """The asset of a method, the capture's seams closed where it has any and `stitched` says so.
-
-    Scalars of two clusters weigh different functions and cannot be made to agree: there seams stay, which is said.
-    """
-    stitch = Stitch.of(capture) if stitched else None
-    if isinstance(chosen, ClusteredEigenMap):
-        if stitch is not None:
-            say(f"the UV layer's {stitch.edges} seam edges are not stitched: scalars of two clusters cannot be compared")
-        return chosen.encode(capture, progress, look)
-    return chosen.encode(capture, progress, look, stitch)
+    """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so."""
+    return chosen.encode(capture, progress, look, Stitch.of(capture) if stitched else None)
 
 
 def _spread(text: str, method: str) -> Any:

@@ -160,11 +160,12 @@ def seam_report(
     stitch: Stitch,
     loose: Float32[ndarray, "N n C"],
     respond: Callable[[Asset, np.ndarray], np.ndarray],
+    loose_index: Int[ndarray, " n"] | None = None,
 ) -> dict[str, Any]:
     """What stitching did to the pictures: rms difference across the seams through a bilinear filter, over the pictures' mean.
 
     Under SEAM_LIGHTS of the train lights, unclamped, by a method's `respond` (its directional_responses): `before`, with the maps' own
-    values `loose` of the stitch's texels, and `after`, with those that the asset stores.
+    values `loose` of the stitch's texels (and clusters `loose_index`), and `after`, with those that the asset stores.
     """
     train = capture.indices("train")
     directions = capture.directions(train[:: -(-len(train) // SEAM_LIGHTS)])
@@ -176,6 +177,7 @@ def seam_report(
         stored=loose[:, None],
         scale=np.ones_like(asset.scale),
         bias=np.zeros_like(asset.bias),
+        tables=sewn.tables if loose_index is None else {**sewn.tables, "cluster_index": loose_index[None].astype(np.uint8)},
     )
     covered = np.flatnonzero(asset.covered)
     mean = float(np.abs(respond(asset.at(covered[:: -(-len(covered) // SEAM_TEXELS)]), directions)).mean())

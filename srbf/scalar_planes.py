@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, get_args
 
 import numpy as np
@@ -111,6 +112,14 @@ def first_function(asset: Asset, rows: slice) -> Int[ndarray, "h W"]:
     return np.zeros((height, asset.width), np.int64)
 
 
+@dataclass(frozen=True, eq=False)
+class SewnPlanes:
+    """What planes `loose` (S, n) and clusters `loose_index` (n,) the texels of a stitch would have had without it."""
+
+    loose: Float32[ndarray, "S n"]
+    loose_index: Int[ndarray, " n"]
+
+
 def planes_asset(
     capture: Capture,
     method: str,
@@ -122,20 +131,30 @@ def planes_asset(
     fit: dict[str, Any],
     index: Int[ndarray, " P"] | None = None,
     stitch: Stitch | None = None,
+    sewn: SewnPlanes | None = None,
 ) -> Asset:
     """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters.
 
-    `stitch` closes the seams of the dilated planes, which must be of one cluster then, before they are rounded.
+    `stitch` closes the seams of the dilated planes before they are rounded. Where there are clusters they must be `sewn`: planes and index
+    of a stitched capture, its gutter included.
     """
     scalars, shape = len(planes), (capture.height, capture.width)
     nearest = nearest_covered(capture.coverage())
     images = carried_images(capture, nearest)
+    if nearest is not None and stitch is not None and sewn is not None:
+        nearest = nearest.copy()
+        nearest.flat[stitch.texels] = stitch.texels
     layers = np.zeros((-(-scalars // CHANNELS), *shape, CHANNELS), np.float32)
     for j, plane in enumerate(planes):
         layers[j // CHANNELS, :, :, j % CHANNELS] = dilate(plane.reshape(*shape, 1), nearest)[:, :, 0]
-    loose = layers.reshape(len(layers), -1, CHANNELS)[:, stitch.texels] if stitch is not None else None
+    loose = None
     if stitch is not None:
-        stitch.apply(layers)
+        loose = layers.reshape(len(layers), -1, CHANNELS)[:, stitch.texels]
+        if sewn is None:
+            stitch.apply(layers)
+        else:
+            for j, plane in enumerate(sewn.loose):
+                loose[j // CHANNELS, :, j % CHANNELS] = plane
     stored, scale, bias = quantize(layers, encoding)
     unused = range(scalars % CHANNELS or CHANNELS, CHANNELS)
     scale[-1, unused], bias[-1, unused] = 0, 0
@@ -159,5 +178,5 @@ def planes_asset(
         tables["cluster_index"] = dilate(index.reshape(*shape, 1), nearest)[:, :, 0].astype(np.uint8)
     asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
     if stitch is not None and loose is not None:
-        manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses)
+        manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses, None if sewn is None else sewn.loose_index)
     return asset

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from scipy.sparse.linalg import splu
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.capture import Capture
+from srbf.dilation import nearest_covered
 from srbf.parallel import each
 
 # Measured on a torus in four charts and a square in two: with these a fiftieth of a gap is left, or less, covered texels beside a seam
@@ -19,6 +21,8 @@ from srbf.parallel import each
 # overshoots by a third; a tenth as firm changes covered texels by a third of the gap.
 HOLD = 0.1  # weight of a covered texel's own value against one sample's difference
 FREE = 1e-3  # that of a texel outside the receiver, which only filtering at a chart's edge sees
+
+LIGHTS_AT_A_TIME = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class Stitch:
     """
 
     texels: Int[ndarray, " n"]
+    sources: Int[ndarray, " n"]  # the covered texels that dilation fills them from
     differences: csr_array  # D, (S, n)
     factor: Any  # SuperLU of D^T D + diag(h)
     edges: int
@@ -61,7 +66,9 @@ class Stitch:
         held = np.where(covered.ravel()[texels], hold, FREE)
         normal = (differences.T @ differences + diags_array(held)).tocsc()
         factor = splu(normal, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        return Stitch(texels, differences, factor, len(edges))
+        nearest = nearest_covered(covered.astype(np.float32))
+        sources = texels if nearest is None else nearest.ravel()[texels]
+        return Stitch(texels, sources, differences, factor, len(edges))
 
     def change(self, values: Float[ndarray, "n M"]) -> Float64[ndarray, "n M"]:
         """What is to be added to `values` of `texels`, each column for itself."""
@@ -76,6 +83,14 @@ class Stitch:
             flat[i, self.texels] += self.change(flat[i, self.texels]).astype(np.float32)
 
         each(sew, len(maps))
+
+    def blocks(self, capture: Capture, lights: Sequence[int]) -> Iterator[tuple[int, Float32[ndarray, "b n 3"]]]:
+        """A capture's answers of `texels`, dilated and stitched, some lights at a time: (position of the first of them, (b, n, 3))."""
+        for first in range(0, len(lights), LIGHTS_AT_A_TIME):
+            answers = capture.sample(lights[first : first + LIGHTS_AT_A_TIME], self.sources)
+            flat = answers.reshape(len(answers), -1)
+            answers += self.change(flat).astype(np.float32).reshape(answers.shape)
+            yield first, np.ascontiguousarray(answers.transpose(1, 0, 2))
 
     def difference(self, values: Float[ndarray, "n M"]) -> float:
         """Root mean square difference between the two sides of all seams, over samples and columns, of `values` of `texels`."""

@@ -66,7 +66,7 @@ def fit(
     chosen = method_for(opened, method, settings, note)
     watch = TrainWatch(opened)
     with progress_bar("fit") as update:
-        asset = encode(chosen, opened, update, watch.look, stitch, note)
+        asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
