@@ -20,7 +20,7 @@ from srbf.bake.crew import Answer, Crew, CrewSettings, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages, uv_checksum, without_uv
 from srbf.bake.manifest import capture_manifest
-from srbf.bake.schedule import FIRST_SAMPLES, next_samples, render_order
+from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
 from srbf.bake.sums import NOTHING, SUMS, Sums
 from srbf.bake.worker import Worker
@@ -119,7 +119,9 @@ class _Passes:
         self._keep = bake.keeps_sums
         self._goal = 1 if self._auto else int(bake.settings.samples)
         self._first = FirstLights(len(self._lights), bake.settings.receiver.place, reporter.say)
+        self._settled = not self._auto  # how many samples the fitted lights get
         self._curve: list[stopping.Measure] = []
+        self._measured: dict[int, stopping.Measure] = {}  # by samples, in this run or before
         self._sampling: dict[str, Any] = {}
         self._tints: dict[str, Any] | None = None
         self._facts: dict[str, Any] | None = None
@@ -154,8 +156,10 @@ class _Passes:
                 crew.render(tasks, self._take)
                 self._failed |= crew.failed
                 self._write_manifest()
-            elif not self._auto or self._is_enough():
+            elif self._settled:
                 return
+            elif self._is_enough():
+                self._settled = True  # what is left is what the tested lights are still due
             else:
                 self._goal *= 2
 
@@ -168,7 +172,7 @@ class _Passes:
                 f"{len(self._failed)} of {len(self._lights)} lights could not be rendered, among them light {index}: {reason}; "
                 f"the others are in {self._folder}, and the same command tries these again"
             )
-        if self._is_time_up() and self._tasks():
+        if self._is_time_up() and (self._tasks() or not self._settled):
             reached = [self._sums.samples(light) for light in self._lights if light.role == "train"]
             self._reporter.say(
                 f"the time is up at {min(reached)} to {max(reached)} samples a texel; the same command adds more"
@@ -202,7 +206,7 @@ class _Passes:
             self._reporter.say(f"going on: {done} of {len(self._lights)} lights are done")
         path = self._folder / SUMS / CURVE
         if self._auto and path.is_file():
-            self._curve = [stopping.Measure(**entry) for entry in files.read_json(path)["curve"]]
+            self._measured = {entry["samples"]: stopping.Measure(**entry) for entry in files.read_json(path)["curve"]}
 
     def _tasks(self) -> list[Task]:
         """The next pass: of the lights that have the fewest, what each is due."""
@@ -243,20 +247,24 @@ class _Passes:
 
     def _is_enough(self) -> bool:
         """`--samples auto`: measure what this many samples gave, and whether the last doubling was still worth it."""
-        if not self._curve or self._curve[-1].samples != self._goal:
+        measure = self._measured.get(self._goal)
+        if measure is None:
             lights = [light for light in self._lights if light.role == "validation" and light.index not in self._failed]
             measure = stopping.measure(Capture.open(self._folder), self._goal, [self._sums.read(light) for light in lights])
-            self._curve.append(measure)
-            files.write_json(self._folder / SUMS / CURVE, {"curve": stopping.record(self._curve)})
+            self._measured[self._goal] = measure
+            files.write_json(self._folder / SUMS / CURVE, {"curve": stopping.record(list(self._measured.values()))})
             self._reporter.say(
                 f"{self._goal} samples a texel: error {measure.relative_rmse:.4f} on the validation lights "
                 f"(their own noise of {measure.noise:.4f} taken off)"
             )
-            self._write_manifest()
+        self._curve.append(measure)
         return stopping.is_enough(self._curve)
 
     def _goal_of(self, light: PlannedLight) -> int:
-        return self._goal if light.role == "train" else self._settings.holdout_samples
+        if light.role == "train":
+            return self._goal
+        tested = self._settings.holdout_samples
+        return tested if self._settled else min(tested, TESTED_GROWTH * self._goal)
 
     def _needs_squares(self, light: PlannedLight) -> bool:
         return self._auto and light.role == "validation"
