@@ -90,7 +90,9 @@ def survey(
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
         found: dict[str, Any] | None = None
-        with Worker({**job, "scratch": str(scratch), "survey": {"points": asked}}, scratch, scratch / "survey.log", blender) as worker:
+        with Worker(
+            {**job, "scratch": str(scratch), "lights": [], "survey": {"points": asked}}, scratch, scratch / "survey.log", blender
+        ) as worker:
             for event in worker.events():
                 if event["event"] == "warning":
                     say(event["message"])

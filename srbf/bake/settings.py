@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,6 +36,11 @@ class Receiver:
             return Receiver(kind, name or None)
         raise InputError(f"expected a receiver lightmap:OBJECT or view[:CAMERA], found {text!r}")
 
+    @property
+    def place(self) -> str:
+        """What it is called in a message."""
+        return f"{self.kind} {self.name!r}" if self.name else f"the {self.kind}"
+
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""
         return {"kind": self.kind, ("object" if self.kind == "lightmap" else "camera"): self.name, "uv_layer": self.uv_layer}
@@ -50,7 +55,7 @@ class BakeSettings:
     height: int = 256
     lights: int = 400
     domain: Domain = "hemisphere"
-    samples: int = 2
+    samples: int | Literal["auto"] = 2
     validation: int = 16
     holdout: int = 32
     holdout_samples: int = 64
@@ -64,11 +69,13 @@ class BakeSettings:
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
-            if getattr(self, name) < 1:
+            if getattr(self, name) != "auto" and getattr(self, name) < 1:
                 raise InputError(f"expected {name.replace('_', ' ')} of 1 or more, found {getattr(self, name)}")
         for name in ("validation", "holdout", "seed", "sun_angle"):
             if not getattr(self, name) >= 0:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
+        if self.samples == "auto" and (self.validation < 1 or self.holdout_samples < 2):
+            raise InputError("--samples auto judges by validation lights of at least 2 samples, found none; leave --validation as it is")
         if max(self.width, self.height) > 16384:
             raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
@@ -76,6 +83,8 @@ class BakeSettings:
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
                 raise InputError("expected point lights without --light-list and --sun-angle, which are of directional ones")
+            if self.samples == "auto":
+                raise InputError("expected a number of samples with point lights, found auto, which judges by fits of directional ones")
             if self.transport != "combined":
                 raise InputError("expected --transport combined with point lights: only a sun's direct light is taken apart")
 
@@ -148,7 +157,7 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
         validation = random_directions(settings.validation, domain, rng)
         holdout = random_directions(settings.holdout, domain, rng)
     groups: list[tuple[Role, np.ndarray, int]] = [
-        ("train", train, settings.samples),
+        ("train", train, 1 if settings.samples == "auto" else settings.samples),
         ("validation", validation, settings.holdout_samples),
         ("holdout", holdout, settings.holdout_samples),
     ]
