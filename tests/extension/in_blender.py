@@ -187,6 +187,16 @@ def command(case: dict) -> dict:
     return {"status": command.run(case["arguments"])}
 
 
+def completions(case: dict) -> dict:
+    """Arguments with what only Blender knows, of an open file open.blend in a Blender at /blender."""
+    from typer.main import get_command
+
+    from blender_extension.command import completed
+    from srbf.cli import app
+
+    return {"completed": [completed(arguments, get_command(app), "open.blend", "/blender") for arguments in case["cases"]]}
+
+
 def twice(case: dict) -> dict:
     """Registered and unregistered again and again, nothing of it stays."""
     handlers = [len(h) for h in blender_extension.HANDLERS]
@@ -204,8 +214,8 @@ if __name__ == "__main__":
     try:
         result = globals()[sys.argv[1]](json.loads(sys.argv[2]))
         sys.stdout.flush()
-        print("\n" + json.dumps(result), flush=True)
-    except Exception:
+        sys.stdout.write("\n" + json.dumps(result) + "\n")
+    except Exception:  # noqa: BLE001 - told, and then this process ends past Blender's own shutdown
         traceback.print_exc()
         status = 1
     blender_extension.unregister()

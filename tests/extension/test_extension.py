@@ -117,14 +117,7 @@ def test_the_command_bakes_the_open_file(in_blender, tmp_path) -> None:
     assert in_blender("command", arguments=["fit"])["status"] == 2
 
 
-def test_what_the_command_adds() -> None:
-    pytest.importorskip("bpy")
-    script = (
-        "import sys, json, bpy; sys.path.insert(0, sys.argv[1]);"
-        "from blender_extension.command import completed; from typer.main import get_command; from srbf.cli import app;"
-        "print(json.dumps([completed(a, get_command(app), 'open.blend', '/blender') for a in json.loads(sys.argv[2])])); sys.stdout.flush();"
-        "import os; os._exit(0)"
-    )
+def test_what_the_command_adds(in_blender) -> None:
     rest = ["-o", "capture", "--receiver", "view", "--dry-run"]
     cases = [
         ["bake", *rest],
@@ -135,8 +128,8 @@ def test_what_the_command_adds() -> None:
         ["--version"],
         ["bake", "--help"],
     ]
-    done = subprocess.run([sys.executable, "-c", script, str(ROOT), json.dumps(cases)], capture_output=True, text=True, timeout=60)
-    assert json.loads(done.stdout.splitlines()[-1]) == [
+    found = in_blender("completions", cases=cases)
+    assert found["completed"] == [
         ["bake", "open.blend", "--blender", "/blender", *rest],
         ["bake", "--blender", "/blender", *rest, "other.blend"],
         ["bake", "open.blend", "--blender=/mine", *rest],
