@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from typing import Any
 
 import bpy
+
+from .process import no_extensions
 
 
 def run(arguments: list[str]) -> int:
@@ -22,10 +25,12 @@ def run(arguments: list[str]) -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender's own would only ask it to end a render
     commands = get_command(app)
     full = completed(arguments, commands, bpy.data.filepath, bpy.app.binary_path)
-    try:
-        commands.main(args=full, prog_name="srbf")
-    except SystemExit as ended:
-        return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    with no_extensions() as folder:
+        os.environ["BLENDER_USER_EXTENSIONS"] = folder
+        try:
+            commands.main(args=full, prog_name="srbf")
+        except SystemExit as ended:
+            return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     return 0
 
 

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -28,13 +29,14 @@ class Job:
         self.status: int | None = None  # the exit status, once it has ended
         self.stopping = False
         log.parent.mkdir(parents=True, exist_ok=True)
+        self._extensions = no_extensions()
         with open(log, "wb") as words:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
                 stdout=words,
                 stderr=subprocess.STDOUT,
-                env=environment(),
+                env=environment(self._extensions.name),
                 # out of reach of Ctrl-C in Blender's own terminal; on Windows CTRL_BREAK needs a group to go to
                 start_new_session=os.name != "nt",
                 creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
@@ -54,6 +56,7 @@ class Job:
         if status is not None:
             self.reader.close()
             self._log.close()
+            self._extensions.cleanup()
             self.status = status
         return self.running
 
@@ -78,10 +81,19 @@ def host_command(arguments: list[str]) -> list[str]:
     return [sys.executable, "-P", str(HOST), *arguments]
 
 
-def environment() -> dict[str, str]:
-    """This process's, with the folder that holds `srbf` where Python looks; MissingHostError where there is none."""
+def no_extensions() -> tempfile.TemporaryDirectory[str]:
+    """A folder to name in BLENDER_USER_EXTENSIONS.
+
+    The bake's Blender starts with factory settings, where no extension is switched on: in the user's own folder it would remove the
+    installed wheels of all of them, and the library's under the running bake.
+    """
+    return tempfile.TemporaryDirectory(prefix="srbf-no-extensions-", ignore_cleanup_errors=True)
+
+
+def environment(extensions: str) -> dict[str, str]:
+    """This process's, `srbf` where Python looks, and `extensions` for the Blenders to come; MissingHostError where there is no `srbf`."""
     spec = find_spec("srbf")
     if spec is None or spec.origin is None:
         raise MissingHostError("expected the library srbf beside this extension, found none; install the extension's zip again")
     paths = [str(Path(spec.origin).parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1"}
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1", "BLENDER_USER_EXTENSIONS": extensions}

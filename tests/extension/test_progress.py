@@ -115,3 +115,12 @@ def test_a_job_that_fails_says_why(tmp_path) -> None:
     job = ended(process.Job("Fit", process.host_command(["fit", str(tmp_path / "none"), "-o", str(tmp_path / "asset")]), tmp_path / "log"))
     assert job.status == 1
     assert job.outcome().startswith("Fit: expected a capture with a capture.json at")
+
+
+def test_the_bakes_blender_is_kept_from_the_users_extensions(tmp_path) -> None:
+    """Started with factory settings it would remove the wheels of all that are installed, the library's among them."""
+    tell = "import os; folder = os.environ['BLENDER_USER_EXTENSIONS']; print(folder, os.listdir(folder))"
+    job = ended(process.Job("Bake", [sys.executable, "-c", tell], tmp_path / "log"))
+    folder, held = job.reader.words[0].split()
+    assert held == "[]"
+    assert not Path(folder).exists()
