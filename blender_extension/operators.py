@@ -26,7 +26,8 @@ class SRBF_OT_bake(bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if self.anew and settings.state_of(settings.folder_of(context.scene.srbf) / "capture") != "nothing":
-            return context.window_manager.invoke_confirm(self, event)
+            message = "What is baked already is dropped, and the scene baked as it is now"
+            return context.window_manager.invoke_confirm(self, event, title="Bake anew?", message=message, confirm_text="Bake Anew")
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import signal
 import sys
 import time
 import types
@@ -109,6 +110,29 @@ def test_a_job_that_is_stopped_ends_by_itself(tmp_path) -> None:
     job.stop()
     ended(job)
     assert (job.status, job.reader.words, job.outcome()) == (1, ["srbf: stopped"], "Bake: stopped")
+
+
+def test_a_stop_reaches_the_host_where_blender_ignores_ctrl_c(tmp_path, monkeypatch) -> None:
+    """As it does when a shell's script began it in the background; children inherit that."""
+    (tmp_path / "srbf").mkdir()
+    (tmp_path / "srbf" / "__init__.py").touch()
+    (tmp_path / "srbf" / "__main__.py").write_text(
+        "import sys, time\n"
+        "def main():\n"
+        "    print('srbf: baking', flush=True)\n"
+        "    try: time.sleep(30)\n"
+        "    except KeyboardInterrupt: sys.exit('srbf: stopped')\n"
+    )
+    monkeypatch.setattr(process, "environment", lambda extensions: {"PYTHONPATH": str(tmp_path)})
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        job = process.Job("Bake", process.host_command([]), tmp_path / "log")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    ended(job, until=lambda job: job.reader.words)
+    job.stop()
+    ended(job)
+    assert job.reader.words[-1] == "srbf: stopped"
 
 
 def test_a_job_that_fails_says_why(tmp_path) -> None:
