@@ -20,6 +20,7 @@ from .lights import lights_of
 SHOWN = "srbf_shown"  # on an object: what is shown on it, a dictionary of these keys
 ORIGINAL = "srbf_original"  # on a material of ours: whose place it took
 OURS = "srbf_emits"  # on every material of ours, that of an empty slot too: whether it emits times albedo / pi
+EEVEE_TEXTURES = 8  # which leave it room on every graphics card: 16 slots, some of them its own
 ADDED = "ADDED"  # in a slot's place: there was none before
 ALBEDO_SOCKETS = {
     "ShaderNodeBsdfPrincipled": "Base Color",
@@ -41,6 +42,8 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Pa
     _, lamps, others = lights_of(scene, scene.srbf.a0)
     if others:
         notes.append(f"not shown: light of {', '.join(others)} (suns and points are)")
+    if scene.render.engine.startswith("BLENDER_EEVEE") and layout == "IMAGES" and maps.k > EEVEE_TEXTURES:
+        notes.append(f"EEVEE may have too few texture slots for {maps.k} maps, and show pink: choose Atlas")
     tree = nodes.build(maps, f"srbf {obj.name}", len(lamps), uv_layer, layout)
     links = []  # of each slot, to which of object and mesh its material belonged
     if not len(obj.data.materials):

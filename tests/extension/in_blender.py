@@ -79,6 +79,7 @@ def relit(case: dict) -> dict:
     scene.srbf.falloff, scene.srbf.a0 = case.get("falloff", "INVERSE_SQUARE"), case.get("a0", 1.0)
     for light in case["lights"]:
         lamp(**light)
+    scene.render.engine = case.get("engine", "CYCLES")
     capture = Path(case["capture"]) if "capture" in case else None
     notes = show.show(scene, obj, Path(case["asset"]), capture, case.get("layout", "IMAGES"), bool(case.get("albedo")))
     for light in case.get("later", []):

@@ -114,3 +114,10 @@ def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:
     lights = [light_of(SUN)]
     # what is emitted is baked into the plane's own active layer: there the picture stands on its head
     assert (np.abs(found[::-1, ::-1] - relight(asset, lights)) <= tolerance(asset, lights)).all()
+
+
+@pytest.mark.parametrize(("layout", "warned"), [("IMAGES", True), ("ATLAS", False)])
+def test_many_maps_in_eevee_are_warned_of(make_asset, emitted, layout, warned) -> None:
+    asset = make_asset(k=20, size=(4, 4))
+    _, answer = emitted(asset, [SUN], layout=layout, engine="BLENDER_EEVEE_NEXT")
+    assert [("Atlas" in note) for note in answer["notes"]] == [True] * warned
