@@ -40,6 +40,9 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
         "lights": {role: len(capture.indices(role)) for role in ROLES},
         **_samples(capture),
         **({"unfinished": True} if (capture.folder / UNFINISHED).is_file() else {}),
+        **(
+            {"light_kind": capture.kind, "fitted_by": "none of the methods: they fit directional lights"} if capture.kind == "point" else {}
+        ),
         **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
         "disk_bytes": folder_bytes(capture.folder),
     }

@@ -17,7 +17,7 @@ def render_order(lights: Sequence[PlannedLight]) -> list[PlannedLight]:
     """Train lights from the highest on, each the farthest from those before; validation and holdout lights evenly between them."""
     train = [light for light in lights if light.role == "train"]
     tested = [light for light in lights if light.role != "train"]
-    places = np.array([light.direction for light in train]).reshape(-1, 3)
+    places = np.array([light.place for light in train]).reshape(-1, 3)
     order = farthest_points(places, len(places))
     ranked = [((i + 1.0) / len(train), 0, train[j]) for i, j in enumerate(order)]
     # Their roles stand one after the other: taken in turn, so that a prefix has some of each.

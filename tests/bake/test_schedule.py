@@ -22,7 +22,7 @@ def test_every_prefix_covers_the_domain(domain: str) -> None:
     """Greedy farthest point is within twice the best radius; the best for n caps of angle r has n (1 - cos r) / 2 >= the domain's share."""
     settings = BakeSettings(RECEIVER, lights=400, domain=domain, holdout=0, validation=0)
     lights = render_order(plan_lights(settings))
-    directions = np.array([light.direction for light in lights])
+    directions = np.array([light.place for light in lights])
     whole = covering_radius(directions, domain)
     area = 0.5 if domain == "hemisphere" else 1.0
     for n in [2, 3, 5, 8, 13, 25, 50, 100, 150, 200, 300, 399]:
@@ -50,7 +50,7 @@ def test_tested_lights_stand_between_the_others() -> None:
     planned = plan_lights(settings)
     lights = render_order(planned)
     assert sorted(light.index for light in lights) == [light.index for light in planned]
-    assert lights[0].direction[2] == max(light.direction[2] for light in planned if light.role == "train")
+    assert lights[0].place[2] == max(light.place[2] for light in planned if light.role == "train")
     for n in (30, 65, 104):
         roles = [light.role for light in lights[:n]]
         assert abs(roles.count("holdout") - n * 20 / 130) <= 2
