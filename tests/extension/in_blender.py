@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 import traceback
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import blender_extension  # noqa: E402
-from blender_extension import operators, running, show  # noqa: E402
+from blender_extension import operators, running, settings, show  # noqa: E402
 
 
 def plane(name: str = "Plane", layer: str = "lightmap") -> bpy.types.Object:
@@ -157,14 +158,14 @@ def bake(case: dict) -> dict:
     process.HOST = Path(case["host"])
     scene = bpy.context.scene
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(case["folder"]) / "scene.blend"))
-    scene.srbf.object = plane()
-    scene.srbf.lights = 7
+    scene.srbf.object = obj = plane()
+    obj.data.materials.append(material((0.8, 0.8, 0.8)))
+    for name, value in case.get("settings", {}).items():
+        setattr(scene.srbf, name, value)
     results = [bpy.ops.srbf.bake()]
     refused = bpy.ops.srbf.bake.poll()
     seen = []
-    import time
-
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 40
     stopped = False
     while running.job() is not None and time.monotonic() < deadline:
         running.listen()
@@ -175,8 +176,20 @@ def bake(case: dict) -> dict:
                 results.append(bpy.ops.srbf.stop())
                 stopped = True
         time.sleep(0.02)
-    copy = Path(case["folder"]) / "srbf" / "Plane" / "scene.blend"
-    return {"results": [sorted(r) for r in results], "refused": not refused, "seen": seen, "last": running.last(), "copy": copy.is_file()}
+    if case.get("fit"):
+        results.append(bpy.ops.srbf.fit())
+        while running.job() is not None and time.monotonic() < deadline:
+            running.listen()
+            time.sleep(0.02)
+    folder = Path(case["folder"]) / "srbf" / "Plane"
+    return {
+        "results": [sorted(r) for r in results],
+        "refused": not refused,
+        "seen": seen,
+        "last": running.last(),
+        "copy": (folder / "scene.blend").is_file(),
+        "state": settings.state_of(folder / "capture"),
+    }
 
 
 def command(case: dict) -> dict:

@@ -77,7 +77,19 @@ def test_bake_starts_the_library_on_a_copy_of_the_scene(in_blender, double, tmp_
     folder = tmp_path / "srbf" / "Plane"
     assert asked[:6] == ["bake", str(folder / "scene.blend"), "--output", str(folder / "capture"), "--receiver", "lightmap:Plane"]
     known = {flag for parameter in get_command(app).commands["bake"].params for flag in parameter.opts}
-    assert {word for word in asked if word.startswith("--")} - {"--json-progress"} <= known
+    assert {word for word in asked if word.startswith("--")} <= known
+
+
+def test_a_true_bake_is_heard_and_fits(in_blender, tmp_path) -> None:
+    host = ROOT / "blender_extension" / "host.py"
+    found = in_blender(
+        "bake", folder=str(tmp_path), host=str(host), settings={"width": 8, "height": 8, "lights": 3, "samples": 1}, fit=True
+    )
+    assert found["results"] == [["FINISHED"], ["FINISHED"]]
+    assert found["last"] == "Fit: done", found
+    assert found["seen"] == sorted(found["seen"]) and found["seen"][-1] > 0
+    assert (tmp_path / "srbf" / "Plane" / "asset" / "asset.json").is_file()
+    assert found["state"] == "done"
 
 
 def test_stop_asks_the_bake_to_end(in_blender, double, tmp_path) -> None:
