@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from srbf.bake.schedule import farthest_point_order, next_samples, render_order
+from srbf.bake.schedule import next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, plan_lights
-from srbf.sphere import all_around, point_set
+from srbf.sphere import all_around, farthest_points, point_set
 
 RECEIVER = Receiver("lightmap", "Plane")
 
@@ -34,14 +34,14 @@ def test_hammersleys_own_order_does_not() -> None:
     """Why there is an order: half of the set in its own order leaves a hole as wide as a quarter of the sky."""
     points = point_set("hammersley", 400, "sphere")
     assert covering_radius(points[:200], "sphere") > np.pi / 3
-    chosen = points[farthest_point_order(points, 0)[:200]]
+    chosen = points[farthest_points(points, 200)]
     assert covering_radius(chosen, "sphere") < np.pi / 10
 
 
 def test_the_order_is_a_permutation_even_of_equal_points() -> None:
     points = np.repeat(np.eye(3), 3, axis=0)
-    order = farthest_point_order(points, 4)
-    assert sorted(order) == list(range(9)) and order[0] == 4
+    order = farthest_points(points, 9)
+    assert sorted(order) == list(range(9)) and order[0] == 6
     assert {int(i) // 3 for i in order[:3]} == {0, 1, 2}
 
 
