@@ -41,27 +41,33 @@ def main() -> None:
 def run(job: dict[str, Any], channel: Channel) -> None:
     """Open the scene, prepare the receiver, then hand over what `job` asks for.
 
-    job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
+    job: scene, receiver {kind, object | objects, uv_layer, unwrap | camera}, no_shadow (names of objects), width, height,
+    quantity, keep_lamps, sun_angle, scratch,
     geometry (bool), ambient {samples, seed} or null, lights [{index, kind, direction | position, samples, seed}].
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
-    by which the tints of translucent materials are chosen.
+    by which the tints of translucent materials are chosen. A job with `survey` gets what that asks for, and nothing is baked.
     """
-    from blender_bake import emission, scene_file, translucency
+    from blender_bake import emission, no_shadow, scene_file, survey, translucency
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
+    from blender_bake.vertices import VertexReceiver
     from blender_bake.view import ViewReceiver
 
     scratch = Path(job["scratch"])
     scene = scenes.open_scene(job["scene"], channel)
     scenes.configure(scene)
+    if "survey" in job:
+        channel.emit("survey", **survey.answer(scene, job, channel))
+        return
+    no_shadow.let_light_through(scene, job["no_shadow"])
     own_light = scenes.OwnLight(scene)
-    kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
+    kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
     apart = job.get("transport") == "indirect"
     if apart:
         scene_file.show_as_rendered(scene)
     receiver = kind(scene, job, channel)
-    channel.emit("scene", blender=scenes.version(), receiver=receiver.description(), **receiver.facts())
+    channel.emit("scene", blender=scenes.version(), receivers=receiver.descriptions(), **receiver.facts())
 
     def image(name: str, array: Any, started: float, **fields: Any) -> None:
         channel.emit("image", name=name, file=hand_over(scratch, name, array), seconds=time.perf_counter() - started, **fields)
@@ -80,17 +86,20 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     if ambient:
         started = time.perf_counter()
         image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
-    illuminant = Illuminant(scene, job["sun_angle"])
+    illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     if not apart:
         for light in job["lights"]:
             started = time.perf_counter()
             illuminant.aim(light)
-            image(f"light_{light['index']}", receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+            answer = receiver.answer(light["samples"], light["seed"])
+            if light.get("denoise"):
+                answer = receiver.denoised(answer)
+            image(f"light_{light['index']}", answer, started, light=light["index"])
         return
     translucent = translucency.find(scene)
     aims = [partial(illuminant.aim, light) for light in job["probes"]]
     tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-    seen_by = {receiver.description()["object"]} if job["receiver"]["kind"] == "lightmap" else None
+    seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
     (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
     channel.emit("file", file="scene.glb", sampling=receiver.sampling())
     switch = translucency.Switch(translucent, tints)

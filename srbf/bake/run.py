@@ -219,7 +219,7 @@ class Bake:
             raise BakeError(f"expected {len(missing)} lights from Blender, found {len(missing) - len(planned)}; run the same command again")
         if images.is_all_black(lights):
             raise BakeError(
-                f"every light image is black: does light reach {facts['receiver'].get('object') or 'the camera'} from the "
+                f"every light image is black: does light reach {facts['receivers'][0].get('object') or 'the camera'} from the "
                 f"{self.settings.domain}? Mend the scene and bake with --restart"
             )
         with open(log, "a", encoding="utf-8") as lines:
@@ -233,7 +233,7 @@ class Bake:
             **base_job(self.scene, settings, scratch),
             "geometry": True,
             "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)},
-            "lights": [light.job() for light in missing],
+            "lights": [{**light.job(), "denoise": settings.denoise and light.role == "train"} for light in missing],
             "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
         }
 
@@ -256,7 +256,7 @@ class Bake:
 
     def _write_uv(self, event: dict[str, Any]) -> None:
         if "uv" in event:
-            files.write_json(self.folder / "uv.json", {"uv_layer": event["made_uv_layer"], "per_loop": event["uv"]})
+            files.write_json(self.folder / "uv.json", event["uv"])
 
     def _manifest(
         self, identity: dict[str, Any], lights: list[PlannedLight], facts: dict[str, Any], images: _Images, sampling: dict[str, Any]
@@ -264,9 +264,10 @@ class Bake:
         source = {**identity, "srbf": srbf.__version__, "blender": facts["blender"]}
         if "camera" in facts:
             source["camera"] = facts["camera"]
-        if "made_uv_layer" in facts:
+        if "uv" in facts:
             source["uv"] = "uv.json"
         apart = self.settings.transport == "indirect"
+        receivers = facts["receivers"]
         return {
             "format": "srbf-capture",
             "version": 1,
@@ -274,7 +275,7 @@ class Bake:
             "transport": self.settings.transport,
             "width": self.settings.width,
             "height": self.settings.height,
-            "receiver": facts["receiver"],
+            **({"receiver": receivers[0]} if len(receivers) == 1 else {"receivers": receivers}),
             "lights": [
                 {
                     "kind": "directional",
@@ -303,6 +304,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "keep_lamps": settings.keep_lamps,
         "sun_angle": settings.sun_angle,
         "transport": settings.transport,
+        "no_shadow": list(settings.no_shadow),
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
     }
