@@ -229,8 +229,9 @@ def test_vertices_are_fitted_relit_and_evaluated(bake) -> None:
     assert report["holdout"]["relative_rmse"] < 0.12  # 25 Gaussians of three clamped cosines
     lamp = (0.0, 0.0, 500.0)  # so far above that it is a sun: the four upper corners see a third of it each
     relit = listed(capture, relight(asset, [PointLight(lamp, a0=498.0, falloff="inverse-square")]))
-    np.testing.assert_allclose(relit[[1, 3, 5, 7]], 1 / 3, atol=0.05)
-    np.testing.assert_allclose(relit[[0, 2, 4, 6]], 0, atol=0.05)
+    ringing = 0.07  # of 25 Gaussians at the kink where a face turns away
+    np.testing.assert_allclose(relit[[1, 3, 5, 7]], 1 / 3, atol=ringing)
+    np.testing.assert_allclose(relit[[0, 2, 4, 6]], 0, atol=ringing)
 
 
 def test_vertices_that_cannot_be(bake) -> None:
@@ -281,11 +282,15 @@ def test_a_lattice_casts_its_pattern(bake) -> None:
 
 
 def test_a_normal_map_decides_the_cosine(bake) -> None:
+    """And Cycles' shadowing of a bumped surface [Conty2019]: 2 / (1 + sqrt(1 + tan²(N, Ng) / 8 tan²(L, Ng)))."""
     capture = bake("normal mapped", "lightmap:Plane").capture
     leaning = np.array([np.sin(0.5), 0, np.cos(0.5)])
+    np.testing.assert_allclose(capture.geometry("normal"), np.broadcast_to(leaning, (48, 48, 3)), atol=1e-3)
     for index, light in enumerate(capture.lights):
-        expected = max(0.0, float(leaning @ light.direction))
-        np.testing.assert_allclose(capture.image(index), expected, rtol=5e-3, atol=5e-3)
+        cosine = max(0.0, float(leaning @ light.direction))
+        slope = 1 / light.direction[2] ** 2 - 1
+        shadowing = 2 / (1 + np.sqrt(1 + np.tan(0.5) ** 2 / 8 * slope))
+        np.testing.assert_allclose(capture.image(index), cosine * shadowing, rtol=2e-3, atol=1e-3)
 
 
 def test_metal_shines_in_radiance_towards_lights_near_the_zenith(bake) -> None:
@@ -298,21 +303,22 @@ def test_metal_shines_in_radiance_towards_lights_near_the_zenith(bake) -> None:
 
 
 def test_a_moved_asset_answers_as_the_bake_of_the_moved_object(bake) -> None:
-    still = RelightingMap(k=40).encode(bake("moved", "lightmap:Plane", folder="still", lights=120, domain="sphere").capture)
-    moved = RelightingMap(k=40).encode(bake("moved", "lightmap:Moved Plane", folder="moved", lights=120, domain="sphere").capture)
+    method = RelightingMap(k=40, spread=0.6, ridge=0.01)
+    still = method.encode(bake("moved", "lightmap:Plane", folder="still", lights=120, domain="sphere").capture)
+    moved = method.encode(bake("moved", "lightmap:Moved Plane", folder="moved", lights=120, domain="sphere").capture)
     c, s = np.cos(0.8), np.sin(0.8)
     world = np.array([[c, -s, 0, FAR], [s, c, 0, 5], [0, 0, 1, 2], [0, 0, 0, 1]])
     carried = replace(still, manifest={**still.manifest, "asset_from_world": np.linalg.inv(world).tolist()})
     np.testing.assert_allclose(still.images["position"] @ world[:3, :3].T + world[:3, 3], moved.images["position"], atol=1e-3)
     for lights in (
-        [DirectionalLight((0.6, 0.3, 0.7))],
+        [DirectionalLight((1, 0.3, 0.5))],
         [PointLight((FAR + 1.5, 5.5, 4.0), falloff="inverse-square")],
     ):
         here, there = relight(carried, lights), relight(moved, lights)
         unmoved = relight(still, lights)
         rms = np.sqrt((there**2).mean())
         # Two fits to lights that stand elsewhere on the sphere as the object sees them; without the move they are far apart.
-        assert np.sqrt(((here - there) ** 2).mean()) < 0.2 * rms
+        assert np.sqrt(((here - there) ** 2).mean()) < 0.06 * rms
         assert np.sqrt(((unmoved - there) ** 2).mean()) > 2 * np.sqrt(((here - there) ** 2).mean())
 
 
@@ -337,7 +343,7 @@ def test_cameras_reproject_within_a_hundredth_of_a_pixel(bake, name: str) -> Non
     np.testing.assert_allclose(row, rows + 0.5, atol=0.01)
 
 
-def test_denoising_halves_the_error_of_few_samples(bake) -> None:
+def test_denoising_brings_few_samples_nearer_to_many(bake) -> None:
     small = {"width": 96, "height": 64, "lights": 2, "holdout": 0, "transport": "combined"}
     clean = bake("views", "view:Straight", folder="clean", samples=256, **small).capture
     noisy = bake("views", "view:Straight", folder="noisy", samples=2, sun_angle=0.0, **small).capture
