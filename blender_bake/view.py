@@ -33,6 +33,7 @@ class ViewReceiver:
         self._coverage_samples = job["coverage_samples"]
         self._coverage: np.ndarray | None = None
         self._last: dict[str, np.ndarray] = {}
+        self._guides: tuple[np.ndarray, np.ndarray] | None = None  # albedo and normal
         self._denoiser: Denoiser | None = None
         self._scratch = Path(job["scratch"])
         self._prepare(job["width"], job["height"])
@@ -86,6 +87,7 @@ class ViewReceiver:
         coverage = self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1)
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
+        self._guides = (albedo, normal * hit)
         return {
             "position": centre["Position"] * hit,
             "normal": normal * hit,
@@ -108,12 +110,12 @@ class ViewReceiver:
     def denoised(self, image: np.ndarray) -> np.ndarray:
         """An image in the units of `answer`, or a mean of several, freed of its noise by OpenImageDenoise: biased, so never to be summed.
 
-        Guided by albedo and normal of the geometry pass. It is done over coverage 1 or 0, so edges against the sky stay.
+        Guided by albedo and normal of the geometry pass; what no sample of that pass met stays 0.
         """
         if self._denoiser is None:
-            guides = self.geometry()
-            self._denoiser = Denoiser(self._scratch, guides["albedo"], guides["normal"])
-        assert self._coverage is not None
+            if self._guides is None:
+                self.geometry()
+            self._denoiser = Denoiser(self._scratch, *self._guides)
         return self._denoiser.denoise(image) * (self._coverage > 0)
 
     def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:

@@ -13,13 +13,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import Baked
+from typer.testing import CliRunner, Result
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.bake.survey import objects_of, with_size
 from srbf.capture import Capture
+from srbf.cli import app
 from srbf.errors import BakeError, InputError
 from srbf.evaluation import evaluate
+from srbf.image import read_image
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods.relighting_map import RelightingMap, relight
 
@@ -356,3 +359,43 @@ def test_denoising_brings_few_samples_nearer_to_many(bake) -> None:
     assert error(denoised) < error(noisy)
     with pytest.raises(InputError, match="--denoise is for views"):
         bake("views", "lightmap:Plane", folder="none", denoise=True)
+
+
+QUICK = ["--lights", "30", "--samples", "1", "--validation", "0", "--holdout", "2", "--holdout-samples", "4"]
+
+
+def srbf(*arguments: object) -> Result:
+    """The command line in this process; bakes still run in a worker's."""
+    return CliRunner().invoke(app, list(map(str, arguments)))
+
+
+def test_the_command_bakes_a_collection_at_a_density(scene, tmp_path: Path) -> None:
+    done = srbf("bake", scene("kit"), "-o", tmp_path / "kit", "--collection", "Kit", "--texels-per-metre", 8, *QUICK)
+    assert done.exit_code == 0, done.output
+    capture = Capture.open(tmp_path / "kit")
+    assert [one["object"] for one in capture.manifest["receivers"]] == ["Deep", "Doubled", "Plate"]
+    assert (capture.width, capture.width % 4) == (capture.height, 0)
+
+
+def test_the_command_bakes_cameras_into_folders_of_their_own(scene, tmp_path: Path) -> None:
+    cameras = ["--receiver", "view:Straight", "--receiver", "view:Flat", "--size", "24x16"]
+    done = srbf("bake", scene("views"), "-o", tmp_path / "two", *cameras, *QUICK)
+    assert done.exit_code == 0, done.output
+    for name in ("Straight", "Flat"):
+        assert Capture.open(tmp_path / "two" / name).manifest["receiver"] == {"kind": "view", "camera": name}
+    missing = srbf("bake", scene("views"), "-o", tmp_path / "none", *QUICK)
+    assert missing.exit_code == 1 and "--receiver" in missing.output
+
+
+def test_the_commands_take_vertices_as_any_other_receiver(scene, tmp_path: Path) -> None:
+    capture, asset = tmp_path / "capture", tmp_path / "asset"
+    dry = srbf("bake", scene("cube"), "-o", capture, "--receiver", "vertices:Cube", "--dry-run", *QUICK)
+    assert dry.exit_code == 0 and "vertices: object Cube, count 9, 9x1" in dry.output and not capture.exists()
+    assert srbf("bake", scene("cube"), "-o", capture, "--receiver", "vertices:Cube", *QUICK).exit_code == 0
+    assert srbf("fit", capture, "-o", asset, "-k", 9).exit_code == 0
+    told = srbf("evaluate", asset, capture, "--json")
+    assert told.exit_code == 0 and json.loads(told.stdout)["holdout"]["relative_rmse"] < 0.5
+    assert srbf("relight", asset, "--directional", "0,0,1", "-o", tmp_path / "lit.exr").exit_code == 0
+    relit = read_image(tmp_path / "lit.exr", 3)[0]
+    assert relit[[1, 3, 5, 7]].min() > relit[[0, 2, 4, 6]].max() + 0.1  # the upper four see the sun
+    assert json.loads(srbf("info", asset, "--json").stdout)["width"] == 9
