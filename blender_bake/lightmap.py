@@ -38,11 +38,12 @@ class LightmapReceiver:
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
-        alone = [self._bake("DIFFUSE", [obj], 1, 0, pass_filter={"COLOR"}).copy() for obj in self._objects]
-        self._masks = [image[:, :, 3:] > 0 for image in alone]  # (H, W, 1) each: a texel is the last object's to take it
-        self._albedo = _laid_over(alone, self._masks)
+        self._owner = np.zeros((self._height, self._width), np.int32)  # which object a covered texel belongs to: the last to take it
+        self._albedo = np.zeros((self._height, self._width, 4), np.float32)
+        for i, obj in enumerate(self._objects):
+            self._take_texels(i, obj)
         self._coverage = self._albedo[:, :, 3:]
-        self._check_coverage(self._made or wanted.get("uv_layer") is not None)
+        self._check_overlap(self._made or wanted.get("uv_layer") is not None)
         self._readable, self._albedo_read = self._coverage, self._albedo
         if self._irradiance:
             self._whiten_what_is_not_diffuse()
@@ -75,8 +76,10 @@ class LightmapReceiver:
         position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample stands on the texel centre
         encoded = self._bake("NORMAL", self._objects, 1, 0, normal_space="OBJECT")[:, :, :3]
         of_object = 2 * (encoded - NORMAL_OFFSET) - 1
-        turned = [of_object @ np.array(obj.matrix_world.to_3x3().inverted_safe(), np.float32) for obj in self._objects]
-        normal = _laid_over(turned, self._masks)
+        normal = np.empty_like(of_object)
+        for i, obj in enumerate(self._objects):
+            mine = self._owner == i
+            normal[mine] = of_object[mine] @ np.array(obj.matrix_world.to_3x3().inverted_safe(), np.float32)
         normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-20)
         covered = self._coverage
         return {
@@ -139,13 +142,18 @@ class LightmapReceiver:
         shown = ", ".join(repr(name) for name in list(self._layers)[:4])
         return shown + (f" and {len(self._layers) - 4} more" if len(self._layers) > 4 else "")
 
-    def _check_coverage(self, made_or_named: bool) -> None:
-        for obj, mask in zip(self._objects, self._masks, strict=True):
-            if not mask.any():
-                raise WorkerError(
-                    f"expected texels on UV layer {self._layers[obj.name]!r} of {obj.name!r}, found none at "
-                    f"{self._width}x{self._height}; check its UVs, or bake larger"
-                )
+    def _take_texels(self, index: int, obj: bpy.types.Object) -> None:
+        image = self._bake("DIFFUSE", [obj], 1, 0, pass_filter={"COLOR"})
+        mine = image[:, :, 3] > 0
+        if not mine.any():
+            raise WorkerError(
+                f"expected texels on UV layer {self._layers[obj.name]!r} of {obj.name!r}, found none at "
+                f"{self._width}x{self._height}; check its UVs, or bake larger"
+            )
+        self._owner[mine] = index
+        self._albedo[mine] = image[mine]
+
+    def _check_overlap(self, made_or_named: bool) -> None:
         overlap = unwrap.overlap([(obj.data, self._layers[obj.name]) for obj in self._objects], self._coverage[:, :, 0])
         if overlap > unwrap.OVERLAP_LIMIT and made_or_named:
             layers = ", ".join(repr(layer) for layer in sorted(set(self._layers.values())))
@@ -171,11 +179,3 @@ class LightmapReceiver:
             self._channel.warn(
                 f"{int(black.sum())} texels are black between diffuse ones: they take the irradiance of the nearest that is not"
             )
-
-
-def _laid_over(images: list[np.ndarray], masks: list[np.ndarray]) -> np.ndarray:
-    """One image of several (H, W, C), each where its own mask (H, W, 1) is true, later ones over earlier ones."""
-    whole = images[0].copy()
-    for image, mask in zip(images[1:], masks[1:], strict=True):
-        np.copyto(whole, image, where=mask)
-    return whole

@@ -151,6 +151,7 @@ def make_layer(obj: bpy.types.Object, texels: int, method: str = "smart") -> Non
 
 def pack(objects: list[bpy.types.Object], own: list[str | None], texels: int, method: str) -> None:
     """Add MADE_LAYER to every object: charts of its `own` layer, or new ones where that is None, at one density, packed without overlap."""
+    whole = sum(world_area(obj) for obj in objects)
     for obj, layer in zip(objects, own, strict=True):
         if layer is None:
             make_layer(obj, texels, method)
@@ -160,14 +161,16 @@ def pack(objects: list[bpy.types.Object], own: list[str | None], texels: int, me
                 _set_coordinates(obj.data, charts)
         loops = layer_coordinates(obj.data, MADE_LAYER)
         area = float(np.abs(triangle_areas(loops[triangle_loops(obj.data)])).sum())
-        _set_coordinates(obj.data, loops * math.sqrt(world_area(obj) / area))
+        _set_coordinates(obj.data, loops * math.sqrt(world_area(obj) / area / whole))  # together they fill the unit square
         obj.data.uv_layers.active = obj.data.uv_layers[MADE_LAYER]
     select(objects)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.reveal()
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.uv.select_all(action="SELECT")
-    result = bpy.ops.uv.pack_islands(rotate=True, scale=True, margin_method="FRACTION", margin=_gutter(texels))
+    result = bpy.ops.uv.pack_islands(  # by boxes: outlines pack closer, but take seconds, and every worker packs anew
+        rotate=True, rotate_method="CARDINAL", scale=True, margin_method="FRACTION", margin=_gutter(texels), shape_method="AABB"
+    )
     bpy.ops.object.mode_set(mode="OBJECT")
     if result != {"FINISHED"}:
         raise WorkerError(f"Blender's packer ended as {', '.join(result)} on {len(objects)} objects; name UV layers that lie side by side")
