@@ -18,8 +18,10 @@ from typer.testing import CliRunner, Result
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.bake.survey import objects_of, with_size
-from srbf.capture import Capture
+from srbf.capture import COVERED, Capture
 from srbf.cli import app
+from srbf.direct.ray import RayTracer
+from srbf.direct.receivers import Receivers
 from srbf.errors import BakeError, InputError
 from srbf.evaluation import evaluate
 from srbf.image import read_image
@@ -399,3 +401,18 @@ def test_the_commands_take_vertices_as_any_other_receiver(scene, tmp_path: Path)
     relit = read_image(tmp_path / "lit.exr", 3)[0]
     assert relit[[1, 3, 5, 7]].min() > relit[[0, 2, 4, 6]].max() + 0.1  # the upper four see the sun
     assert json.loads(srbf("info", asset, "--json").stdout)["width"] == 9
+
+
+@pytest.mark.parametrize(
+    ("name", "receivers", "no_shadow"),
+    [("shared", ("lightmap:Flat", "lightmap:Mirrored"), ()), ("closed room", ("lightmap:Room",), ("Ceiling",))],
+)
+def test_rays_give_the_direct_light_of_an_atlas_and_of_a_closed_room_back(bake, name: str, receivers: tuple, no_shadow: tuple) -> None:
+    capture = bake(name, *receivers, transport="indirect", no_shadow=no_shadow, lights=2, holdout_samples=32).capture
+    tracer = RayTracer(Receivers.of(capture))
+    covered = capture.coverage() >= COVERED
+    for index in capture.indices("holdout"):
+        true = capture.combined().image(index) - capture.image(index)
+        found = tracer.directional(capture.directions([index]))[0]
+        assert true[covered].mean() > 0.05
+        assert np.median(np.abs(found - true)[covered].max(axis=1)) < 2e-3 * true.max()
