@@ -29,7 +29,7 @@ def main() -> None:
     requests = Requests()
     try:
         job = json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8"))
-        run(job, chain(job["lights"], requests if job.get("serve") else ()), channel)
+        run(job, chain(job.get("lights", ()), requests if job.get("serve") else ()), channel)
     except WorkerError as error:
         channel.emit("error", message=str(error))
         leave(1)
@@ -44,32 +44,34 @@ def main() -> None:
 def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel) -> None:
     """Open the scene, prepare the receiver, hand over what `job` asks for, say that it is ready, then answer `lights` as they come.
 
-    job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
-    geometry (bool), ambient {samples, seed} or null; `serve` where lights are asked for on stdin, after those in the job.
-    A light: index, kind, direction | position, samples, seed.
+    job: scene, receiver {kind, object | objects, uv_layer, unwrap | camera}, no_shadow (names of objects), width, height, quantity,
+    keep_lamps, sun_angle, scratch, geometry (bool), ambient {samples, seed} or null; `serve` where lights are asked for on stdin,
+    after those in the job. A light: index, kind, direction | position, samples, seed, denoise (bool).
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
-    by which the tints of translucent materials are chosen, unless `tints` has them already. Where there is a `survey`, its
-    question is answered, and nothing else done.
+    by which the tints of translucent materials are chosen, unless `tints` has them already. A job with `survey` gets what that asks for,
+    and nothing is baked.
     """
-    from blender_bake import emission, point_grid, scene_file, translucency
+    from blender_bake import emission, no_shadow, scene_file, survey, translucency
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
+    from blender_bake.vertices import VertexReceiver
     from blender_bake.view import ViewReceiver
 
     scratch = Path(job["scratch"])
     scene = scenes.open_scene(job["scene"], channel)
-    if "survey" in job:
-        channel.emit("survey", points=point_grid.survey(scene, job["survey"]["points"]))
-        return
     scenes.configure(scene)
+    if "survey" in job:
+        channel.emit("survey", **survey.answer(scene, job, channel))
+        return
+    no_shadow.let_light_through(scene, job["no_shadow"])
     own_light = scenes.OwnLight(scene)
-    kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
+    kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
     apart = job.get("transport") == "indirect"
     if apart:
         scene_file.show_as_rendered(scene)
     receiver = kind(scene, job, channel)
-    channel.emit("scene", blender=scenes.version(), receiver=receiver.description(), **receiver.facts())
+    channel.emit("scene", blender=scenes.version(), receivers=receiver.descriptions(), **receiver.facts())
 
     def image(name: str, array: Any, started: float, **fields: Any) -> None:
         channel.emit("image", name=name, file=hand_over(scratch, name, array), seconds=time.perf_counter() - started, **fields)
@@ -88,7 +90,7 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     if ambient:
         started = time.perf_counter()
         image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
-    illuminant = Illuminant(scene, job["sun_angle"])
+    illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
         translucent = translucency.find(scene)
@@ -96,7 +98,7 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
         if tints is None:
             aims = [partial(illuminant.aim, light) for light in job["probes"]]
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-            seen_by = {receiver.description()["object"]} if job["receiver"]["kind"] == "lightmap" else None
+            seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
             (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
             channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)
         switch = translucency.Switch(translucent, tints)
@@ -106,7 +108,8 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
         illuminant.aim(light)
         name = f"light_{light['index']}"
         if switch is None:
-            image(name, receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+            answer = receiver.answer(light["samples"], light["seed"])
+            image(name, receiver.denoised(answer) if light.get("denoise") else answer, started, light=light["index"])
             continue
         whole, direct = receiver.answers(light["samples"], light["seed"], switch)
         image(name, whole, started, light=light["index"], direct=hand_over(scratch, f"direct_{light['index']}", direct))

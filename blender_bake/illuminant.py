@@ -15,9 +15,11 @@ POINT_WATTS = 4 * math.pi  # a lamp of P watts gives the irradiance P / (4 pi d^
 class Illuminant:
     """A sun and a point lamp of ours, one of them lit at a time."""
 
-    def __init__(self, scene: bpy.types.Scene, sun_angle: float) -> None:
+    def __init__(self, scene: bpy.types.Scene, sun_angle: float, by_shadow_rays_alone: bool = False) -> None:
         self._sun = _lamp(scene, "SUN")
         self._sun.data.angle = sun_angle
+        if by_shadow_rays_alone:  # bounced rays may not reach it, and must then not be counted on
+            self._sun.data.cycles.use_multiple_importance_sampling = False
         self._point = _lamp(scene, "POINT")
         self._point.data.shadow_soft_size = 0.0
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A lightmap receiver: the texels of an object's UV layer, baked by Cycles."""
+"""A lightmap receiver: the texels of UV layers, of one object or of several in one atlas, baked by Cycles."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from blender_bake import materials, unwrap
 from blender_bake.channel import Channel, WorkerError
+from blender_bake.receiver_objects import prepare, select
 from blender_bake.seam_edges import seam_edges
 from blender_bake.translucency import Switch
 
@@ -19,7 +20,7 @@ NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
 
 
 class LightmapReceiver:
-    """One mesh object, its modifiers applied, its texels answering lights; arrays are (H, W, C) float32, row 0 at the top."""
+    """Mesh objects, their modifiers applied, whose texels in one atlas answer lights; arrays are (H, W, C) float32, row 0 at the top."""
 
     def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
         self._scene = scene
@@ -27,34 +28,44 @@ class LightmapReceiver:
         self._irradiance = job["quantity"] == "irradiance"
         scene.render.bake.view_from = "ABOVE_SURFACE"
         self._height, self._width = job["height"], job["width"]
-        self._object = find_mesh_object(scene, job["receiver"]["object"])
-        apply_modifiers(self._object)
-        _only_selected(self._object)
+        wanted = job["receiver"]
+        self._objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
         self._image = bpy.data.images.new("srbf bake", self._width, self._height, alpha=True, float_buffer=True)
-        self._material_names = [slot.material.name if slot.material else "(none)" for slot in self._object.material_slots]
-        materials.bakeable_slots(self._object, self._image)
-        self._uv_layer, made = unwrap.choose_layer(self._object, job["receiver"].get("uv_layer"), min(self._width, self._height), channel)
-        self._albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
+        self._material_names = [[s.material.name if s.material else "(none)" for s in obj.material_slots] for obj in self._objects]
+        for obj in self._objects:
+            materials.bakeable_slots(obj, self._image)
+        texels, method = min(self._width, self._height), wanted.get("unwrap", "smart")
+        layers, self._made = unwrap.choose_layers(self._objects, wanted.get("uv_layer"), texels, method, channel)
+        self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
+        for obj, layer in zip(self._objects, layers, strict=True):
+            obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
+        self._owner = np.zeros((self._height, self._width), np.int32)  # which object a covered texel belongs to: the last to take it
+        self._albedo = np.zeros((self._height, self._width, 4), np.float32)
+        for i, obj in enumerate(self._objects):
+            self._take_texels(i, obj)
         self._coverage = self._albedo[:, :, 3:]
-        self._check_coverage(made or job["receiver"].get("uv_layer") is not None)
+        self._check_overlap(self._made or wanted.get("uv_layer") is not None)
         self._readable, self._albedo_read = self._coverage, self._albedo
         if self._irradiance:
             self._whiten_what_is_not_diffuse()
-        self._made_layer = made
 
-    def description(self) -> dict[str, Any]:
-        """What the manifest says of this receiver."""
-        return {"kind": "lightmap", "object": self._object.name, "uv_layer": self._uv_layer}
+    def descriptions(self) -> list[dict[str, Any]]:
+        """What the manifest says of each object."""
+        return [{"kind": "lightmap", "object": name, "uv_layer": layer} for name, layer in self._layers.items()]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log; where a layer was made, its name and its coordinates per loop, to carry into one's own scene."""
+        """For the dry run and the log; where layers were made, their names and coordinates per loop, to carry into one's own scene."""
         facts: dict[str, Any] = {
-            "polygons": len(self._object.data.polygons),
+            "polygons": sum(len(obj.data.polygons) for obj in self._objects),
             "covered_texels": int((self._coverage > 0).sum()),
         }
-        if self._made_layer:
-            facts["made_uv_layer"] = self._uv_layer
-            facts["uv"] = unwrap.layer_coordinates(self._object.data, self._uv_layer).tolist()
+        if self._made:
+            made = [
+                {"object": obj.name, "uv_layer": self._layers[obj.name], "per_loop": unwrap.layer_coordinates(obj.data, layer).tolist()}
+                for obj in self._objects
+                for layer in (self._layers[obj.name],)
+            ]
+            facts["uv"] = {key: made[0][key] for key in ("uv_layer", "per_loop")} if len(made) == 1 else {"objects": made}
         return facts
 
     def sampling(self) -> dict[str, Any]:
@@ -62,13 +73,18 @@ class LightmapReceiver:
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
     def geometry(self) -> dict[str, np.ndarray]:
-        """World position at texel centres, world normal, albedo and coverage; (1, E, 8) `seams` where the layer has any."""
-        position = self._bake("POSITION", 1, 0)[:, :, :3]  # one sample stands on the texel centre; more would be summed
-        encoded = self._bake("NORMAL", 1, 0, normal_space="OBJECT")[:, :, :3]
-        normal = (2 * (encoded - NORMAL_OFFSET) - 1) @ np.array(self._object.matrix_world.to_3x3().inverted_safe(), np.float32)
+        """World position at texel centres, world normal, albedo and coverage; (1, E, 8) `seams` where the layers have any."""
+        position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample stands on the texel centre
+        encoded = self._bake("NORMAL", self._objects, 1, 0, normal_space="OBJECT")[:, :, :3]
+        of_object = 2 * (encoded - NORMAL_OFFSET) - 1
+        normal = np.empty_like(of_object)
+        for i, obj in enumerate(self._objects):
+            mine = self._owner == i
+            normal[mine] = of_object[mine] @ np.array(obj.matrix_world.to_3x3().inverted_safe(), np.float32)
         normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-20)
         covered = self._coverage
-        seams = seam_edges(self._object.data, self._uv_layer, within_material=not self._irradiance)
+        of_each = [seam_edges(obj.data, self._layers[obj.name], within_material=not self._irradiance) for obj in self._objects]
+        seams = np.concatenate(of_each)
         return {
             "position": position * covered,
             "normal": normal * covered,
@@ -82,9 +98,9 @@ class LightmapReceiver:
     def answer(self, samples: int, seed: int) -> np.ndarray:
         """Irradiance E = pi x Cycles' DIFFUSE without colour, or radiance seen from straight above each texel."""
         if self._irradiance:
-            return self._bake("DIFFUSE", samples, seed, pass_filter={"DIRECT", "INDIRECT"})[:, :, :3] * np.float32(math.pi)
+            return self._bake("DIFFUSE", self._objects, samples, seed, pass_filter={"DIRECT", "INDIRECT"})[:, :, :3] * np.float32(math.pi)
         every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
-        return self._bake("COMBINED", samples, seed, pass_filter=every)[:, :, :3]
+        return self._bake("COMBINED", self._objects, samples, seed, pass_filter=every)[:, :, :3]
 
     def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
         """(`answer`, the direct diffuse light in it with `translucent` on): same seed, so that one is exactly part of the other."""
@@ -98,120 +114,72 @@ class LightmapReceiver:
         """The direct diffuse light alone, in the units of `answer`."""
         parts = {"DIRECT"} if self._irradiance else {"DIRECT", "COLOR"}
         scale = math.pi if self._irradiance else 1.0
-        return self._bake("DIFFUSE", samples, seed, pass_filter=parts)[:, :, :3] * np.float32(scale)
+        return self._bake("DIFFUSE", self._objects, samples, seed, pass_filter=parts)[:, :, :3] * np.float32(scale)
 
-    def _bake(self, kind: str, samples: int, seed: int, **options: Any) -> np.ndarray:
+    def _bake(self, kind: str, objects: list[bpy.types.Object], samples: int, seed: int, **options: Any) -> np.ndarray:
+        select(objects)
         self._scene.cycles.samples = samples
         self._scene.cycles.seed = seed
         try:
             result = bpy.ops.object.bake(
                 type=kind,
                 margin=0,
-                use_clear=True,
+                use_clear=True,  # of several objects Blender clears none: what no object covers stays as its last bake alone left it
                 target="IMAGE_TEXTURES",
                 save_mode="INTERNAL",
                 use_selected_to_active=False,
                 use_cage=False,
                 use_split_materials=False,
-                uv_layer=self._uv_layer,
                 **options,
             )
         except RuntimeError as error:
             reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
-            raise WorkerError(f"Blender could not bake {self._object.name!r}: {reason}") from error
+            raise WorkerError(f"Blender could not bake {self._names()}: {reason}") from error
         if result != {"FINISHED"}:
-            raise WorkerError(f"Blender's bake of {self._object.name!r} ended as {', '.join(result)}, without a reason")
+            raise WorkerError(f"Blender's bake of {self._names()} ended as {', '.join(result)}, without a reason")
         pixels = np.empty(self._height * self._width * 4, np.float32)
         self._image.pixels.foreach_get(pixels)
         # Blender's row 0 is the bottom: this is the one flip.
         return pixels.reshape(self._height, self._width, 4)[::-1]
 
-    def _check_coverage(self, made_or_named: bool) -> None:
-        if not self._coverage.any():
+    def _names(self) -> str:
+        shown = ", ".join(repr(name) for name in list(self._layers)[:4])
+        return shown + (f" and {len(self._layers) - 4} more" if len(self._layers) > 4 else "")
+
+    def _take_texels(self, index: int, obj: bpy.types.Object) -> None:
+        image = self._bake("DIFFUSE", [obj], 1, 0, pass_filter={"COLOR"})
+        mine = image[:, :, 3] > 0
+        if not mine.any():
             raise WorkerError(
-                f"expected texels on UV layer {self._uv_layer!r} of {self._object.name!r}, found none at "
+                f"expected texels on UV layer {self._layers[obj.name]!r} of {obj.name!r}, found none at "
                 f"{self._width}x{self._height}; check its UVs, or bake larger"
             )
-        overlap = unwrap.overlap(self._object.data, self._uv_layer, self._coverage[:, :, 0])
+        self._owner[mine] = index
+        self._albedo[mine] = image[mine]
+
+    def _check_overlap(self, made_or_named: bool) -> None:
+        overlap = unwrap.overlap([(obj.data, self._layers[obj.name]) for obj in self._objects], self._coverage[:, :, 0])
         if overlap > unwrap.OVERLAP_LIMIT and made_or_named:
-            self._channel.warn(f"UV layer {self._uv_layer!r}: about {overlap:.0%} of its area overlaps, and overlapping faces share light")
+            layers = ", ".join(repr(layer) for layer in sorted(set(self._layers.values())))
+            self._channel.warn(f"UV layer {layers}: about {overlap:.0%} of its area overlaps, and overlapping faces share light")
 
     def _whiten_what_is_not_diffuse(self) -> None:
         """Replace each slot with no diffuse reflection (metal, glass, black) by white Lambert, so that its irradiance can be read."""
-        largest = unwrap.slot_maximum(self._object, self._uv_layer, self._albedo)
         names = []
-        for i, albedo in largest.items():
-            if albedo < NOT_DIFFUSE:
-                slot = self._object.material_slots[i]
-                names.append(repr(self._material_names[i]))
-                slot.material = materials.lambert((1, 1, 1))
-                materials.add_target(slot.material, self._image)
+        for obj, slots in zip(self._objects, self._material_names, strict=True):
+            for i, albedo in unwrap.slot_maximum(obj, self._layers[obj.name], self._albedo).items():
+                if albedo < NOT_DIFFUSE:
+                    names.append(repr(slots[i]))
+                    obj.material_slots[i].material = materials.lambert((1, 1, 1))
+                    materials.add_target(obj.material_slots[i].material, self._image)
         if names:
-            self._channel.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
-            self._albedo_read = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
+            self._channel.warn(
+                f"nothing is diffuse in {', '.join(dict.fromkeys(names))}: its irradiance is taken on a white Lambert surface instead"
+            )
+            self._albedo_read = self._bake("DIFFUSE", self._objects, 1, 0, pass_filter={"COLOR"})
         black = (self._albedo_read[:, :, :3].max(axis=2) < NOT_DIFFUSE) & (self._coverage[:, :, 0] > 0)
         if black.any():
             self._readable = self._coverage * ~black[:, :, None]
             self._channel.warn(
                 f"{int(black.sum())} texels are black between diffuse ones: they take the irradiance of the nearest that is not"
             )
-
-
-def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
-    """The object `name` of the scene, made local and visible; WorkerError says what else there is."""
-    obj = scene.objects.get(name)
-    if obj is None:
-        meshes = sorted(o.name for o in scene.objects if o.type == "MESH")
-        shown = ", ".join(repr(n) for n in meshes[:12]) + (", …" if len(meshes) > 12 else "")
-        raise WorkerError(f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}")
-    if obj.type != "MESH":
-        raise WorkerError(
-            f"expected a mesh object, found {name!r} of type {obj.type}; a curve or text: Object > Convert > Mesh, and save the .blend"
-        )
-    if obj.hide_render:
-        raise WorkerError(f"expected {name!r} to be renderable, found it disabled in renders; enable its camera icon and save the .blend")
-    if obj.library or obj.override_library:
-        obj.make_local()
-    obj.hide_viewport = False
-    obj.hide_select = False
-    obj.hide_set(False)
-    if not obj.visible_get():
-        raise WorkerError(f"expected {name!r} to be visible, found its collection excluded or hidden; show it and save the .blend")
-    return obj
-
-
-def apply_modifiers(obj: bpy.types.Object) -> None:
-    """Put the evaluated mesh, at render settings, in place of the object's data: every bake would evaluate it again."""
-    for modifier in obj.modifiers:
-        modifier.show_viewport = modifier.show_render
-        if modifier.type in {"SUBSURF", "MULTIRES"}:
-            modifier.levels = modifier.render_levels
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    _realise_instances(obj, depsgraph)
-    mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
-    obj.modifiers.clear()
-    obj.data = mesh
-    if not mesh.polygons:
-        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any")
-
-
-def _realise_instances(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Objects that the modifiers or particles of `obj` scatter stay as objects of their own when those are gone."""
-    meshes: dict[str, bpy.types.Mesh] = {}
-    for instance in depsgraph.object_instances:
-        source = instance.object
-        if not (instance.is_instance and instance.parent and instance.parent.original == obj and source.type == "MESH"):
-            continue
-        key = source.data.name_full
-        if key not in meshes:
-            meshes[key] = bpy.data.meshes.new_from_object(source, preserve_all_data_layers=True, depsgraph=depsgraph)
-        copy = bpy.data.objects.new(f"{obj.name} instance", meshes[key])
-        copy.matrix_world = instance.matrix_world.copy()
-        bpy.context.scene.collection.objects.link(copy)
-
-
-def _only_selected(obj: bpy.types.Object) -> None:
-    for other in bpy.context.view_layer.objects:
-        other.select_set(False)
-    obj.select_set(True)
-    bpy.context.view_layer.objects.active = obj

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UV layers for lightmaps: does one fit (inside [0, 1], not degenerate, no overlap), and making one where none does."""
+"""UV layers for lightmaps: do they fit (inside [0, 1], not degenerate, no overlap, side by side), and making them where they do not."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
 
 from blender_bake.channel import Channel, WorkerError
+from blender_bake.receiver_objects import select, world_area
 
 MAX_UV_LAYERS = 8  # Blender's own limit
 MADE_LAYER = "srbf lightmap"
@@ -16,82 +19,189 @@ RANGE_TOLERANCE = 1e-4
 SMALLEST_AREA = 1e-6  # of the unit square: less is degenerate
 OVERLAP_LIMIT = 0.1  # of the layer's area: below, texel rounding at small charts explains it
 OVERLAP_GRID = 512
+NO_AREA = "has no area"
 GUTTER_TEXELS = 4
 LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be all gutter
 
 
-def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, channel: Channel) -> tuple[str, bool]:
-    """(layer, whether it was made): the layer asked for, else the active one if it fits, else another that fits, else a new one."""
+def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int, method: str, channel: Channel) -> tuple[list[str], bool]:
+    """(a layer for each object, whether they were made). Several objects share one atlas, so theirs must lie side by side.
+
+    name: the layer asked for, else the active one if it fits, else another that fits; where none does, or where those of several objects
+    overlap, a layer of our own on every object, by `method`: `smart` (Smart UV Project) or `lightmap-pack` for objects without a layer
+    that fits, then all charts together by Blender's packer at one density; `keep` makes none. WorkerError where nothing can serve.
+    """
+    if len(objects) == 1:
+        layer, made = choose_layer(objects[0], name, texels, method, channel)
+        return [layer], made
+    if name not in (None, MADE_LAYER):
+        for obj in objects:
+            _require_layer(obj, name)
+        own: list[str | None] = [name] * len(objects)
+    else:
+        own = [fitting_layer(obj.data) for obj in objects]
+    fitting = [layer for layer in own if layer is not None]
+    if len(fitting) < len(objects):
+        lacking = [repr(obj.name) for obj, layer in zip(objects, own, strict=True) if layer is None]
+        reason = (
+            f"{len(lacking)} of {len(objects)} objects have none that fits: {', '.join(lacking[:8])}{', …' if len(lacking) > 8 else ''}"
+        )
+    else:
+        both = zip(objects, fitting, strict=True)
+        corners = np.concatenate([layer_coordinates(obj.data, layer)[triangle_loops(obj.data)] for obj, layer in both])
+        problem = misfit_of(corners)
+        if problem is None and name != MADE_LAYER:
+            return fitting, False
+        reason = f"the layers of {len(objects)} objects together: that of all {problem}" if problem else "it was asked for"
+    if method == "keep":
+        raise WorkerError(
+            f"expected UV layers of {len(objects)} objects that share one atlas, found {reason}; lay them out side by side, "
+            "or let --unwrap smart pack them"
+        )
+    pack(objects, own, texels, method)
+    channel.warn(
+        f"packed a lightmap UV layer for {len(objects)} objects ({reason}); its coordinates are written to uv.json beside the capture"
+    )
+    return [MADE_LAYER] * len(objects), True
+
+
+def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: str, channel: Channel) -> tuple[str, bool]:
+    """(layer, whether it was made) of a single object, see `choose_layers`."""
     mesh = obj.data
     layers = mesh.uv_layers
     if name == MADE_LAYER and name not in layers:  # an earlier bake made it: the same layer comes out again
-        make_layer(obj, texels)
+        make_layer(obj, texels, method)
         return name, True
     if name is not None:
-        if name not in layers:
-            found = ", ".join(repr(layer.name) for layer in layers) or "none"
-            raise WorkerError(f"expected a UV layer {name!r} on {obj.name!r}, found {found}")
+        _require_layer(obj, name)
         problem = misfit(mesh, name)
-        if problem and "area" in problem:
-            raise WorkerError(f"expected UV layer {name!r} of {obj.name!r} to cover texels, found that it {problem}")
         if problem:
             channel.warn(f"UV layer {name!r} {problem}; it is used because it was asked for")
         return name, False
     active = layers.active.name if layers.active else None
-    candidates = ([active] if active else []) + [layer.name for layer in layers if layer.name != active]
-    problems = {}
-    for candidate in candidates:
-        problem = misfit(mesh, candidate)
-        if not problem:
-            if candidate != active:
-                channel.warn(f"the active UV layer {active!r} {problems[active]}; using {candidate!r}")
-            return candidate, False
-        problems[candidate] = problem
-    if len(layers) >= MAX_UV_LAYERS:
+    layer = fitting_layer(mesh)
+    if layer is not None:
+        if layer != active:
+            channel.warn(f"the active UV layer {active!r} {misfit(mesh, active)}; using {layer!r}")
+        return layer, False
+    problem = misfit(mesh, active) if active else None
+    reason = f"the active one {problem}" if active else "it has none"
+    if method == "keep":
         raise WorkerError(
-            f"expected a UV layer of {obj.name!r} that fits a lightmap or room for one, found {len(layers)} layers of which none fits "
-            f"({active!r} {problems[active]}); remove one, or name one with --uv-layer"
+            f"expected a UV layer of {obj.name!r} that fits a lightmap, found that {reason}; mend it, or let --unwrap smart make one"
         )
-    reason = f"the active one {problems[active]}" if active else "it has none"
-    make_layer(obj, texels)
+    make_layer(obj, texels, method)
     channel.warn(f"made a lightmap UV layer for {obj.name!r} ({reason}); its coordinates are written to uv.json beside the capture")
     return MADE_LAYER, True
 
 
+def fitting_layer(mesh: bpy.types.Mesh) -> str | None:
+    """The active UV layer if it fits a lightmap, else the first that does."""
+    active = mesh.uv_layers.active.name if mesh.uv_layers.active else None
+    names = ([active] if active else []) + [layer.name for layer in mesh.uv_layers if layer.name != active]
+    return next((name for name in names if misfit(mesh, name) is None), None)
+
+
+def _require_layer(obj: bpy.types.Object, name: str) -> None:
+    layers = obj.data.uv_layers
+    if name not in layers:
+        found = ", ".join(repr(layer.name) for layer in layers) or "none"
+        raise WorkerError(f"expected a UV layer {name!r} on {obj.name!r}, found {found}")
+    problem = misfit(obj.data, name)
+    if problem == NO_AREA:
+        raise WorkerError(f"expected UV layer {name!r} of {obj.name!r} to cover texels, found that it {problem}")
+
+
 def misfit(mesh: bpy.types.Mesh, layer: str) -> str | None:
     """Why a layer cannot serve as a lightmap, or None."""
-    uv = layer_coordinates(mesh, layer)
-    if not np.isfinite(uv).all():
+    return misfit_of(layer_coordinates(mesh, layer)[triangle_loops(mesh)])
+
+
+def misfit_of(corners: np.ndarray) -> str | None:
+    """Why UV triangles (n, 3, 2), of one mesh or of several together, cannot serve as a lightmap, or None."""
+    if not np.isfinite(corners).all():
         return "holds NaN or infinite coordinates"
-    if float(uv.min()) < -RANGE_TOLERANCE or float(uv.max()) > 1 + RANGE_TOLERANCE:
-        return f"leaves [0, 1] (from {uv.min():.3g} to {uv.max():.3g})"
-    if float(np.abs(triangle_areas(uv[triangle_loops(mesh)])).sum()) < SMALLEST_AREA:
-        return "has no area"
-    shared = overlap_on_grid(uv[triangle_loops(mesh)])
+    if float(corners.min()) < -RANGE_TOLERANCE or float(corners.max()) > 1 + RANGE_TOLERANCE:
+        return f"leaves [0, 1] (from {corners.min():.3g} to {corners.max():.3g})"
+    if float(np.abs(triangle_areas(corners)).sum()) < SMALLEST_AREA:
+        return NO_AREA
+    shared = overlap_on_grid(corners)
     if shared > OVERLAP_LIMIT:
         return f"overlaps itself on about {shared:.0%} of its area"
     return None
 
 
-def make_layer(obj: bpy.types.Object, texels: int) -> None:
-    """Add MADE_LAYER by Blender's Smart UV Project, with a gutter between charts, leaving the layer that textures use alone."""
-    layers = obj.data.uv_layers
-    render_layer = next((layer.name for layer in layers if layer.active_render), None)
-    if layers.new(name=MADE_LAYER, do_init=False) is None:
-        raise WorkerError(f"Blender refused another UV layer on {obj.name!r}")
-    layers.active = layers[MADE_LAYER]
+def make_layer(obj: bpy.types.Object, texels: int, method: str = "smart") -> None:
+    """Add MADE_LAYER by Blender's Smart UV Project or Lightmap Pack, a gutter between charts, leaving the layer that textures use alone."""
+    with _layer_for_us(obj):
+        select([obj])
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.reveal()
+        bpy.ops.mesh.select_all(action="SELECT")
+        if method == "lightmap-pack":
+            bpy.ops.uv.lightmap_pack(
+                PREF_CONTEXT="ALL_FACES", PREF_PACK_IN_ONE=True, PREF_NEW_UVLAYER=False, PREF_MARGIN_DIV=_gutter(texels)
+            )
+        else:
+            bpy.ops.uv.smart_project(
+                angle_limit=math.radians(66), margin_method="FRACTION", island_margin=_gutter(texels), correct_aspect=False
+            )
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def pack(objects: list[bpy.types.Object], own: list[str | None], texels: int, method: str) -> None:
+    """Add MADE_LAYER to every object: charts of its `own` layer, or new ones where that is None, at one density, packed without overlap."""
+    whole = sum(world_area(obj) for obj in objects)
+    for obj, layer in zip(objects, own, strict=True):
+        if layer is None:
+            make_layer(obj, texels, method)
+        elif layer != MADE_LAYER:
+            charts = layer_coordinates(obj.data, layer)
+            with _layer_for_us(obj):
+                _set_coordinates(obj.data, charts)
+        loops = layer_coordinates(obj.data, MADE_LAYER)
+        area = float(np.abs(triangle_areas(loops[triangle_loops(obj.data)])).sum())
+        _set_coordinates(obj.data, loops * math.sqrt(world_area(obj) / area / whole))  # together they fill the unit square
+        obj.data.uv_layers.active = obj.data.uv_layers[MADE_LAYER]
+    select(objects)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.reveal()
     bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.uv.smart_project(
-        angle_limit=math.radians(66),
-        margin_method="FRACTION",
-        island_margin=min(GUTTER_TEXELS / texels, LARGEST_GUTTER),
-        correct_aspect=False,
+    bpy.ops.uv.select_all(action="SELECT")
+    result = bpy.ops.uv.pack_islands(  # by boxes: outlines pack closer, but take seconds, and every worker packs anew
+        rotate=True, rotate_method="CARDINAL", scale=True, margin_method="FRACTION", margin=_gutter(texels), shape_method="AABB"
     )
     bpy.ops.object.mode_set(mode="OBJECT")
-    if render_layer is not None:
+    if result != {"FINISHED"}:
+        raise WorkerError(f"Blender's packer ended as {', '.join(result)} on {len(objects)} objects; name UV layers that lie side by side")
+
+
+@contextmanager
+def _layer_for_us(obj: bpy.types.Object) -> Iterator[None]:
+    """A new MADE_LAYER, active inside; the layer that textures use stays the one for rendering."""
+    layers = obj.data.uv_layers
+    render_layer = next((layer.name for layer in layers if layer.active_render), None)
+    if MADE_LAYER in layers:
+        layers.remove(layers[MADE_LAYER])
+    if len(layers) >= MAX_UV_LAYERS:
+        raise WorkerError(
+            f"expected a UV layer of {obj.name!r} that fits a lightmap or room for one, found {len(layers)} layers of which none fits "
+            f"({layers.active.name!r} {misfit(obj.data, layers.active.name)}); remove one, or name one with --uv-layer"
+        )
+    if layers.new(name=MADE_LAYER, do_init=False) is None:
+        raise WorkerError(f"Blender refused another UV layer on {obj.name!r}")
+    layers.active = layers[MADE_LAYER]
+    yield
+    if render_layer is not None and render_layer in obj.data.uv_layers:
         obj.data.uv_layers[render_layer].active_render = True
+
+
+def _gutter(texels: int) -> float:
+    return min(GUTTER_TEXELS / texels, LARGEST_GUTTER)
+
+
+def _set_coordinates(mesh: bpy.types.Mesh, uv: np.ndarray) -> None:
+    mesh.uv_layers[MADE_LAYER].uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
 
 
 def layer_coordinates(mesh: bpy.types.Mesh, layer: str) -> np.ndarray:
@@ -126,9 +236,14 @@ def overlap_on_grid(corners: np.ndarray) -> float:
     return max(0.0, 1 - float(covered.sum()) / total) if total else 0.0
 
 
-def overlap(mesh: bpy.types.Mesh, layer: str, coverage: np.ndarray) -> float:
-    """The share of a layer's area that lies on texels already taken: 1 - covered texels / area in texels."""
-    area = float(np.abs(triangle_areas(layer_coordinates(mesh, layer)[triangle_loops(mesh)])).sum()) * coverage.size
+def uv_area(mesh: bpy.types.Mesh, layer: str) -> float:
+    """Area of a layer's triangles, of the unit square."""
+    return float(np.abs(triangle_areas(layer_coordinates(mesh, layer)[triangle_loops(mesh)])).sum())
+
+
+def overlap(layers: list[tuple[bpy.types.Mesh, str]], coverage: np.ndarray) -> float:
+    """The share of the layers' area that lies on texels already taken: 1 - covered texels / area in texels."""
+    area = sum(uv_area(mesh, layer) for mesh, layer in layers) * coverage.size
     return max(0.0, 1 - float((coverage > 0).sum()) / area) if area else 0.0
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from blender_bake import materials
 from blender_bake.channel import Channel, WorkerError
+from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
 from blender_bake.translucency import Switch
 
@@ -32,13 +33,16 @@ class ViewReceiver:
         self._coverage_samples = job["coverage_samples"]
         self._coverage: np.ndarray | None = None
         self._last: dict[str, np.ndarray] = {}
+        self._guides: tuple[np.ndarray, np.ndarray] | None = None  # albedo and normal
+        self._denoiser: Denoiser | None = None
+        self._scratch = Path(job["scratch"])
         self._prepare(job["width"], job["height"])
         if self._irradiance:
             self._whiten_if_nothing_is_diffuse(channel)
 
-    def description(self) -> dict[str, Any]:
+    def descriptions(self) -> list[dict[str, Any]]:
         """What the manifest says of this receiver."""
-        return {"kind": "view", "camera": self._camera.name}
+        return [{"kind": "view", "camera": self._camera.name}]
 
     def facts(self) -> dict[str, Any]:
         """For the dry run, the log and depth-based shaders: the camera's kind and pose."""
@@ -47,6 +51,7 @@ class ViewReceiver:
             "camera": {
                 "type": data.type,
                 "matrix_world": [list(row) for row in self._camera.matrix_world],
+                "frame": [list(corner) for corner in data.view_frame(scene=self._scene)],
                 "angle_x": data.angle_x,
                 "ortho_scale": data.ortho_scale,
                 "shift": [data.shift_x, data.shift_y],
@@ -82,6 +87,7 @@ class ViewReceiver:
         coverage = self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1)
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
+        self._guides = (albedo, normal * hit)
         return {
             "position": centre["Position"] * hit,
             "normal": normal * hit,
@@ -100,6 +106,17 @@ class ViewReceiver:
         if self._irradiance:
             return (passes["Diffuse Direct"] + passes["Diffuse Indirect"])[:, :, :3] * np.float32(math.pi)
         return self._over_coverage(passes["Combined"][:, :, :3])
+
+    def denoised(self, image: np.ndarray) -> np.ndarray:
+        """An image in the units of `answer`, or a mean of several, freed of its noise by OpenImageDenoise: biased, so never to be summed.
+
+        Guided by albedo and normal of the geometry pass; what no sample of that pass met stays 0.
+        """
+        if self._denoiser is None:
+            if self._guides is None:
+                self.geometry()
+            self._denoiser = Denoiser(self._scratch, *self._guides)
+        return self._denoiser.denoise(image) * (self._coverage > 0)
 
     def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
         """(`answer`, the direct diffuse light in it with `translucent` on): of one render where nothing is translucent, else of two."""

@@ -35,10 +35,11 @@ class Task:
     light: PlannedLight
     samples: int
     seed: int
+    denoise: bool = False
 
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""
-        return {**self.light.job(), "samples": self.samples, "seed": self.seed}
+        return {**self.light.job(), "samples": self.samples, "seed": self.seed, "denoise": self.denoise}
 
 
 @dataclass(frozen=True)

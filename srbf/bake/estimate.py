@@ -66,11 +66,12 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     else:
         train_from = settings.domain if settings.light_list is None else "from the light list"
         train_from += f", a sun of {np.degrees(settings.sun_angle):.3g} degrees"
-    receiver = ", ".join(f"{key} {value}" for key, value in facts["receiver"].items() if key != "kind")
+    first, *more = facts["receivers"]
+    receiver = ", ".join(f"{key} {value}" for key, value in first.items() if key != "kind") + (f" and {len(more)} more" if more else "")
     covered = f", {facts['covered_texels']} texels covered" if "covered_texels" in facts else ""
     return [
         f"scene      {bake.scene} (Blender {facts['blender']})",
-        f"receiver   {facts['receiver']['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
+        f"receiver   {first['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
         f"lights     {roles['train']} train at {_samples(bake)}, {roles['validation']} validation and "
         f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",

@@ -73,7 +73,7 @@ class CaptureImages:
                 image = dilate(image, nearest if name == "albedo" else of_hits)
             write_image(self._folder / f"{name}.exr", image, "float")
         if "uv" in facts:
-            files.write_json(self._folder / "uv.json", {"uv_layer": facts["made_uv_layer"], "per_loop": facts["uv"]})
+            files.write_json(self._folder / "uv.json", facts["uv"])
         self.prepared = {
             "facts": without_uv(facts),
             "sampling": sampling,

@@ -20,6 +20,7 @@ def capture_manifest(
 ) -> dict[str, Any]:
     """The manifest of the lights that are there, each with its samples; `reached` by the train lights, `curve` of `--samples auto`."""
     facts = prepared["facts"]
+    receivers = facts["receivers"]
     source = {**identity, "settings": {**identity["settings"], "samples": reached}, "srbf": srbf.__version__, "blender": facts["blender"]}
     if "camera" in facts:
         source["camera"] = facts["camera"]
@@ -35,7 +36,7 @@ def capture_manifest(
         "transport": settings.transport,
         "width": settings.width,
         "height": settings.height,
-        "receiver": facts["receiver"],
+        **({"receiver": receivers[0]} if len(receivers) == 1 else {"receivers": receivers}),
         "lights": [
             {
                 **light.placed(),

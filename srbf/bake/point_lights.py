@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tempfile
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float64
-from srbf.bake.worker import Worker
-from srbf.errors import BakeError, InputError
-
-if TYPE_CHECKING:
-    from srbf.bake.settings import BakeSettings
+from srbf.errors import InputError
 
 Box = tuple[float, float, float, float, float, float]  # x0, y0, z0, x1, y1, z1, metres
 Places = tuple[tuple[float, float, float], ...]
@@ -28,7 +21,7 @@ Places = tuple[tuple[float, float, float], ...]
 class PointGrid:
     """Lamps `spacing` metres apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
 
-    `grid` and `random` are positions in metres, not known before `survey` has asked the scene.
+    `grid` and `random` are positions in metres, not known before `srbf.bake.survey.with_free_lamps` has asked the scene.
     """
 
     spacing: float
@@ -74,34 +67,3 @@ class PointGrid:
         """For the manifest: spacing and box, and the positions by a checksum, since the lights hold them."""
         places = json.dumps([self.grid, self.random])
         return {"spacing": self.spacing, "box": self.box, "positions": hashlib.sha256(places.encode()).hexdigest()}
-
-
-def survey(
-    settings: BakeSettings, job: dict[str, Any], blender: Path | None = None, say: Callable[[str], None] = lambda line: None
-) -> BakeSettings:
-    """The same settings with the lamps that are free in the scene of `job` (srbf.bake.run.base_job), as Blender finds them.
-
-    BakeError where there are none, or so few free places that random ones cannot be found.
-    """
-    points = settings.points
-    if points is None or points.grid is not None:
-        return settings
-    asked = {"spacing": points.spacing, "box": points.box, "random": settings.validation + settings.holdout, "seed": settings.seed}
-    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
-        scratch = Path(name)
-        found: dict[str, Any] | None = None
-        with Worker(
-            {**job, "scratch": str(scratch), "lights": [], "survey": {"points": asked}}, scratch, scratch / "survey.log", blender
-        ) as worker:
-            for event in worker.events():
-                if event["event"] == "warning":
-                    say(event["message"])
-                elif event["event"] == "survey":
-                    found = event["points"]
-    if found is None:
-        raise BakeError("expected Blender to survey the scene for point lights, found no answer; run the same command again")
-    x0, y0, z0, x1, y1, z1 = found["box"]
-    grid, random = (tuple((x, y, z) for x, y, z in found[key]) for key in ("grid", "random"))
-    bounds = f"{x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m"
-    say(f"{len(grid)} point lights in the box {bounds}; {found['skipped']} places in or at geometry are left out")
-    return replace(settings, points=replace(points, box=(x0, y0, z0, x1, y1, z1), grid=grid, random=random))

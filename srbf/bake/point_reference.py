@@ -46,8 +46,9 @@ def compare_with_lamps(
         raise InputError("expected covered texels in the asset, found none")
     if "position" not in asset.images:
         raise InputError("comparing with lamps needs a position map, and this asset has none")
-    receiver = asset.manifest.get("source", {}).get("receiver")
-    if receiver is None:
+    source = asset.manifest.get("source", {})
+    described = source.get("receivers") or [source[key] for key in ("receiver",) if key in source]
+    if not described:
         raise InputError("expected an asset baked from a scene, found one that names no receiver")
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found no such file")
@@ -57,7 +58,7 @@ def compare_with_lamps(
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
     lamps = lamp_positions(asset, count, seed)
-    references = _render(asset, receiver, scene, lamps, samples, seed, progress, say, blender)
+    references = _render(asset, described, scene, lamps, samples, seed, progress, say, blender)
     distances: list[np.ndarray] = []
     errors: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]] = {falloff: [] for falloff in FALLOFFS}
     for lamp, reference in zip(lamps, references, strict=True):
@@ -90,7 +91,7 @@ def lamp_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
 
 def _render(
     asset: Asset,
-    receiver: dict[str, Any],
+    described: list[dict[str, Any]],
     scene: Path,
     lamps: np.ndarray,
     samples: int,
@@ -99,8 +100,7 @@ def _render(
     say: Callable[[str], None],
     blender: Path | None,
 ) -> list[np.ndarray]:
-    parsed = Receiver(receiver["kind"], receiver.get("object") or receiver.get("camera"), receiver.get("uv_layer"))
-    settings = BakeSettings(parsed, asset.width, asset.height, quantity=asset.quantity)
+    settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity)
     lights = [
         {"index": i, "kind": "point", "position": lamp.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
         for i, lamp in enumerate(lamps)

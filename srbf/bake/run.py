@@ -56,6 +56,10 @@ class Bake:
     seconds: float | None = None
     keep_sums: bool = False
 
+    def __post_init__(self) -> None:
+        if self.seconds is not None and self.settings.denoise:
+            raise InputError("--denoise needs a given number of samples, found --time; give --samples, or take --denoise off")
+
     @property
     def is_open_ended(self) -> bool:
         """Whether the number of samples is found while baking."""
@@ -213,11 +217,17 @@ class _Passes:
         due = [light for light in self._order if self._sums.samples(light) < self._goal_of(light) and light.index not in self._failed]
         level = min((self._sums.passes(light) for light in due), default=0)
         first = 1 if self._auto else FIRST_SAMPLES
+
+        def alone(light: PlannedLight) -> bool:
+            """Whether its image is denoised, which is done to a whole image: its samples are one pass."""
+            return self._settings.denoise and light.role == "train"
+
         return [
             Task(
                 light,
-                next_samples(light, self._sums.samples(light), self._goal_of(light), first),
+                self._goal if alone(light) else next_samples(light, self._sums.samples(light), self._goal_of(light), first),
                 noise_seed(self._settings.seed, light.index, level),
+                alone(light),
             )
             for light in due
             if self._sums.passes(light) == level
@@ -368,6 +378,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "keep_lamps": settings.keep_lamps,
         "sun_angle": settings.sun_angle,
         "transport": settings.transport,
+        "no_shadow": list(settings.no_shadow),
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
     }

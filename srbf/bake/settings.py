@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import re
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -15,26 +17,43 @@ from srbf.errors import InputError
 from srbf.light_list import read_light_list
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
+Kind = Literal["lightmap", "vertices", "view"]
+Unwrap = Literal["smart", "lightmap-pack", "keep"]
+LARGEST_SIDE = 16384
+
 
 @dataclass(frozen=True)
 class Receiver:
-    """`lightmap:OBJECT` (with its UV layer, else the active one) or `view[:CAMERA]` (else the scene's own camera)."""
+    """`lightmap:OBJECT` (its UV layer, else one that fits), `vertices:OBJECT`, or `view[:CAMERA]` (else the scene's own camera).
 
-    kind: str
+    `also` names further objects whose texels share the lightmap. `unwrap` says how a layer is made where the user's do not fit.
+    """
+
+    kind: Kind
     name: str | None = None
     uv_layer: str | None = None
+    also: tuple[str, ...] = ()
+    unwrap: Unwrap = "smart"
 
     @staticmethod
-    def parse(text: str, uv_layer: str | None = None) -> Receiver:
+    def parse(text: str, uv_layer: str | None = None, unwrap: Unwrap = "smart") -> Receiver:
         """From the command line's word; InputError on any other."""
         kind, _, name = text.partition(":")
         if kind == "lightmap" and name:
-            return Receiver(kind, name, uv_layer)
-        if kind == "view":
+            return Receiver("lightmap", name, uv_layer, unwrap=unwrap)
+        if (kind == "vertices" and name) or kind == "view":
             if uv_layer is not None:
-                raise InputError("--uv-layer belongs to a lightmap receiver, found it with a view")
-            return Receiver(kind, name or None)
-        raise InputError(f"expected a receiver lightmap:OBJECT or view[:CAMERA], found {text!r}")
+                raise InputError(f"--uv-layer belongs to a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
+            return Receiver("view" if kind == "view" else "vertices", name or None)
+        raise InputError(f"expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found {text!r}")
+
+    @staticmethod
+    def of_manifest(described: Sequence[dict[str, Any]]) -> Receiver:
+        """What a capture's `receiver`, or `receivers` in one atlas, say of themselves; one UV layer only where all have it."""
+        first = described[0]
+        layers = {one.get("uv_layer") for one in described}
+        names = [one.get("object") or one.get("camera") for one in described]
+        return Receiver(first["kind"], names[0], layers.pop() if len(layers) == 1 else None, tuple(str(name) for name in names[1:]))
 
     @property
     def place(self) -> str:
@@ -43,7 +62,50 @@ class Receiver:
 
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""
-        return {"kind": self.kind, ("object" if self.kind == "lightmap" else "camera"): self.name, "uv_layer": self.uv_layer}
+        if self.kind == "view":
+            return {"kind": self.kind, "camera": self.name}
+        return {
+            "kind": self.kind,
+            "object": self.name,
+            "objects": [self.name, *self.also],
+            "uv_layer": self.uv_layer,
+            "unwrap": self.unwrap,
+        }
+
+    def record(self) -> dict[str, Any]:
+        """JSON for the manifest; what is as it was before there was a choice is left out."""
+        record: dict[str, Any] = {"kind": self.kind, "name": self.name, "uv_layer": self.uv_layer}
+        if self.also:
+            record["also"] = list(self.also)
+        if self.unwrap != "smart":
+            record["unwrap"] = self.unwrap
+        return record
+
+
+def captures_of(receivers: Sequence[Receiver], separate: bool = False) -> list[Receiver]:
+    """The captures that `receivers` make: all lightmaps share one atlas, unless `separate`; views and vertices have each their own.
+
+    InputError where one is named twice.
+    """
+    named = [(receiver.kind, receiver.name) for receiver in receivers]
+    for kind, name in named:
+        if named.count((kind, name)) > 1:
+            raise InputError(f"expected each receiver once, found {kind}:{name} {named.count((kind, name))} times")
+    lightmaps = [receiver for receiver in receivers if receiver.kind == "lightmap"]
+    if separate or len(lightmaps) < 2:
+        return list(receivers)
+    atlas = replace(lightmaps[0], also=tuple(str(receiver.name) for receiver in lightmaps[1:]))
+    return [atlas, *(receiver for receiver in receivers if receiver.kind != "lightmap")]
+
+
+def folder_names(receivers: Sequence[Receiver]) -> list[str]:
+    """A folder for each of several captures: the object's or camera's name, made fit for any file system, numbered where two are alike."""
+    names: list[str] = []
+    for receiver in receivers:
+        stem = re.sub(r"[^\w. -]", "_", receiver.name or receiver.kind).strip(". ") or receiver.kind
+        alike = sum(1 for name in names if name.lower().rpartition("~")[0] == stem.lower() or name.lower() == stem.lower())
+        names.append(f"{stem}~{alike + 1}" if alike else stem)
+    return names
 
 
 @dataclass(frozen=True)
@@ -66,6 +128,8 @@ class BakeSettings:
     light_list: Path | None = None
     transport: Transport = "combined"
     points: PointGrid | None = None  # lamps instead of directional lights
+    no_shadow: tuple[str, ...] = ()  # objects that light passes
+    denoise: bool = False  # of a view's train images
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -76,10 +140,14 @@ class BakeSettings:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
         if self.samples == "auto" and (self.validation < 1 or self.holdout_samples < 2):
             raise InputError("--samples auto judges by validation lights of at least 2 samples, found none; leave --validation as it is")
-        if max(self.width, self.height) > 16384:
-            raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
+        if self.denoise and (self.samples == "auto" or self.receiver.kind != "view" or self.transport != "combined"):
+            raise InputError("--denoise is for views of transport combined and a given number of samples, found another; take it off")
+        if max(self.width, self.height) > LARGEST_SIDE:
+            raise InputError(f"expected a size of at most {LARGEST_SIDE} texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
+        if self.transport == "indirect" and self.receiver.kind == "vertices":
+            raise InputError("expected vertices with transport combined, found indirect: rays have no footprint to spread over at a point")
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
                 raise InputError("expected point lights without --light-list and --sun-angle, which are of directional ones")
@@ -98,8 +166,11 @@ class BakeSettings:
     def record(self) -> dict[str, Any]:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
         record = asdict(self)
-        if self.transport == "combined":
-            del record["transport"]  # captures of before there was a choice stay what they were
+        record["receiver"] = self.receiver.record()
+        record["no_shadow"] = list(self.no_shadow)
+        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False)):
+            if record[name] == old:
+                del record[name]  # captures of before there was a choice stay what they were
         del record["points"]
         if self.points is not None:
             for directional in ("lights", "domain", "sun_angle", "light_list"):

@@ -10,9 +10,10 @@ import typer
 
 from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
-from srbf.bake.point_lights import PointGrid, survey
-from srbf.bake.run import Bake, Reporter, base_job
-from srbf.bake.settings import BakeSettings, Receiver
+from srbf.bake.point_lights import PointGrid
+from srbf.bake.run import Bake, Reporter
+from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
+from srbf.bake.survey import objects_of, with_free_lamps, with_size
 from srbf.cli.parameters import Blender, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
 from srbf.errors import InputError
@@ -23,8 +24,28 @@ UNLIMITED = 1 << 16  # samples a texel: more than any bake's time allows
 def bake(
     scene: Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)],
     output: Output,
-    receiver: Annotated[str, typer.Option(help="lightmap:OBJECT or view[:CAMERA].", show_default=False)],
+    receiver: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="lightmap:OBJECT, vertices:OBJECT or view[:CAMERA]; again for more: lightmaps share an atlas, others go to OUTPUT/NAME.",
+            show_default=False,
+        ),
+    ] = None,
+    collection: Annotated[
+        list[str] | None, typer.Option(help="Every renderable mesh of a collection into the atlas.", show_default=False)
+    ] = None,
+    separate: Annotated[bool, typer.Option("--separate", help="A lightmap each instead of one atlas, in OUTPUT/NAME.")] = False,
     size: Annotated[str, typer.Option(help="Texels, N or WxH.")] = "256",
+    texels_per_metre: Annotated[
+        float | None, typer.Option(help="Mean density of a lightmap, which decides its size.", show_default=False)
+    ] = None,
+    unwrap: Annotated[
+        Literal["smart", "lightmap-pack", "keep"], typer.Option(help="How a UV layer is made where none fits; keep: refuse.")
+    ] = "smart",
+    no_shadow: Annotated[
+        list[str] | None, typer.Option(help="An object that light passes, such as a closed room's ceiling.", show_default=False)
+    ] = None,
+    denoise: Annotated[bool, typer.Option("--denoise", help="Denoise a view's fitted images by OpenImageDenoise.")] = False,
     lights: Annotated[int, typer.Option(help="Hammersley directions to fit.")] = 400,
     domain: Annotated[
         Literal["sphere", "hemisphere"], typer.Option(help="Where lights stand; hemisphere is above the ground.")
@@ -77,42 +98,59 @@ def bake(
 ) -> None:
     """Bake SCENE under many lights, one at a time, in passes. Stopped at any moment, the same command goes on."""
     width, height = parse_size(size)
-    parsed, angle = Receiver.parse(receiver, uv_layer), parse_sun_angle(sun_angle)
-    settings = BakeSettings(
-        receiver=parsed,
-        width=width,
-        height=height,
-        lights=lights,
-        domain=domain,
-        samples=_samples(samples, time),
-        validation=validation,
-        holdout=holdout,
-        holdout_samples=holdout_samples,
-        quantity=quantity or ("irradiance" if parsed.kind == "lightmap" else "radiance"),
-        seed=seed,
-        sun_angle=0.0 if angle == "auto" else angle,
-        keep_lamps=keep_lamps,
-        light_list=light_list,
-        transport=transport,
-        points=None if light_set is None else PointGrid.parse(light_set, light_box),
-    )
+    angle = parse_sun_angle(sun_angle)
+    named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
+    if not (named or collection):
+        raise InputError("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
+
     if light_set is None and light_box is not None:
         raise InputError("expected --light-set point:SPACING with --light-box, found none")
-    if angle == "auto":
-        settings = settings.with_matched_sun()
-        note(f"a sun of {settings.sun_angle:.4g} rad ({degrees(settings.sun_angle):.1f} degrees), as far as the fitted lights stand apart")
-    if settings.points is not None:
-        Bake(scene, output, settings, blender).check_scene()
-        settings = survey(settings, base_job(scene, settings, output), blender, note)
     crew = CrewSettings(workers, lights_a_worker, hang_after)
-    job = Bake(scene, output, settings, blender, crew, None if time is None else parse_duration(time), keep_sums)
-    if dry_run:
-        for line in estimate(job, note):
-            typer.echo(line)
-        return
-    with json_progress_lines() if json_progress else progress_bar("bake") as update:
-        baked = job.run(Reporter(update, note), force, restart)
-    note(f"baked {output}" if baked else f"{output} is complete already")
+
+    def plan(one: Receiver, folder: Path) -> Bake:
+        settings = BakeSettings(
+            receiver=one,
+            width=width,
+            height=height,
+            lights=lights,
+            domain=domain,
+            samples=_samples(samples, time),
+            validation=validation,
+            holdout=holdout,
+            holdout_samples=holdout_samples,
+            quantity=quantity or ("radiance" if one.kind == "view" else "irradiance"),
+            seed=seed,
+            sun_angle=0.0 if angle == "auto" else angle,
+            keep_lamps=keep_lamps,
+            light_list=light_list,
+            transport=transport,
+            points=None if light_set is None else PointGrid.parse(light_set, light_box),
+            no_shadow=tuple(no_shadow or ()),
+            denoise=denoise,
+        )
+        settings = settings.with_matched_sun() if angle == "auto" else settings
+        return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_sums)
+
+    if collection:
+        known = {one.name for one in named if one.kind == "lightmap"}
+        inside = objects_of(plan(Receiver("view"), output), collection, note)
+        named += [Receiver("lightmap", name, uv_layer, unwrap=unwrap) for name in inside if name not in known]
+    captures = captures_of(named, separate)
+    several = len(captures) > 1 or separate
+    jobs = [plan(one, output / name if several else output) for one, name in zip(captures, folder_names(captures), strict=True)]
+    if angle == "auto":
+        sun = jobs[0].settings.sun_angle
+        note(f"a sun of {sun:.4g} rad ({degrees(sun):.1f} degrees), as far as the fitted lights stand apart")
+    for job in jobs:
+        job = with_size(job, texels_per_metre if job.settings.receiver.kind == "lightmap" or not several else None, note)
+        job = with_free_lamps(job, note)
+        if dry_run:
+            for line in estimate(job, note):
+                typer.echo(line)
+            continue
+        with json_progress_lines() if json_progress else progress_bar("bake") as update:
+            baked = job.run(Reporter(update, note), force, restart)
+        note(f"baked {job.folder}" if baked else f"{job.folder} is complete already")
 
 
 def _samples(text: str | None, time: str | None) -> int | Literal["auto"]:

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from srbf.bake.point_lights import PointGrid, survey
-from srbf.bake.run import base_job
+from srbf.bake.point_lights import PointGrid
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
+from srbf.bake.survey import with_free_lamps
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.evaluation import evaluate
@@ -80,7 +80,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
     """The block's inside is not free, the open crate's is, the room's air is, and nothing is nearer than a tenth of the spacing."""
     settings = settings_with(PointGrid(0.25, (-2.0, -2.0, 0.0, 2.0, 2.0, 3.0)), validation=20, holdout=30)
     said: list[str] = []
-    found = survey(settings, base_job(blend("blocks"), settings, tmp_path), say=said.append)
+    found = with_free_lamps(Bake(blend("blocks"), tmp_path, settings), said.append).settings
     assert found.points is not None
     train, validation, holdout = found.points.places(20, 30)
     axes = [np.arange(n) * 0.25 + low for n, low in ((16, -1.875), (16, -1.875), (12, 0.125))]
@@ -93,7 +93,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
     for point in np.concatenate([validation, holdout]):
         outside = np.abs(point - [-1, 0, 1]).max() - 0.5  # the block's distance, in its own norm
         assert outside > 0.025 / np.sqrt(3) and point[2] > 0.025 and (np.abs(point[:2]) <= 2).all()
-    again = survey(settings, base_job(blend("blocks"), settings, tmp_path))
+    again = with_free_lamps(Bake(blend("blocks"), tmp_path, settings)).settings
     assert again == found
 
 
@@ -101,10 +101,10 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
 def test_no_room_is_said(blend, tmp_path: Path) -> None:
     settings = settings_with(PointGrid(0.2, (-1.2, -0.2, 0.8, -0.8, 0.2, 1.2)))
     with pytest.raises(BakeError, match="--light-box"):
-        survey(settings, base_job(blend("blocks"), settings, tmp_path))
+        with_free_lamps(Bake(blend("blocks"), tmp_path, settings))
     settings = settings_with(PointGrid(0.001))
     with pytest.raises(BakeError, match="larger spacing"):
-        survey(settings, base_job(blend("blocks"), settings, tmp_path))
+        with_free_lamps(Bake(blend("blocks"), tmp_path, settings))
 
 
 @pytest.mark.blender

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from srbf.bake.settings import BakeSettings, Receiver
+from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.cli.parameters import parse_sun_angle
 from srbf.errors import InputError
 from srbf.sphere import point_set
@@ -40,3 +40,60 @@ def test_sun_angle_as_text() -> None:
         parse_sun_angle("wide")
     with pytest.raises(InputError, match="sun angle"):
         BakeSettings(Receiver("view"), sun_angle=parse_sun_angle("nan"))
+
+
+def test_lightmaps_share_an_atlas_and_others_stand_alone() -> None:
+    words = ["lightmap:A", "view:Eye", "lightmap:B", "vertices:A", "lightmap:C"]
+    atlas, *others = captures_of([Receiver.parse(word, None if word[0] != "l" else "UV") for word in words])
+    assert atlas == Receiver("lightmap", "A", "UV", ("B", "C"))
+    assert others == [Receiver("view", "Eye"), Receiver("vertices", "A")]
+    assert len(captures_of([Receiver.parse(word) for word in words], separate=True)) == 5
+    with pytest.raises(InputError, match="found lightmap:A 2 times"):
+        captures_of([Receiver("lightmap", "A"), Receiver("lightmap", "A")])
+
+
+def test_captures_of_one_bake_have_folders_of_their_own() -> None:
+    names = ["Eye", "../up", "eye", "a/b", "..", "Üben 1.5"]
+    folders = folder_names([Receiver("view", name) for name in names])
+    assert folders == ["Eye", "_up", "eye~2", "a_b", "view", "Üben 1.5"]
+    assert folder_names([Receiver("view", "."), Receiver("view", None), Receiver("view", "view")]) == ["view", "view~2", "view~3"]
+
+
+def test_what_was_recorded_before_there_was_a_choice_stays() -> None:
+    record = BakeSettings(Receiver("lightmap", "A")).record()
+    assert record["receiver"] == {"kind": "lightmap", "name": "A", "uv_layer": None}
+    assert not {"no_shadow", "denoise", "transport"} & set(record)
+    chosen = BakeSettings(Receiver("lightmap", "A", also=("B",), unwrap="keep"), no_shadow=("C",)).record()
+    assert chosen == json.loads(json.dumps(chosen))  # a bake that goes on compares it with what was written
+    assert chosen["receiver"] == {"kind": "lightmap", "name": "A", "uv_layer": None, "also": ["B"], "unwrap": "keep"}
+    assert chosen["no_shadow"] == ["C"]
+
+
+def test_a_receiver_comes_back_from_its_manifest() -> None:
+    one = {"kind": "lightmap", "object": "A", "uv_layer": "UV"}
+    assert Receiver.of_manifest([one]) == Receiver("lightmap", "A", "UV")
+    assert Receiver.of_manifest([one, {**one, "object": "B"}]) == Receiver("lightmap", "A", "UV", ("B",))
+    assert Receiver.of_manifest([one, {**one, "object": "B", "uv_layer": "other"}]).uv_layer is None
+    assert Receiver.of_manifest([{"kind": "view", "camera": "Eye"}]) == Receiver("view", "Eye")
+    assert Receiver.of_manifest([{"kind": "vertices", "object": "A", "count": 9}]) == Receiver("vertices", "A")
+
+
+@pytest.mark.parametrize(
+    ("word", "layer", "words"),
+    [
+        ("surfel:A", None, "lightmap:OBJECT, vertices:OBJECT or view"),
+        ("vertices:", None, "vertices:OBJECT"),
+        ("vertices:A", "UV", "--uv-layer belongs to a lightmap receiver, found it with vertices"),
+    ],
+)
+def test_receivers_that_no_bake_has(word: str, layer: str | None, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Receiver.parse(word, layer)
+
+
+def test_what_only_some_receivers_can() -> None:
+    with pytest.raises(InputError, match="vertices with transport combined"):
+        BakeSettings(Receiver("vertices", "A"), transport="indirect")
+    for receiver, transport in ((Receiver("lightmap", "A"), "combined"), (Receiver("view"), "indirect")):
+        with pytest.raises(InputError, match="--denoise is for views"):
+            BakeSettings(receiver, transport=transport, denoise=True)

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The mesh objects that a receiver names: found, made local and real, their modifiers applied."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from blender_bake.channel import WorkerError
+
+RAYS = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_volume_scatter", "visible_shadow")
+
+
+def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
+    """The meshes that `names` stand for, in order, each with data of its own: modifiers applied, instances made real, once.
+
+    A name is a mesh object's, or that of an empty that shows a collection, which stands for its renderable meshes.
+    """
+    objects: list[bpy.types.Object] = []
+    for name in names:
+        for obj in _named(scene, name):
+            if obj not in objects:
+                objects.append(obj)
+    for obj in objects:
+        apply_modifiers(obj)
+    return objects
+
+
+def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
+    """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none."""
+    found = {c.name: c for c in [scene.collection, *scene.collection.children_recursive]}
+    if collection not in found:
+        shown = ", ".join(repr(name) for name in sorted(found)[:12]) + (", …" if len(found) > 12 else "")
+        raise WorkerError(f"expected a collection {collection!r} in scene {scene.name!r}, found none; its collections are {shown}")
+    hidden = {o.name for c in found.values() if c.hide_render for o in c.all_objects}
+    in_layer = {o.name for o in bpy.context.view_layer.objects}
+    names = [
+        o.name
+        for o in found[collection].all_objects
+        if not o.hide_render and o.name not in hidden and o.name in in_layer and (o.type == "MESH" or _shows_collection(o))
+    ]
+    if not names:
+        raise WorkerError(f"expected renderable meshes in collection {collection!r}, found none")
+    return sorted(set(names))
+
+
+def _named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
+    empty = scene.objects.get(name)
+    if empty is not None and _shows_collection(empty):
+        return _made_real(scene, _local(scene, empty))
+    whole = scene.objects.get(name.partition("/")[0])
+    if empty is None and whole is not None and _shows_collection(whole):  # one of an instance's meshes, as a manifest names it
+        _made_real(scene, _local(scene, whole))
+    return [find_mesh_object(scene, name)]
+
+
+def _shows_collection(obj: bpy.types.Object) -> bool:
+    return obj.type == "EMPTY" and obj.instance_type == "COLLECTION" and obj.instance_collection is not None
+
+
+def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.types.Object]:
+    """Objects in place of the instances of a collection, nested ones too, named EMPTY/OBJECT; its renderable meshes."""
+    for obj in list(empty.instance_collection.all_objects):  # a change of visibility drops the list
+        obj.hide_viewport = obj.hide_render  # what is made real is what the viewport would show
+    _show(empty)
+    select([empty])
+    before = set(scene.objects)
+    if bpy.ops.object.duplicates_make_real() != {"FINISHED"}:
+        raise WorkerError(f"Blender could not make the instances of {empty.name!r} real")
+    made = sorted((obj for obj in scene.objects if obj not in before), key=lambda obj: obj.name)
+    for obj in made:
+        stem, _, number = obj.name.rpartition(".")
+        obj.name = f"{empty.name}/{stem if number.isdecimal() and stem else obj.name}"
+    meshes = [find_mesh_object(scene, obj.name) for obj in made if obj.type == "MESH" and not obj.hide_render]
+    if not meshes:
+        raise WorkerError(f"expected renderable meshes in the collection that {empty.name!r} shows, found none")
+    return meshes
+
+
+def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    """The object `name` of the scene, made local and visible; WorkerError says what else there is."""
+    obj = scene.objects.get(name)
+    if obj is None:
+        meshes = sorted(o.name for o in scene.objects if o.type == "MESH")
+        shown = ", ".join(repr(n) for n in meshes[:12]) + (", …" if len(meshes) > 12 else "")
+        raise WorkerError(f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}")
+    if obj.type != "MESH":
+        raise WorkerError(
+            f"expected a mesh object, found {name!r} of type {obj.type}; a curve or text: Object > Convert > Mesh, and save the .blend"
+        )
+    if obj.hide_render:
+        raise WorkerError(f"expected {name!r} to be renderable, found it disabled in renders; enable its camera icon and save the .blend")
+    obj = _local(scene, obj)
+    _show(obj)
+    if not obj.visible_get():
+        raise WorkerError(f"expected {name!r} to be visible, found its collection excluded or hidden; show it and save the .blend")
+    return obj
+
+
+def _local(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Object:
+    """The object, out of its library: its linked collections first, or it would stay there beside its copy."""
+    if not (obj.library or obj.override_library):
+        return obj
+    for collection in scene.collection.children_recursive:
+        if collection.library and obj.name in collection.all_objects:
+            collection.make_local()
+    return obj.make_local() or scene.objects[obj.name]
+
+
+def _show(obj: bpy.types.Object) -> None:
+    obj.hide_viewport = False
+    obj.hide_select = False
+    obj.hide_set(False)
+
+
+def apply_modifiers(obj: bpy.types.Object) -> None:
+    """Put the evaluated mesh, at render settings, in place of the object's data: every bake would evaluate it again.
+
+    That mesh is the object's own, so objects that shared one each get their own texels.
+    """
+    for modifier in obj.modifiers:
+        modifier.show_viewport = modifier.show_render
+        if modifier.type in {"SUBSURF", "MULTIRES"}:
+            modifier.levels = modifier.render_levels
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    _realise_instances(obj, depsgraph)
+    mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
+    obj.modifiers.clear()
+    obj.data = mesh
+    if not mesh.polygons:
+        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any")
+
+
+def _realise_instances(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Objects that the modifiers or particles of `obj` scatter stay as objects of their own when those are gone."""
+    meshes: dict[str, bpy.types.Mesh] = {}
+    for instance in depsgraph.object_instances:
+        source = instance.object
+        if not (instance.is_instance and instance.parent and instance.parent.original == obj and source.type == "MESH"):
+            continue
+        key = source.data.name_full
+        if key not in meshes:
+            meshes[key] = bpy.data.meshes.new_from_object(source, preserve_all_data_layers=True, depsgraph=depsgraph)
+        copy = bpy.data.objects.new(f"{obj.name} instance", meshes[key])
+        for ray in RAYS:
+            setattr(copy, ray, getattr(source, ray))
+        copy.matrix_world = instance.matrix_world.copy()
+        bpy.context.scene.collection.objects.link(copy)
+
+
+def select(objects: list[bpy.types.Object]) -> None:
+    """These and no others, the first of them active: what Blender's operators work on."""
+    for other in bpy.context.view_layer.objects:
+        other.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def world_area(obj: bpy.types.Object) -> float:
+    """Area of the object's triangles in the world, square metres."""
+    mesh = obj.data
+    mesh.calc_loop_triangles()
+    vertices = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+    mesh.loop_triangles.foreach_get("vertices", vertices)
+    points = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get("co", points)
+    corners = (points.reshape(-1, 3) @ np.array(obj.matrix_world.to_3x3(), np.float64).T)[vertices].reshape(-1, 3, 3)
+    return float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A vertex receiver: the vertices of a mesh object, baked by Cycles into a colour attribute, as a list of points."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+
+from blender_bake import materials
+from blender_bake.channel import Channel, WorkerError
+from blender_bake.receiver_objects import prepare, select
+
+NOT_DIFFUSE = 1e-3
+ATTRIBUTE = "srbf bake"
+ROW = 1024  # points a row of the images, at most
+
+
+def image_size(count: int) -> tuple[int, int]:
+    """(width, height) of the image that lists `count` points."""
+    width = max(1, min(count, ROW))
+    return width, max(1, -(-count // width))
+
+
+class VertexReceiver:
+    """The vertices of one mesh object, its modifiers applied, in vertex order along the rows; arrays are (H, W, C) float32.
+
+    Cycles answers at every corner of every face, just inside it; a vertex takes the mean of its corners, each by its angle, as its normal
+    does: it does not depend on how its faces are divided. Corners with nothing diffuse do not count towards irradiance. A vertex
+    without a face, and what fills up the last row, has coverage 0.
+    """
+
+    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
+        self._scene = scene
+        self._channel = channel
+        self._irradiance = job["quantity"] == "irradiance"
+        scene.render.bake.view_from = "ABOVE_SURFACE"
+        objects = prepare(scene, [job["receiver"]["object"]])
+        if len(objects) > 1:
+            raise WorkerError(f"expected one object's vertices, found {len(objects)} objects in {job['receiver']['object']!r}; name one")
+        self._object = objects[0]
+        mesh = self._object.data
+        self._count = len(mesh.vertices)
+        self._width, self._height = job["width"], job["height"]
+        if (self._width, self._height) != image_size(self._count):
+            width, height = image_size(self._count)
+            raise WorkerError(
+                f"expected a size of {width}x{height} for the {self._count} vertices of {self._object.name!r}, found "
+                f"{self._width}x{self._height}; let the bake survey the scene"
+            )
+        for attribute in [a for a in mesh.color_attributes if a.name == ATTRIBUTE]:
+            mesh.color_attributes.remove(attribute)
+        mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
+        mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
+        select([self._object])
+        self._corners = np.empty(len(mesh.loops), np.int32)  # (C,) vertex of each corner
+        mesh.loops.foreach_get("vertex_index", self._corners)
+        self._angles = corner_angles(mesh, self._object.matrix_world)
+        self._readable = np.ones(len(self._corners), bool)
+        albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
+        self._albedo = self._of_vertices(albedo)
+        if self._irradiance:
+            self._whiten_what_is_not_diffuse(albedo)
+
+    def descriptions(self) -> list[dict[str, Any]]:
+        """What the manifest says of this receiver."""
+        return [{"kind": "vertices", "object": self._object.name, "count": self._count}]
+
+    def facts(self) -> dict[str, Any]:
+        """For the dry run and the log."""
+        return {"polygons": len(self._object.data.polygons), "vertices": self._count}
+
+    def sampling(self) -> dict[str, Any]:
+        """Nothing: points have no footprint for rays to spread over."""
+        return {}
+
+    def geometry(self) -> dict[str, np.ndarray]:
+        """World position and normal of the vertices as the mesh has them, albedo and coverage."""
+        mesh, matrix = self._object.data, np.array(self._object.matrix_world)
+        points, normals = np.empty(self._count * 3, np.float32), np.empty(self._count * 3, np.float32)
+        mesh.vertices.foreach_get("co", points)
+        mesh.vertex_normals.foreach_get("vector", normals)
+        position = points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+        normal = normals.reshape(-1, 3) @ np.linalg.pinv(matrix[:3, :3])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+        faced = np.bincount(self._corners, minlength=self._count) > 0
+        lit = np.bincount(self._corners, self._readable, self._count) > 0
+        coverage = self._image(faced[:, None])
+        return {
+            "position": self._image(position * faced[:, None]),
+            "normal": self._image(normal * faced[:, None]),
+            "albedo": self._image(self._albedo),
+            "coverage": coverage,
+            "readable": self._image(lit[:, None]),
+            "hit": coverage,
+        }
+
+    def answer(self, samples: int, seed: int) -> np.ndarray:
+        """Irradiance E = pi x Cycles' DIFFUSE without colour, or radiance seen from straight above each face."""
+        if self._irradiance:
+            corners = self._bake("DIFFUSE", samples, seed, pass_filter={"DIRECT", "INDIRECT"}) * np.float32(math.pi)
+        else:
+            every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
+            corners = self._bake("COMBINED", samples, seed, pass_filter=every)
+        return self._image(self._of_vertices(corners))
+
+    def _of_vertices(self, corners: np.ndarray) -> np.ndarray:
+        """(V, 3) means over each vertex's readable corners (C, 3), by angle."""
+        weight = self._angles * self._readable
+        total = np.maximum(np.bincount(self._corners, weight, self._count), 1e-20)
+        return np.stack([np.bincount(self._corners, weight * corners[:, c], self._count) / total for c in range(3)], axis=1)
+
+    def _image(self, values: np.ndarray) -> np.ndarray:
+        """(V, C) along the rows of (H, W, C), zeros after the last."""
+        image = np.zeros((self._height * self._width, values.shape[1]), np.float32)
+        image[: self._count] = values
+        return image.reshape(self._height, self._width, -1)
+
+    def _bake(self, kind: str, samples: int, seed: int, **options: Any) -> np.ndarray:
+        """(C, 3) colours of the corners."""
+        self._scene.cycles.samples = samples
+        self._scene.cycles.seed = seed
+        try:
+            result = bpy.ops.object.bake(
+                type=kind, target="VERTEX_COLORS", use_clear=True, margin=0, use_selected_to_active=False, use_cage=False, **options
+            )
+        except RuntimeError as error:
+            reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
+            raise WorkerError(f"Blender could not bake the vertices of {self._object.name!r}: {reason}") from error
+        if result != {"FINISHED"}:
+            raise WorkerError(f"Blender's bake of the vertices of {self._object.name!r} ended as {', '.join(result)}, without a reason")
+        colors = np.empty(len(self._corners) * 4, np.float32)
+        self._object.data.color_attributes[ATTRIBUTE].data.foreach_get("color", colors)
+        return colors.reshape(-1, 4)[:, :3]
+
+    def _whiten_what_is_not_diffuse(self, albedo: np.ndarray) -> None:
+        """Replace each slot with no diffuse reflection by white Lambert, so that its irradiance can be read; skip single black corners."""
+        mesh, slots = self._object.data, self._object.material_slots
+        if slots:
+            of_faces, corners_of_faces = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
+            mesh.polygons.foreach_get("material_index", of_faces)
+            mesh.polygons.foreach_get("loop_total", corners_of_faces)
+            of_corners = np.repeat(np.clip(of_faces, 0, len(slots) - 1), corners_of_faces)
+            names = []
+            for i in np.unique(of_corners):
+                if albedo[of_corners == i].max() < NOT_DIFFUSE:
+                    names.append(repr(slots[i].material.name if slots[i].material else "(none)"))
+                    slots[i].material = materials.lambert((1, 1, 1))
+            if names:
+                self._channel.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
+                albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
+        self._readable = albedo.max(axis=1) >= NOT_DIFFUSE
+        dark = int((np.bincount(self._corners, self._readable, self._count) == 0).sum())
+        if dark:
+            self._channel.warn(f"{dark} vertices have nothing diffuse around them: they take the irradiance of the nearest in the list")
+
+
+def corner_angles(mesh: bpy.types.Mesh, matrix: Any) -> np.ndarray:
+    """(C,) angle in the world between the two edges that meet at each face corner, rad."""
+    points = np.empty(len(mesh.vertices) * 3, np.float32)
+    mesh.vertices.foreach_get("co", points)
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    world = (points.reshape(-1, 3) @ np.array(matrix.to_3x3(), np.float64).T)[vertices]
+    first, total = np.empty(len(mesh.polygons), np.int32), np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", first)
+    mesh.polygons.foreach_get("loop_total", total)
+    corner = np.arange(len(vertices))
+    first, total = np.repeat(first, total), np.repeat(total, total)
+    after, before = (world[first + (corner - first + step) % total] - world for step in (1, -1))
+    cross = np.linalg.norm(np.cross(after, before), axis=1)
+    return np.arctan2(cross, (after * before).sum(axis=1))
