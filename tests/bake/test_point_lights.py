@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from srbf.bake.point_lights import PointGrid
+from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.survey import with_free_lamps
 from srbf.capture import Capture
