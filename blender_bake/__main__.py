@@ -2,7 +2,7 @@
 """`python -m blender_bake JOB.json`, or `blender --background --python blender_bake/__main__.py -- JOB.json`.
 
 The job says scene, receiver, size, quantity, lights and scratch folder; see `run`. Events come out as JSON lines:
-scene, warning, image (name or light, file, seconds), error, done.
+scene, warning, image (name or light, file, seconds), file, ready, error, done.
 """
 
 from __future__ import annotations
@@ -11,22 +11,25 @@ import json
 import sys
 import time
 import traceback
+from collections.abc import Iterable
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 if not __package__:  # run as a script by an installed Blender
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from blender_bake.channel import Channel, WorkerError, die_with_host, hand_over, leave
+from blender_bake.channel import Channel, Requests, WorkerError, hand_over, leave
 
 
 def main() -> None:
     """Run the job named by the last argument; exit 0 when done, 1 after an error event."""
     channel = Channel()
-    die_with_host()
+    requests = Requests()
     try:
-        run(json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8")), channel)
+        job = json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8"))
+        run(job, chain(job["lights"], requests if job.get("serve") else ()), channel)
     except WorkerError as error:
         channel.emit("error", message=str(error))
         leave(1)
@@ -38,13 +41,14 @@ def main() -> None:
     leave(0)
 
 
-def run(job: dict[str, Any], channel: Channel) -> None:
-    """Open the scene, prepare the receiver, then hand over what `job` asks for.
+def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel) -> None:
+    """Open the scene, prepare the receiver, hand over what `job` asks for, say that it is ready, then answer `lights` as they come.
 
     job: scene, receiver {kind, object, uv_layer | camera}, width, height, quantity, keep_lamps, sun_angle, scratch,
-    geometry (bool), ambient {samples, seed} or null, lights [{index, kind, direction | position, samples, seed}].
+    geometry (bool), ambient {samples, seed} or null; `serve` where lights are asked for on stdin, after those in the job.
+    A light: index, kind, direction | position, samples, seed.
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
-    by which the tints of translucent materials are chosen.
+    by which the tints of translucent materials are chosen, unless `tints` has them already.
     """
     from blender_bake import emission, scene_file, translucency
     from blender_bake import scene as scenes
@@ -69,7 +73,7 @@ def run(job: dict[str, Any], channel: Channel) -> None:
     if job["geometry"]:
         for name, array in receiver.geometry().items():
             image(name, array, time.perf_counter())
-    ambient = job["ambient"]
+    ambient = job["ambient"] if job["keep_lamps"] or emission.may_shine() else None
     started = time.perf_counter()
     if ambient:
         if job["keep_lamps"]:
@@ -81,26 +85,27 @@ def run(job: dict[str, Any], channel: Channel) -> None:
         started = time.perf_counter()
         image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
     illuminant = Illuminant(scene, job["sun_angle"])
-    if not apart:
-        for light in job["lights"]:
-            started = time.perf_counter()
-            illuminant.aim(light)
-            image(f"light_{light['index']}", receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
-        return
-    translucent = translucency.find(scene)
-    aims = [partial(illuminant.aim, light) for light in job["probes"]]
-    tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-    seen_by = {receiver.description()["object"]} if job["receiver"]["kind"] == "lightmap" else None
-    (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
-    channel.emit("file", file="scene.glb", sampling=receiver.sampling())
-    switch = translucency.Switch(translucent, tints)
-    for light in job["lights"]:
+    switch = None
+    if apart:
+        translucent = translucency.find(scene)
+        tints = job.get("tints")
+        if tints is None:
+            aims = [partial(illuminant.aim, light) for light in job["probes"]]
+            tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
+            seen_by = {receiver.description()["object"]} if job["receiver"]["kind"] == "lightmap" else None
+            (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+            channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)
+        switch = translucency.Switch(translucent, tints)
+    channel.emit("ready")
+    for light in lights:
         started = time.perf_counter()
         illuminant.aim(light)
+        name = f"light_{light['index']}"
+        if switch is None:
+            image(name, receiver.answer(light["samples"], light["seed"]), started, light=light["index"])
+            continue
         whole, direct = receiver.answers(light["samples"], light["seed"], switch)
-        image(
-            f"light_{light['index']}", whole, started, light=light["index"], direct=hand_over(scratch, f"direct_{light['index']}", direct)
-        )
+        image(name, whole, started, light=light["index"], direct=hand_over(scratch, f"direct_{light['index']}", direct))
 
 
 if __name__ == "__main__":

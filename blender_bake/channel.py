@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the worker speaks to its host: JSON lines on the real stdout, arrays as files in the scratch folder, death on end of stdin."""
+"""How the worker speaks to its host: JSON lines out on the real stdout and in on stdin, arrays as files in the scratch folder."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import json
 import os
 import sys
 import threading
+from collections import deque
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -45,15 +47,40 @@ def hand_over(scratch: Path, name: str, array: np.ndarray) -> str:
     return file
 
 
-def die_with_host() -> None:
-    """End this process as soon as stdin closes: the host holds the other end, so its death, even by kill -9, closes it."""
+class Requests:
+    """What the host asks for on stdin, a JSON line each; its end is the host's death, even by kill -9, and ours.
 
-    def watch() -> None:
-        while os.read(0, 4096):
-            pass
+    Iterate the requests as they come, until the host ends them with `{"end": true}`: what it asked for and was not begun is dropped.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: deque[dict[str, Any] | None] = deque()
+        self._changed = threading.Condition()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting)
+                request = self._waiting.popleft()
+            if request is None:
+                return
+            yield request
+
+    def _watch(self) -> None:
+        rest = b""
+        while block := os.read(0, 65536):
+            *lines, rest = (rest + block).split(b"\n")
+            with self._changed:
+                for line in lines:
+                    request = json.loads(line)
+                    if request.get("end"):
+                        self._waiting.clear()
+                        self._waiting.append(None)
+                    else:
+                        self._waiting.append(request)
+                self._changed.notify()
         leave(3)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def leave(status: int) -> NoReturn:

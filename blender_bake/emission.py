@@ -12,14 +12,27 @@ STRENGTHS = {
 }
 
 
+SHINING = {"ShaderNodeBackground", "ShaderNodeEeveeSpecular", "ShaderNodeScript"}  # emit, or may, by no strength of the above
+BLACKBODY = "Blackbody Intensity"
+
+
+def may_shine() -> bool:
+    """Whether any material holds a node that emits, at a strength that is not 0 or that something drives: else ambient is exactly 0."""
+    for tree in _trees():
+        for node in tree.nodes:
+            sockets = [node.inputs.get(name) for name in (STRENGTHS.get(node.bl_idname, ""), BLACKBODY)]
+            driven = tree.animation_data is not None
+            if node.bl_idname in SHINING or any(s is not None and (driven or s.is_linked or s.default_value != 0) for s in sockets):
+                return True
+    return False
+
+
 def switch_off() -> None:
     """Set every emission strength of every material and node group to 0, drivers and animation included.
 
     What emits by other means (a blackbody in a volume, say) is left, and the host subtracts its image.
     """
-    trees = [material.node_tree for material in bpy.data.materials if material.node_tree]
-    trees += [group for group in bpy.data.node_groups if group.bl_idname == "ShaderNodeTree"]
-    for tree in trees:
+    for tree in _trees():
         for node in tree.nodes:
             socket = node.inputs.get(STRENGTHS.get(node.bl_idname, ""))
             if socket is None:
@@ -28,3 +41,8 @@ def switch_off() -> None:
                 tree.links.remove(link)
             tree.animation_data_clear()  # a driver would bring the strength back
             socket.default_value = 0.0
+
+
+def _trees() -> list[bpy.types.NodeTree]:
+    trees = [material.node_tree for material in bpy.data.materials if material.node_tree]
+    return trees + [group for group in bpy.data.node_groups if group.bl_idname == "ShaderNodeTree"]

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
+from uuid import uuid4
 
 from srbf.errors import ImageError, ManifestError, OutputExistsError, SrbfError
 
@@ -21,7 +22,9 @@ class WriteError(SrbfError, OSError):
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` to write to; on success it is flushed to disk and renamed, on failure removed."""
-    temporary = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    temporary = path.with_name(
+        f".{path.stem}.{os.getpid()}-{uuid4().hex[:8]}.partial{path.suffix}"
+    )  # several machines may share the folder
     try:
         yield temporary
         with open(temporary, "rb+") as file:

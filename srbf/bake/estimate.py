@@ -6,13 +6,16 @@ import shutil
 import tempfile
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from srbf.bake.checks import bytes_needed
 from srbf.bake.run import Bake, base_job
-from srbf.bake.settings import plan_lights
+from srbf.bake.schedule import next_samples
+from srbf.bake.settings import PlannedLight, plan_lights
 from srbf.bake.worker import Worker
 from srbf.image import write_image
 
@@ -26,6 +29,8 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     """
     settings = bake.settings
     bake.check_scene()
+    if bake.is_open_ended:
+        settings = replace(settings, samples=1)
     lights = plan_lights(settings)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
@@ -49,8 +54,10 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
     fixed = max(0.0, seconds[1] - per_sample)
     ambient = 2 * settings.holdout_samples  # as the scene emits, and with all of it off
-    time = (len(lights) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
-    disk = len(lights) * image_bytes + settings.width * settings.height * 40
+    passes = [_passes(light) for light in lights]
+    time = (sum(passes) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
+    summed = len(lights) if bake.keeps_sums else sum(count > 1 for count in passes)
+    disk = len(lights) * image_bytes + bytes_needed(settings, 0, summed)
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
@@ -60,11 +67,25 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     return [
         f"scene      {bake.scene} (Blender {facts['blender']})",
         f"receiver   {facts['receiver']['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
-        f"lights     {roles['train']} train at {settings.samples} samples, {roles['validation']} validation and "
+        f"lights     {roles['train']} train at {_samples(bake)}, {roles['validation']} validation and "
         f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}, a sun of {np.degrees(settings.sun_angle):.3g} degrees",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
-        f"time       about {_duration(time)} on this machine as busy as it is now",
+        f"time       about {_duration(time)} {'a sample of all lights ' if bake.is_open_ended else ''}on this machine as busy as it is now",
     ]
+
+
+def _samples(bake: Bake) -> str:
+    if bake.settings.samples == "auto":
+        return "as many samples as help"
+    return f"{bake.settings.samples} samples" if bake.seconds is None else f"the samples that {_duration(bake.seconds)} allow"
+
+
+def _passes(light: PlannedLight) -> int:
+    count = done = 0
+    while done < light.samples:
+        done += next_samples(light, done, light.samples)
+        count += 1
+    return count
 
 
 def _duration(seconds: float) -> str:

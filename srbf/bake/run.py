@@ -1,51 +1,41 @@
-"""Baking a capture: ask the worker for what is missing, write each image as it comes, the manifest last."""
+"""Baking a capture: pass by pass, every light's sum kept, the folder a valid capture from the first pass on."""
 
 from __future__ import annotations
 
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import srbf
 from srbf import files
+from srbf.bake import folder, stopping
+from srbf.bake.checks import FirstLights, bytes_needed, check_disk
+from srbf.bake.crew import Answer, Crew, CrewSettings, Task
+from srbf.bake.folder import LOG, SCRATCH, STATE
+from srbf.bake.images import CaptureImages, uv_checksum, without_uv
+from srbf.bake.manifest import capture_manifest
+from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
-from srbf.bake.worker import Worker, WorkerDiedError
-from srbf.capture import MANIFEST
-from srbf.dilation import dilate, nearest_covered
-from srbf.errors import BakeError, ImageError, InputError, MissingLibraryError, OutputExistsError
-from srbf.image import HALF_MAX, read_image, size_of, write_image
+from srbf.bake.sums import NOTHING, SUMS, Sums
+from srbf.bake.worker import Worker
+from srbf.capture import MANIFEST, Capture
+from srbf.errors import BakeError, InputError
 
-STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
-LOG = "bake.log"
-SCRATCH = ".scratch"
-LOCK = ".lock"
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
-GEOMETRY = ("position", "normal", "albedo", "coverage")
-SCENE_FILE = "scene.glb"
 PROBES = 12  # about so many lights by which the tints of translucent materials are chosen
-BEFORE_IMAGES = (LOCK, SCRATCH, LOG, "lights", "direct")  # what may be there of a bake that never wrote an image
-WRITTEN = (
-    "lights",
-    "direct",
-    "ambient.exr",
-    *(f"{name}.exr" for name in GEOMETRY),
-    "uv.json",
-    SCENE_FILE,
-    SCRATCH,
-    LOG,
-)  # all that a bake leaves
+CURVE = "curve.json"  # in the folder of sums: what --samples auto measured
 
 
 @dataclass
 class Reporter:
-    """Where a bake tells of itself: progress in units of work (done, total, what), and lines for the user."""
+    """Where a bake tells of itself: progress in samples (done, total, what), and lines for the user."""
 
     progress: Callable[[float, float, str], None] = lambda done, total, what: None
     say: Callable[[str], None] = lambda line: None
@@ -53,72 +43,56 @@ class Reporter:
 
 @dataclass(frozen=True)
 class Bake:
-    """One bake of a scene into a folder; `run` starts it or goes on with it."""
+    """One bake of a scene into a folder; `run` starts it or goes on with it.
+
+    `seconds`: stop when so much time is up, at the end of the light at hand. `keep_sums`: leave what more samples could be added to.
+    """
 
     scene: Path
     folder: Path
     settings: BakeSettings
     blender: Path | None = None
+    crew: CrewSettings = field(default_factory=CrewSettings)
+    seconds: float | None = None
+    keep_sums: bool = False
+
+    @property
+    def is_open_ended(self) -> bool:
+        """Whether the number of samples is found while baking."""
+        return self.settings.samples == "auto" or self.seconds is not None
+
+    @property
+    def keeps_sums(self) -> bool:
+        """Whether more samples can be added once it is done."""
+        return self.keep_sums or self.is_open_ended
 
     def run(self, reporter: Reporter, force: bool = False, restart: bool = False) -> bool:
-        """Bake what is not there yet; False where the capture was complete already. Killed at any moment, it goes on when run again.
+        """Bake what is not there yet; False where nothing was left to do. Killed at any moment, it goes on when run again.
 
-        Finished lights are kept, and every image and the manifest are bit-identical to those of an uninterrupted bake.
-        BakeError where Blender fails or another process bakes here; OutputExistsError where the folder holds something else.
+        Finished passes of lights are kept, and every image and the manifest are bit-identical to those of an uninterrupted bake.
+        BakeError where Blender fails, a light cannot be rendered, or another process bakes here; OutputExistsError where the folder
+        holds something else.
         """
         identity = self._identity()
         existed = self.folder.exists()
-        with self._lock():
+        with folder.hold(self.folder):
             try:
-                self._check_folder(identity, force, restart)
-                if (self.folder / MANIFEST).is_file():
-                    (self.folder / STATE).unlink(missing_ok=True)
+                if folder.is_finished(self.folder, identity, force, restart):
                     return False
-                self._sweep()
-                scratch = self.folder / SCRATCH
-                files.make_folder(scratch)
-                files.make_folder(self.folder / "lights")
-                if self.settings.transport == "indirect":
-                    files.make_folder(self.folder / "direct")
-                try:
-                    manifest = self._bake(identity, scratch, reporter)
-                except WorkerDiedError as error:
-                    if not (self.folder / STATE).is_file():
-                        raise
-                    raise BakeError(
-                        f"{error}; its log is {self.folder / LOG}; finished lights are kept, run the same command to go on"
-                    ) from error
-                files.write_json(self.folder / MANIFEST, manifest)
-                (self.folder / STATE).unlink()
+                folder.sweep(self.folder)
+                for name in (SUMS, "lights", *(["direct"] if self.settings.transport == "indirect" else [])):
+                    files.make_folder(self.folder / name)
+                files.make_folder(self.folder / SCRATCH)
+                _Passes(self, identity, reporter).run()
                 return True
+            except KeyboardInterrupt:
+                if (self.folder / STATE).is_file():
+                    reporter.say(f"stopped; finished lights are kept, the same command goes on with {self.folder}")
+                raise
             finally:
                 shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
                 if not (existed or (self.folder / STATE).exists() or (self.folder / MANIFEST).exists()):
                     shutil.rmtree(self.folder, ignore_errors=True)  # Blender never came as far as the first image
-
-    @contextmanager
-    def _lock(self) -> Iterator[None]:
-        """Hold the folder; the system lets go of it however this process ends."""
-        try:
-            import filelock
-        except ImportError as error:
-            raise MissingLibraryError("baking needs filelock: pip install filelock") from error
-        if self.folder.exists() and not self.folder.is_dir():
-            raise OutputExistsError(f"expected a folder or nothing at {self.folder}, found a file; choose another -o")
-        files.make_folder(self.folder)
-        lock = filelock.FileLock(str(self.folder / LOCK))
-        try:
-            lock.acquire(timeout=0)
-        except filelock.Timeout as error:
-            raise BakeError(f"another process is baking into {self.folder}; wait for it, or choose another -o") from error
-        except OSError as error:
-            raise files.WriteError(f"cannot write into {self.folder}: {error.strerror}; choose a folder that can be written") from error
-        try:
-            yield
-        finally:
-            if self.folder.exists() and not any((self.folder / name).exists() for name in (STATE, MANIFEST)):
-                (self.folder / LOCK).unlink(missing_ok=True)
-            lock.release()
 
     def check_scene(self) -> None:
         """InputError where there is no scene to bake."""
@@ -130,166 +104,257 @@ class Bake:
         self.check_scene()
         return {"scene": self.scene.name, "scene_sha256": files.sha256_of(self.scene), "settings": self.settings.record()}
 
-    def _check_folder(self, identity: dict[str, Any], force: bool, restart: bool) -> None:
-        """Refuse a folder that this bake can neither go on with nor replace; empty it where the user said so."""
-        done, begun = self.folder / MANIFEST, self.folder / STATE
-        if not done.is_file() and not begun.is_file():
-            others = [p for p in self.folder.iterdir() if p.name not in BEFORE_IMAGES and ".partial" not in p.name]
-            if others or any(any((self.folder / name).glob("*")) for name in ("lights", "direct")):
-                raise OutputExistsError(f"expected an empty folder or a capture at {self.folder}, found other files; choose another -o")
-            return
-        recorded = files.read_json(done).get("source", {}) if done.is_file() else files.read_json(begun)
-        if recorded.get("emptying"):
-            self._empty()
-            return
-        changed = _differences(recorded, identity)
-        if not changed and not restart and not (force and done.is_file()):
-            return
-        if not (force or (restart and not done.is_file())):
-            if not changed:
-                raise OutputExistsError(
-                    f"expected an unfinished capture to restart at {self.folder}, found a finished one; --force replaces it"
-                )
-            state = "a finished capture" if done.is_file() else "a capture half done"
-            flag = "--force" if done.is_file() else "--restart"
-            raise OutputExistsError(
-                f"expected {state} of the same scene and settings at {self.folder}, found another {', '.join(changed)}; "
-                f"choose another -o, or {flag} to bake anew"
-            )
-        self._empty()
 
-    def _empty(self) -> None:
-        """Remove an old capture. Killed on the way, the next run goes on: no light of the old bake may pass for one of the new."""
-        files.write_json(self.folder / STATE, {"emptying": True})
-        (self.folder / MANIFEST).unlink(missing_ok=True)
-        for name in WRITTEN:
-            path = self.folder / name
-            shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
-        (self.folder / STATE).unlink()
+class _Passes:
+    """One run of a bake, in a folder that it holds."""
 
-    def _sweep(self) -> None:
-        """Remove what a killed process left half-written."""
-        shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
-        for partial in [*self.folder.glob(".*.partial*"), *self.folder.glob("lights/.*.partial*"), *self.folder.glob("direct/.*.partial*")]:
-            partial.unlink()
+    def __init__(self, bake: Bake, identity: dict[str, Any], reporter: Reporter) -> None:
+        self._bake, self._identity, self._reporter = bake, identity, reporter
+        self._folder, self._settings = bake.folder, bake.settings
+        self._lights = plan_lights(bake.settings)
+        self._order = render_order(self._lights)
+        self._images = CaptureImages(bake.folder, reporter.say)
+        self._sums = Sums(bake.folder, self._lights)
+        self._auto = bake.settings.samples == "auto"
+        self._keep = bake.keeps_sums
+        self._goal = 1 if self._auto else int(bake.settings.samples)
+        self._first = FirstLights(len(self._lights), bake.settings.receiver.place, reporter.say)
+        self._settled = not self._auto  # how many samples the fitted lights get
+        self._curve: list[stopping.Measure] = []
+        self._measured: dict[int, stopping.Measure] = {}  # by samples, in this run or before
+        self._sampling: dict[str, Any] = {}
+        self._tints: dict[str, Any] | None = None
+        self._facts: dict[str, Any] | None = None
+        self._failed: dict[int, str] = {}
+        self._told: set[str] = set()
+        self._started = time.monotonic()
+        self._mutex = threading.Lock()
 
-    def _bake(self, identity: dict[str, Any], scratch: Path, reporter: Reporter) -> dict[str, Any]:
-        lights = plan_lights(self.settings)
-        missing = [light for light in lights if not self._is_done(light)]
-        images = _Images(self.folder, self.settings, reporter)
-        total = float(sum(light.samples for light in lights))
-        done = total - sum(light.samples for light in missing)
-        log = self.folder / LOG
-        started = time.perf_counter()
-        if done:
-            reporter.say(f"going on: {len(lights) - len(missing)} of {len(lights)} lights are done")
-        reporter.progress(done, total, "opening the scene")
-        facts: dict[str, Any] = {}
-        sampling: dict[str, Any] = {}
-        planned = {light.index: light for light in missing}
-        with Worker(self._job(missing, scratch), scratch, log, self.blender) as worker:
-            for event in worker.events():
-                if event["event"] == "warning":
-                    reporter.say(event["message"])
-                elif event["event"] == "scene":
-                    facts = event
-                    self._record(identity, event["blender"])
-                    self._write_uv(event)
-                elif event["event"] == "file":
-                    sampling = event["sampling"]
-                    with files.atomic_path(self.folder / event["file"]) as temporary:
-                        shutil.copyfile(scratch / event["file"], temporary)
-                elif event["event"] == "image":
-                    array = np.load(scratch / event["file"])
-                    (scratch / event["file"]).unlink()
-                    if "light" not in event:
-                        images.take(event["name"], array)
-                        continue
-                    light = planned.pop(event["light"])
-                    direct = None
-                    if "direct" in event:
-                        direct = np.load(scratch / event["direct"])
-                        (scratch / event["direct"]).unlink()
-                    images.take_light(light, array, direct)
-                    done += light.samples
-                    reporter.progress(done, total, f"light {len(lights) - len(planned)} of {len(lights)}")
-                    with open(log, "a", encoding="utf-8") as lines:
-                        lines.write(f"srbf: light {light.index} in {event['seconds']:.3f} s\n")
-        if planned:
-            raise BakeError(f"expected {len(missing)} lights from Blender, found {len(missing) - len(planned)}; run the same command again")
-        if images.is_all_black(lights):
+    def run(self) -> None:
+        new = [light for light in self._lights if not (self._folder / light.file).is_file()]
+        check_disk(self._folder, bytes_needed(self._settings, len(new), len([light for light in new if self._is_summed(light)])))
+        with Crew(self._bake.crew, self._folder / SCRATCH, self._start, self._ready, self._reporter.say) as crew, self._alarm(crew):
+            if self._images.prepared is None:
+                self._reporter.progress(0, 1, "opening the scene")
+                crew.open()
+                assert self._facts is not None
+                self._images.prepare(self._facts, self._sampling, self._tints)
+            else:
+                self._record(self._images.prepared["facts"]["blender"])
+            self._take_stock()
+            try:
+                self._passes(crew)
+            except KeyboardInterrupt:
+                self._write_manifest()
+                raise
+        self._finish()
+
+    def _passes(self, crew: Crew) -> None:
+        while not self._is_time_up():
+            tasks = self._tasks()
+            if tasks:
+                crew.render(tasks, self._take)
+                self._failed |= crew.failed
+                self._write_manifest()
+            elif self._settled:
+                return
+            elif self._is_enough():
+                self._settled = True  # what is left is what the tested lights are still due
+            else:
+                self._goal *= 2
+
+    def _finish(self) -> None:
+        self._write_manifest()
+        self._log(f"stopped after {time.monotonic() - self._started:.1f} s")
+        if self._failed:
+            index, reason = next(iter(self._failed.items()))
             raise BakeError(
-                f"every light image is black: does light reach {facts['receiver'].get('object') or 'the camera'} from the "
-                f"{self.settings.domain}? Mend the scene and bake with --restart"
+                f"{len(self._failed)} of {len(self._lights)} lights could not be rendered, among them light {index}: {reason}; "
+                f"the others are in {self._folder}, and the same command tries these again"
             )
-        with open(log, "a", encoding="utf-8") as lines:
-            lines.write(f"srbf: {len(missing)} lights in {time.perf_counter() - started:.1f} s\n")
-        return self._manifest(identity, lights, facts, images, sampling)
+        if self._is_time_up() and (self._tasks() or not self._settled):
+            reached = [self._sums.samples(light) for light in self._lights if light.role == "train"]
+            self._reporter.say(
+                f"the time is up at {min(reached)} to {max(reached)} samples a texel; the same command adds more"
+                if any(reached)
+                else "the time was up before the first light was done; the same command goes on"
+            )
+            return
+        if self._keep:
+            (self._folder / STATE).unlink()
+            return
+        folder.tidy(self._folder)
 
-    def _job(self, missing: list[PlannedLight], scratch: Path) -> dict[str, Any]:
-        settings = self.settings
-        train = [light for light in plan_lights(settings) if light.role == "train"]
-        return {
-            **base_job(self.scene, settings, scratch),
-            "geometry": True,
-            "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)},
-            "lights": [light.job() for light in missing],
-            "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
-        }
+    def _take_stock(self) -> None:
+        """A light whose images are gone or damaged is written or begun anew; likewise one that has to grow and cannot."""
+        apart, size = self._settings.transport == "indirect", (self._settings.height, self._settings.width)
+        for light in self._lights:
+            if self._sums.passes(light) == 0:
+                continue
+            if not self._images.is_published(light, apart, size):
+                total = self._sums.read(light)
+                if total.whole is None:
+                    self._sums.forget(light)
+                else:
+                    self._images.publish(light, self._images.own_light(light, total.mean), total.direct_mean)
+            if self._needs_squares(light) and self._sums.read(light).squares is None:
+                self._sums.forget(light)
+            if self._sums.samples(light) < self._goal_of(light) and not self._sums.can_grow(light):
+                self._sums.forget(light)
+        done = sum(self._sums.passes(light) > 0 for light in self._lights)
+        if done:
+            self._reporter.say(f"going on: {done} of {len(self._lights)} lights are done")
+        path = self._folder / SUMS / CURVE
+        if self._auto and path.is_file():
+            self._measured = {entry["samples"]: stopping.Measure(**entry) for entry in files.read_json(path)["curve"]}
 
-    def _is_done(self, light: PlannedLight) -> bool:
-        """A light's files are whole by construction (renamed into place); a size that is not ours is baked again."""
-        paths = [self.folder / light.file]
-        if self.settings.transport == "indirect":
-            paths.append(self.folder / light.direct_file)
-        with suppress(ImageError):
-            return all(path.is_file() and size_of(path) == (self.settings.height, self.settings.width) for path in paths)
-        return False
+    def _tasks(self) -> list[Task]:
+        """The next pass: of the lights that have the fewest, what each is due."""
+        due = [light for light in self._order if self._sums.samples(light) < self._goal_of(light) and light.index not in self._failed]
+        level = min((self._sums.passes(light) for light in due), default=0)
+        first = 1 if self._auto else FIRST_SAMPLES
+        return [
+            Task(
+                light,
+                next_samples(light, self._sums.samples(light), self._goal_of(light), first),
+                noise_seed(self._settings.seed, light.index, level),
+            )
+            for light in due
+            if self._sums.passes(light) == level
+        ]
 
-    def _record(self, identity: dict[str, Any], blender: str) -> None:
-        """The receiver is good: from here on the folder is a bake begun. Another Blender would not give the same bits."""
-        path = self.folder / STATE
+    def _take(self, task: Task, answer: Answer) -> None:
+        light = task.light
+        total = self._sums.read(light) if self._sums.passes(light) else NOTHING
+        if total.passes != self._sums.passes(light):  # damaged since the stock was taken
+            self._sums.forget(light)
+            return
+        total = total.with_pass(task.samples, answer.whole, answer.direct, self._needs_squares(light))
+        try:
+            own = self._images.own_light(light, total.mean)
+            self._images.publish(light, own, total.direct_mean)
+        except BakeError as error:
+            if self._first.looking:
+                raise
+            self._reporter.say(f"{error}; the rest goes on")
+            self._failed[light.index] = str(error)
+            return
+        self._sums.write(light, total, self._keep or total.samples < self._goal_of(light))
+        with self._mutex:
+            self._first.look(own)
+            self._tell_progress(total.passes)
+            self._log(f"light {light.index} pass {total.passes} of {task.samples} in {answer.seconds:.3f} s")
+
+    def _is_enough(self) -> bool:
+        """`--samples auto`: measure what this many samples gave, and whether the last doubling was still worth it."""
+        measure = self._measured.get(self._goal)
+        if measure is None:
+            lights = [light for light in self._lights if light.role == "validation" and light.index not in self._failed]
+            measure = stopping.measure(Capture.open(self._folder), self._goal, [self._sums.read(light) for light in lights])
+            self._measured[self._goal] = measure
+            files.write_json(self._folder / SUMS / CURVE, {"curve": stopping.record(list(self._measured.values()))})
+            self._reporter.say(
+                f"{self._goal} samples a texel: error {measure.relative_rmse:.4f} on the validation lights "
+                f"(their own noise of {measure.noise:.4f} taken off)"
+            )
+        self._curve.append(measure)
+        return stopping.is_enough(self._curve)
+
+    def _goal_of(self, light: PlannedLight) -> int:
+        if light.role == "train":
+            return self._goal
+        tested = self._settings.holdout_samples
+        return tested if self._settled else min(tested, TESTED_GROWTH * self._goal)
+
+    def _needs_squares(self, light: PlannedLight) -> bool:
+        return self._auto and light.role == "validation"
+
+    def _is_summed(self, light: PlannedLight) -> bool:
+        return self._keep or self._goal_of(light) > FIRST_SAMPLES
+
+    def _write_manifest(self) -> None:
+        """The folder as it stands becomes a valid capture, once a fitted light is there."""
+        lights = [(light, self._sums.samples(light)) for light in self._lights if self._sums.passes(light)]
+        reached = [samples for light, samples in lights if light.role == "train"]
+        if reached and self._images.prepared is not None:
+            curve = stopping.record(self._curve)
+            manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)
+            files.write_json(self._folder / MANIFEST, manifest)
+
+    def _record(self, blender: str) -> None:
+        """From here on the folder is a bake begun. Another Blender would not give the same bits."""
+        path = self._folder / STATE
         began = files.read_json(path).get("blender", blender) if path.is_file() else blender
         if began != blender:
-            raise BakeError(f"expected Blender {began}, which began {self.folder}, found {blender}; use it, or add --restart")
-        files.write_json(path, {**identity, "blender": blender})
+            raise BakeError(f"expected Blender {began}, which began {self._folder}, found {blender}; use it, or add --restart")
+        files.write_json(path, {**self._identity, "blender": blender})
 
-    def _write_uv(self, event: dict[str, Any]) -> None:
-        if "uv" in event:
-            files.write_json(self.folder / "uv.json", {"uv_layer": event["made_uv_layer"], "per_loop": event["uv"]})
-
-    def _manifest(
-        self, identity: dict[str, Any], lights: list[PlannedLight], facts: dict[str, Any], images: _Images, sampling: dict[str, Any]
-    ) -> dict[str, Any]:
-        source = {**identity, "srbf": srbf.__version__, "blender": facts["blender"]}
-        if "camera" in facts:
-            source["camera"] = facts["camera"]
-        if "made_uv_layer" in facts:
-            source["uv"] = "uv.json"
-        apart = self.settings.transport == "indirect"
-        return {
-            "format": "srbf-capture",
-            "version": 1,
-            "quantity": self.settings.quantity,
-            "transport": self.settings.transport,
-            "width": self.settings.width,
-            "height": self.settings.height,
-            "receiver": facts["receiver"],
-            "lights": [
-                {
-                    "kind": "directional",
-                    "direction": list(light.direction),
-                    "role": light.role,
-                    "file": light.file,
-                    **({"direct": light.direct_file} if apart else {}),
-                }
-                for light in lights
-            ],
-            **({"scene": SCENE_FILE, "direct": {"sun_angle": self.settings.sun_angle, **sampling}} if apart else {}),
-            **{name: f"{name}.exr" for name in GEOMETRY},
-            **({"ambient": "ambient.exr"} if images.has_ambient else {}),
-            "source": source,
+    def _start(self, scratch: Path) -> Worker:
+        settings, prepared = self._settings, self._images.prepared
+        train = [light for light in self._lights if light.role == "train"]
+        job = {
+            **base_job(self._bake.scene, settings, scratch),
+            "serve": True,
+            "geometry": prepared is None,
+            "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)} if prepared is None else None,
+            "lights": [],
+            "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
+            "tints": None if prepared is None else prepared["tints"],
         }
+        return Worker(job, scratch, self._folder / LOG, self._bake.blender)
+
+    def _ready(self, event: dict[str, Any], scratch: Path) -> None:
+        """What a worker tells before it serves: the first one the receiver and its geometry, every other one the same scene."""
+        kind, prepared = event["event"], self._images.prepared
+        if kind == "warning":
+            with self._mutex:
+                if event["message"] not in self._told:
+                    self._told.add(event["message"])
+                    self._reporter.say(event["message"])
+        elif kind == "scene" and prepared is not None:
+            self._record(event["blender"])
+            if without_uv(event) != prepared["facts"] or uv_checksum(event) != prepared["uv"]:
+                raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+        elif kind == "scene":
+            self._record(event["blender"])
+            self._facts = event
+        elif kind == "file":
+            self._sampling, self._tints = event["sampling"], event["tints"]
+            with files.atomic_path(self._folder / event["file"]) as temporary:
+                shutil.copyfile(scratch / event["file"], temporary)
+        elif kind == "image":
+            self._images.take(event["name"], np.load(scratch / event["file"]))
+            (scratch / event["file"]).unlink()
+
+    @contextmanager
+    def _alarm(self, crew: Crew) -> Iterator[None]:
+        """Stop the crew when the time is up."""
+        timer = None
+        if self._bake.seconds is not None:
+            timer = threading.Timer(max(0.0, self._bake.seconds - (time.monotonic() - self._started)), crew.stop)
+            timer.daemon = True
+            timer.start()
+        try:
+            yield
+        finally:
+            if timer is not None:
+                timer.cancel()
+
+    def _is_time_up(self) -> bool:
+        return self._bake.seconds is not None and time.monotonic() - self._started >= self._bake.seconds
+
+    def _tell_progress(self, sampling_pass: int) -> None:
+        if self._bake.seconds is not None:
+            done, total = min(time.monotonic() - self._started, self._bake.seconds), self._bake.seconds
+        else:
+            done = float(sum(min(self._sums.samples(light), self._goal_of(light)) for light in self._lights))
+            total = float(sum(self._goal_of(light) for light in self._lights))
+        reached = sum(self._sums.passes(light) >= sampling_pass for light in self._lights)
+        self._reporter.progress(done, total, f"pass {sampling_pass}: light {reached} of {len(self._lights)}")
+
+    def _log(self, line: str) -> None:
+        with open(self._folder / LOG, "a", encoding="utf-8") as log:
+            log.write(f"srbf: {line}\n")
 
 
 def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, Any]:
@@ -306,74 +371,3 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
     }
-
-
-class _Images:
-    """The capture's images as they arrive: geometry, ambient, what is left of it, then the lights with that subtracted."""
-
-    def __init__(self, folder: Path, settings: BakeSettings, reporter: Reporter) -> None:
-        self._folder = folder
-        self._settings = settings
-        self._reporter = reporter
-        self._left: np.ndarray | None = None
-        self._raw: dict[str, np.ndarray] = {}
-        self._nearest: np.ndarray | None = None
-        self.has_ambient = False
-        self._brightest = 0.0
-
-    def take(self, name: str, array: np.ndarray) -> None:
-        """Geometry is kept until `hit`, its last image: where position and normal are real. `readable` says where light is."""
-        if name == "left":  # what still shines with every lamp and emission off: subtracted from the lights, mostly nothing
-            self._left = dilate(array, self._nearest) if array.any() else None
-        elif name == "ambient":
-            self.has_ambient = bool(array.any())
-            if self.has_ambient:
-                write_image(self._folder / "ambient.exr", dilate(array, self._nearest), "float")
-        elif name == "hit":
-            self._nearest = nearest_covered(self._raw.pop("readable")[:, :, 0])
-            nearest = nearest_covered(self._raw["coverage"][:, :, 0])
-            of_hits = nearest_covered(array[:, :, 0])
-            for geometry, image in self._raw.items():
-                if geometry != "coverage":
-                    image = dilate(image, nearest if geometry == "albedo" else of_hits)
-                write_image(self._folder / f"{geometry}.exr", image, "float")
-            self._raw.clear()
-        else:
-            self._raw[name] = array
-
-    def take_light(self, light: PlannedLight, array: np.ndarray, direct: np.ndarray | None = None) -> None:
-        """Write one light's answer: finite, freed of what is left of the scene's own light, half float (fireflies clipped, and said).
-
-        With `direct` given that is taken from it and written beside it, first: a light whose image is there has both.
-        """
-        if not (np.isfinite(array).all() and (direct is None or np.isfinite(direct).all())):
-            raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
-        array = dilate(array, self._nearest)
-        if self._left is not None:
-            array = array - self._left
-        self._brightest = max(self._brightest, float(array.max()))
-        if direct is not None:
-            direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
-            array = array - direct  # as the file has it, so that the two add up again
-            write_image(self._folder / light.direct_file, direct, "half")
-        beyond = int((np.abs(array) > HALF_MAX).sum())
-        if beyond:
-            self._reporter.say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
-            array = np.clip(array, -HALF_MAX, HALF_MAX)
-        write_image(self._folder / light.file, array, "half")
-
-    def is_all_black(self, lights: list[PlannedLight]) -> bool:
-        """Whether no light image of the capture, baked now or earlier, has a texel above 0."""
-        if self._brightest > 0:
-            return False
-        names = [light.file for light in lights]
-        if self._settings.transport == "indirect":
-            names += [light.direct_file for light in lights]
-        return all(float(read_image(self._folder / name, 3).max()) <= 0 for name in names)
-
-
-def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:
-    """Names of what differs between a recorded bake and this one."""
-    changed = ["scene"] if recorded.get("scene_sha256") != asked["scene_sha256"] else []
-    before, now = recorded.get("settings", {}), asked["settings"]
-    return changed + [name.replace("_", " ") for name in now if before.get(name) != now[name]]

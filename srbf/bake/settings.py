@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -35,6 +35,11 @@ class Receiver:
             return Receiver(kind, name or None)
         raise InputError(f"expected a receiver lightmap:OBJECT or view[:CAMERA], found {text!r}")
 
+    @property
+    def place(self) -> str:
+        """What it is called in a message."""
+        return f"{self.kind} {self.name!r}" if self.name else f"the {self.kind}"
+
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""
         return {"kind": self.kind, ("object" if self.kind == "lightmap" else "camera"): self.name, "uv_layer": self.uv_layer}
@@ -49,7 +54,7 @@ class BakeSettings:
     height: int = 256
     lights: int = 400
     domain: Domain = "hemisphere"
-    samples: int = 2
+    samples: int | Literal["auto"] = 2
     validation: int = 16
     holdout: int = 32
     holdout_samples: int = 64
@@ -62,11 +67,13 @@ class BakeSettings:
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
-            if getattr(self, name) < 1:
+            if getattr(self, name) != "auto" and getattr(self, name) < 1:
                 raise InputError(f"expected {name.replace('_', ' ')} of 1 or more, found {getattr(self, name)}")
         for name in ("validation", "holdout", "seed", "sun_angle"):
             if not getattr(self, name) >= 0:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
+        if self.samples == "auto" and (self.validation < 1 or self.holdout_samples < 2):
+            raise InputError("--samples auto judges by validation lights of at least 2 samples, found none; leave --validation as it is")
         if max(self.width, self.height) > 16384:
             raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
@@ -122,7 +129,7 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
         train = point_set("hammersley", settings.lights, domain)
     rng = np.random.default_rng(settings.seed)
     groups: list[tuple[Role, np.ndarray, int]] = [
-        ("train", train, settings.samples),
+        ("train", train, 1 if settings.samples == "auto" else settings.samples),
         ("validation", random_directions(settings.validation, domain, rng), settings.holdout_samples),
         ("holdout", random_directions(settings.holdout, domain, rng), settings.holdout_samples),
     ]

@@ -1,4 +1,4 @@
-"""Blender's process as seen from outside: start it, read its events, notice its death, and never leave it behind."""
+"""Blender's process as seen from outside: start it, ask it, read its events, notice its death, and never leave it behind."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import json
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
 
@@ -36,19 +39,20 @@ def command(blender: Path | None, job: Path) -> list[str]:
 
 
 class WorkerDiedError(BakeError):
-    """The process ended without an error event: a crash, or a kill."""
+    """The process ended without an error event (a crash, a kill), or said nothing for too long and was killed."""
 
 
 class Worker:
-    """A running worker; iterate its events. As a context manager it is dead at the end, whatever happened."""
+    """A running worker; ask it for lights, take its events. As a context manager it is dead at the end, whatever happened."""
 
     def __init__(self, job: dict[str, Any], scratch: Path, log: Path, blender: Path | None = None) -> None:
         path = scratch / "job.json"
         path.write_text(json.dumps(job), encoding="utf-8")
         self._log_path = log
-        self._log = open(log, "ab")  # noqa: SIM115 - closed in __exit__
+        self._log = open(log, "ab")  # noqa: SIM115 - closed in close
+        self._events: SimpleQueue[dict[str, Any] | None] = SimpleQueue()
         try:
-            # A session of its own: Ctrl-C reaches the host alone, which decides. Its stdin is our life line, see die_with_host.
+            # A session of its own: Ctrl-C reaches the host alone, which decides. Its stdin is also our life line.
             self._process = subprocess.Popen(
                 command(blender, path),
                 stdin=subprocess.PIPE,
@@ -62,34 +66,68 @@ class Worker:
         except OSError as error:
             self._log.close()
             raise BakeError(f"cannot start Blender at {blender or sys.executable}: {error.strerror}") from error
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def __enter__(self) -> Worker:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Kill it where it still runs."""
         if self._process.poll() is None:
             self._process.kill()
         self._process.wait()
+        self._reader.join()
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
-                stream.close()
+                with suppress(OSError):  # words that a dead worker never took
+                    stream.close()
         self._log.close()
 
+    def ask(self, light: dict[str, Any]) -> None:
+        """Ask for one more light of a job that serves; what is asked for is answered in order."""
+        self._tell(light)
+
+    def end(self) -> None:
+        """Let it finish the light at hand, forget the others, and end."""
+        self._tell({"end": True})
+
+    def event(self, patience: float | None = None) -> dict[str, Any] | None:
+        """The next event; None once it is done. BakeError on an error event, WorkerDiedError after `patience` seconds of silence."""
+        try:
+            event = self._events.get(timeout=patience)
+        except Empty as error:
+            self._process.kill()
+            raise WorkerDiedError(f"Blender's process gave no answer for {patience:.0f} s and was stopped") from error
+        if event is None:
+            status = self._process.wait()
+            cause = f"signal {-status}" if status < 0 else f"status {status}"
+            raise WorkerDiedError(f"Blender's process ended unexpectedly ({cause}), its last words being {self._last_words()}")
+        if event["event"] == "error":
+            raise BakeError(event["message"])
+        return None if event["event"] == "done" else event
+
     def events(self) -> Iterator[dict[str, Any]]:
-        """Every event until `done`; BakeError on an error event, or when the process ends without one."""
+        """Every event until it is done."""
+        while (event := self.event()) is not None:
+            yield event
+
+    def _tell(self, request: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # a dead one is noticed when its answer is awaited
+            self._process.stdin.write(json.dumps(request) + "\n")
+            self._process.stdin.flush()
+
+    def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
             event = self._parse(line)
-            if event is None:
-                continue
-            if event["event"] == "error":
-                raise BakeError(event["message"])
-            if event["event"] == "done":
-                return
-            yield event
-        status = self._process.wait()
-        cause = f"signal {-status}" if status < 0 else f"status {status}"
-        raise WorkerDiedError(f"Blender's process ended unexpectedly ({cause}), its last words being {self._last_words()}")
+            if event is not None:
+                self._events.put(event)
+        self._events.put(None)
 
     def _parse(self, line: str) -> dict[str, Any] | None:
         try:

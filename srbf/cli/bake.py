@@ -8,11 +8,14 @@ from typing import Annotated, Literal
 
 import typer
 
+from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.cli.parameters import Blender, Force, Output, parse_size, parse_sun_angle
-from srbf.cli.terminal import note, progress_bar
+from srbf.cli.parameters import Blender, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
+from srbf.cli.terminal import json_progress_lines, note, progress_bar
+
+UNLIMITED = 1 << 16  # samples a texel: more than any bake's time allows
 
 
 def bake(
@@ -24,7 +27,11 @@ def bake(
     domain: Annotated[
         Literal["sphere", "hemisphere"], typer.Option(help="Where lights stand; hemisphere is above the ground.")
     ] = "hemisphere",
-    samples: Annotated[int, typer.Option(help="Samples a texel of each fitted light.")] = 2,
+    samples: Annotated[
+        str | None,
+        typer.Option(help="Samples a texel of each fitted light; auto: until more no longer help. Default 2, with --time all it allows."),
+    ] = None,
+    time: Annotated[str | None, typer.Option(help="Stop when so much time is up: 90s, 30m, 8h. The same command adds more.")] = None,
     validation: Annotated[int, typer.Option(help="Random lights that decisions may look at.")] = 16,
     holdout: Annotated[int, typer.Option(help="Random lights for the reported error alone.")] = 32,
     holdout_samples: Annotated[int, typer.Option(help="Samples a texel of validation, holdout and ambient.")] = 64,
@@ -45,11 +52,21 @@ def bake(
     ] = "0",
     keep_lamps: Annotated[bool, typer.Option("--keep-lamps", help="The scene's own lamps and world become ambient.")] = False,
     blender: Blender = None,
+    workers: Annotated[int, typer.Option(help="Blender processes at a time.", min=1)] = 1,
+    lights_a_worker: Annotated[int, typer.Option(help="Lights after which a Blender process is replaced.", min=1)] = 500,
+    hang_after: Annotated[
+        float | None,
+        typer.Option(help="Seconds after which a silent Blender is replaced; default: learnt from the lights before.", show_default=False),
+    ] = None,
+    keep_sums: Annotated[bool, typer.Option("--keep-sums", help="Keep what --samples N can later add to; --time and auto do.")] = False,
+    json_progress: Annotated[
+        bool, typer.Option("--json-progress", help="Progress as JSON lines on stderr: done, total, what, seconds_left.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say receiver, lights, disk and time; bake nothing.")] = False,
     force: Force = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin anew.")] = False,
 ) -> None:
-    """Bake SCENE under many directional lights. Stopped at any moment, the same command goes on."""
+    """Bake SCENE under many directional lights, in passes. Stopped at any moment, the same command goes on."""
     width, height = parse_size(size)
     parsed, angle = Receiver.parse(receiver, uv_layer), parse_sun_angle(sun_angle)
     settings = BakeSettings(
@@ -58,7 +75,7 @@ def bake(
         height=height,
         lights=lights,
         domain=domain,
-        samples=samples,
+        samples=_samples(samples, time),
         validation=validation,
         holdout=holdout,
         holdout_samples=holdout_samples,
@@ -72,11 +89,18 @@ def bake(
     if angle == "auto":
         settings = settings.with_matched_sun()
         note(f"a sun of {settings.sun_angle:.4g} rad ({degrees(settings.sun_angle):.1f} degrees), as far as the fitted lights stand apart")
-    job = Bake(scene, output, settings, blender)
+    crew = CrewSettings(workers, lights_a_worker, hang_after)
+    job = Bake(scene, output, settings, blender, crew, None if time is None else parse_duration(time), keep_sums)
     if dry_run:
         for line in estimate(job, note):
             typer.echo(line)
         return
-    with progress_bar("bake") as update:
+    with json_progress_lines() if json_progress else progress_bar("bake") as update:
         baked = job.run(Reporter(update, note), force, restart)
     note(f"baked {output}" if baked else f"{output} is complete already")
+
+
+def _samples(text: str | None, time: str | None) -> int | Literal["auto"]:
+    if text is None:
+        return 2 if time is None else UNLIMITED
+    return parse_samples(text)

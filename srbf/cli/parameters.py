@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,3 +36,21 @@ def parse_sun_angle(text: str) -> Literal["auto"] | float:
         return float(text)
     except ValueError as error:
         raise InputError(f"expected --sun-angle auto or a number of radians, found {text!r}") from error
+
+
+def parse_samples(text: str) -> Literal["auto"] | int:
+    """`auto` or a number of samples."""
+    if text == "auto":
+        return "auto"
+    if not (text.isascii() and text.isdecimal()):
+        raise InputError(f"expected --samples auto or a whole number, found {text!r}")
+    return int(text)
+
+
+def parse_duration(text: str) -> float:
+    """Seconds of `90s`, `30m`, `8h`, `1h30m` or a plain number of seconds."""
+    found = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text.strip())
+    seconds = sum(float(n or 0) * unit for n, unit in zip(found.groups(), (3600, 60, 1), strict=True)) if found else 0.0
+    if seconds <= 0:
+        raise InputError(f"expected --time as 90s, 30m or 8h, found {text!r}")
+    return seconds

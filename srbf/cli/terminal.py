@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -74,3 +75,21 @@ def progress_bar(what: str) -> Iterator[Callable[..., None]]:
             bar.update(task, completed=done, total=total, description=text)
 
         yield update
+
+
+@contextmanager
+def json_progress_lines() -> Iterator[Callable[..., None]]:
+    """Progress for a program to read: on stderr, a JSON line each, with the seconds left by the rate so far (null at first)."""
+    began: tuple[float, float] | None = None
+
+    def update(done: float, total: float, text: str = "") -> None:
+        nonlocal began
+        now = time.monotonic()
+        if began is None or done < began[1]:
+            began = (now, done)
+        gained = done - began[1]
+        left = None if gained <= 0 else round((total - done) * (now - began[0]) / gained, 1)
+        sys.stderr.write(json.dumps({"done": done, "total": total, "what": text, "seconds_left": left}) + "\n")
+        sys.stderr.flush()
+
+    yield update

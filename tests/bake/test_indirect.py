@@ -116,7 +116,7 @@ def test_a_killed_indirect_bake_goes_on_to_the_same_bits(blend, tmp_path: Path) 
     wait_for_lights(folder, 9, process)
     os.kill(process.pid, signal.SIGKILL)
     process.communicate(timeout=60)
-    (folder / "direct" / "0002.exr").unlink()  # a light lacks its half: it is baked again
+    min((folder / "direct").glob("[0-9]*.exr")).unlink()  # a light lacks its half: it is baked again
     subprocess.run(run, check=True, capture_output=True)
     assert contents(folder) == contents(whole)
     assert "direct/0002.exr" in contents(whole) and "scene.glb" in contents(whole)

@@ -1,0 +1,268 @@
+"""Several workers at one list of lights: each asked in turn, replaced when it dies, hangs or has grown old; no light is lost by that."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf import files
+from srbf.bake.settings import PlannedLight
+from srbf.bake.worker import Worker, WorkerDiedError
+from srbf.errors import BakeError
+
+AHEAD = 2  # lights asked of a worker at once: it renders one while we write the other
+TRIES = 2  # of a light, before it is reported and the rest goes on
+OPENING = 3600.0  # seconds that a scene may take to open, before anything is known of it
+FIRST_LIGHT = 3600.0
+PATIENCE = 10.0  # times the slowest sample seen so far
+LEAST_PATIENCE = 30.0  # seconds
+
+
+@dataclass(frozen=True)
+class Task:
+    """One pass of a light: `samples` more of it, by their own `seed`."""
+
+    light: PlannedLight
+    samples: int
+    seed: int
+
+    def job(self) -> dict[str, Any]:
+        """As the worker reads it."""
+        return {**self.light.job(), "samples": self.samples, "seed": self.seed}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a worker rendered for a task; `direct` where the capture keeps the direct light apart."""
+
+    whole: ndarray
+    direct: ndarray | None
+    seconds: float
+
+
+@dataclass(frozen=True)
+class CrewSettings:
+    """How the work is spread, none of which changes a pixel."""
+
+    workers: int = 1
+    lights_a_worker: int = 500  # then its process is replaced: Blender's memory grows
+    hang_after: float | None = None  # seconds without an answer; by default learnt from the lights before
+
+
+class Patience:
+    """How long an answer may take: PATIENCE times the slowest so far, by the sample."""
+
+    def __init__(self, fixed: float | None) -> None:
+        self._fixed = fixed
+        self._slowest: float | None = None
+
+    def learn(self, seconds: float, samples: int) -> None:
+        self._slowest = max(self._slowest or 0.0, seconds / samples)
+
+    def of(self, samples: int) -> float:
+        """Seconds for a light of so many samples."""
+        if self._fixed is not None:
+            return self._fixed
+        return FIRST_LIGHT if self._slowest is None else LEAST_PATIENCE + PATIENCE * self._slowest * samples
+
+
+class Crew:
+    """Workers of one bake, alive until it is left. `start` makes one in a scratch folder, `ready` sees all its events until it serves."""
+
+    def __init__(
+        self,
+        settings: CrewSettings,
+        scratch: Path,
+        start: Callable[[Path], Worker],
+        ready: Callable[[dict[str, Any], Path], None],
+        say: Callable[[str], None],
+    ) -> None:
+        self._settings = settings
+        self._start, self._ready, self._say = start, ready, say
+        self._slots = [_Slot(scratch / f"worker{i}") for i in range(settings.workers)]
+        self._patience = Patience(settings.hang_after)
+        self._lock = threading.Lock()
+        self._waiting: deque[Task] = deque()
+        self._deaths: Counter[int] = Counter()
+        self._lost_openings = 0  # in a row
+        self._stop = False
+        self._error: BaseException | None = None
+        self.failed: dict[int, str] = {}  # lights given up, and why
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stop = True
+        for slot in self._slots:
+            slot.close()
+
+    def open(self) -> None:
+        """Start the first worker and wait until it serves."""
+        while self._slots[0].worker is None:
+            with suppress(WorkerDiedError):
+                self._open(self._slots[0])
+
+    def stop(self) -> None:
+        """Begin no other light; `render` returns once those at hand are done."""
+        with self._lock:
+            self._stop = True
+            self._waiting.clear()
+
+    def render(self, tasks: Sequence[Task], take: Callable[[Task, Answer], None]) -> None:
+        """Have every task rendered and hand over its answer, from the threads of several workers; lights given up are in `failed`.
+
+        The first error of scene, disk or `take` ends all of it. KeyboardInterrupt lets the lights at hand finish, then is raised.
+        """
+        self._waiting.extend(tasks)
+        threads = [threading.Thread(target=self._serve, args=(slot, take), daemon=True) for slot in self._slots]
+        for thread in threads:
+            thread.start()
+        interrupt: KeyboardInterrupt | None = None
+        while any(thread.is_alive() for thread in threads):
+            try:
+                for thread in threads:
+                    thread.join(0.2)
+            except KeyboardInterrupt as pressed:
+                if interrupt is not None:
+                    for slot in self._slots:
+                        slot.close()
+                    raise
+                interrupt = pressed
+                self._say("finishing the light at hand; press again to stop at once")
+                self.stop()
+        if self._error is not None:
+            raise self._error
+        if interrupt is not None:
+            raise interrupt
+
+    def _serve(self, slot: _Slot, take: Callable[[Task, Answer], None]) -> None:
+        try:
+            while self._work(slot, take):
+                pass
+        except BaseException as error:  # noqa: BLE001 - raised again by `render`, in the thread that asked
+            with self._lock:
+                self._error = self._error or error
+            self.stop()
+
+    def _work(self, slot: _Slot, take: Callable[[Task, Answer], None]) -> bool:
+        """Ask and take until the list is empty (False) or the worker is to be replaced (True)."""
+        asked: deque[Task] = deque()
+        try:
+            while True:
+                while len(asked) < AHEAD and slot.answered + len(asked) < self._settings.lights_a_worker:
+                    task = self._next()
+                    if task is None:
+                        break
+                    if slot.worker is None:
+                        asked.append(task)  # put back should the opening fail
+                        self._open(slot)
+                        asked.pop()
+                    assert slot.worker is not None
+                    slot.worker.ask(task.job())
+                    asked.append(task)
+                if self._stop and len(asked) > 1 and slot.worker is not None:
+                    slot.worker.end()  # drops what it has not begun
+                if not asked:
+                    if slot.answered >= self._settings.lights_a_worker:
+                        slot.close()
+                        return True
+                    return False
+                answer = self._answer(slot, asked[0])
+                if answer is None:
+                    slot.close()
+                    return False
+                task = asked.popleft()
+                self._patience.learn(answer.seconds, task.samples)
+                take(task, answer)
+        except WorkerDiedError as error:
+            slot.close()
+            self._died(asked, error)
+            return not self._stop
+
+    def _open(self, slot: _Slot) -> None:
+        shutil.rmtree(slot.scratch, ignore_errors=True)
+        files.make_folder(slot.scratch)
+        slot.worker = self._start(slot.scratch)
+        try:
+            while (event := slot.worker.event(self._settings.hang_after or OPENING)) is not None:
+                if event["event"] == "ready":
+                    self._lost_openings = 0
+                    return
+                self._ready(event, slot.scratch)
+        except WorkerDiedError as error:
+            slot.close()
+            self._lost_openings += 1
+            if self._lost_openings >= TRIES:
+                raise BakeError(f"{error}, before it rendered anything, {TRIES} times in a row") from error
+            self._say(f"{error}; tried again")
+            raise
+        raise BakeError("Blender's worker ended before it was ready")
+
+    def _answer(self, slot: _Slot, task: Task) -> Answer | None:
+        """The next image; None where the worker was told to end before it began the task."""
+        assert slot.worker is not None
+        while (event := slot.worker.event(self._patience.of(task.samples))) is not None:
+            if event["event"] == "warning":
+                self._say(event["message"])
+            elif event["event"] == "image":
+                if event["light"] != task.light.index:
+                    raise BakeError(f"expected light {task.light.index} from Blender, found {event['light']}")
+                slot.answered += 1
+                direct = _taken(slot.scratch / event["direct"]) if "direct" in event else None
+                return Answer(_taken(slot.scratch / event["file"]), direct, event["seconds"])
+        return None
+
+    def _next(self) -> Task | None:
+        with self._lock:
+            return self._waiting.popleft() if self._waiting and not self._stop else None
+
+    def _died(self, asked: deque[Task], error: WorkerDiedError) -> None:
+        """The light at hand is tried again, or given up; those behind it go back to the list."""
+        if not asked:
+            raise error
+        if self._lost_openings:  # it never came to a light
+            with self._lock:
+                self._waiting.extendleft(reversed(asked))
+            return
+        at_hand = asked.popleft()
+        with self._lock:
+            self._waiting.extendleft(reversed(asked))
+            self._deaths[at_hand.light.index] += 1
+            again = self._deaths[at_hand.light.index] < TRIES
+            if again:
+                self._waiting.appendleft(at_hand)
+            else:
+                self.failed[at_hand.light.index] = str(error)
+        what = "tried again" if again else "given up; the rest goes on"
+        self._say(f"light {at_hand.light.index}: {error}; {what}")
+
+
+@dataclass
+class _Slot:
+    scratch: Path
+    worker: Worker | None = None
+    answered: int = 0
+
+    def close(self) -> None:
+        worker, self.worker, self.answered = self.worker, None, 0
+        if worker is not None:
+            worker.close()
+        with suppress(OSError):
+            shutil.rmtree(self.scratch)
+
+
+def _taken(path: Path) -> ndarray:
+    array = np.load(path)
+    path.unlink()
+    return array

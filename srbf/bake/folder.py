@@ -1,0 +1,148 @@
+"""The folder of a bake: who holds it, what it holds, whether a bake may go on with it, and emptying it safely."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from srbf import files
+from srbf.bake import sums
+from srbf.bake.images import GEOMETRY, SCENE_FILE
+from srbf.bake.sums import SUMS
+from srbf.capture import MANIFEST
+from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
+
+STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
+LOG = "bake.log"
+SCRATCH = ".scratch"
+LOCK = ".lock"
+HOLDER = ".holder.json"
+BEFORE_IMAGES = (LOCK, HOLDER, SCRATCH, LOG, SUMS, "lights", "direct")  # what may be there of a bake that never wrote an image
+WRITTEN = (
+    "lights",
+    "direct",
+    "ambient.exr",
+    "seams.exr",
+    *(f"{name}.exr" for name in GEOMETRY),
+    "uv.json",
+    SCENE_FILE,
+    SUMS,
+    SCRATCH,
+    LOG,
+)  # all that a bake leaves
+
+
+@contextmanager
+def hold(folder: Path) -> Iterator[None]:
+    """Hold the folder; the system lets go of it however this process ends."""
+    try:
+        import filelock
+    except ImportError as error:
+        raise MissingLibraryError("baking needs filelock: pip install filelock") from error
+    if folder.exists() and not folder.is_dir():
+        raise OutputExistsError(f"expected a folder or nothing at {folder}, found a file; choose another -o")
+    files.make_folder(folder)
+    lock = filelock.FileLock(str(folder / LOCK))
+    try:
+        lock.acquire(timeout=0)
+    except filelock.Timeout as error:
+        raise BakeError(f"another process{_holder(folder)} is baking into {folder}; wait for it, or choose another -o") from error
+    except OSError as error:
+        raise files.WriteError(f"cannot write into {folder}: {error.strerror}; choose a folder that can be written") from error
+    try:
+        files.write_json(folder / HOLDER, {"host": socket.gethostname(), "pid": os.getpid(), "since": time.strftime("%F %T")})
+        yield
+    finally:
+        (folder / HOLDER).unlink(missing_ok=True)
+        if folder.exists() and not any((folder / name).exists() for name in (STATE, MANIFEST)):
+            (folder / LOCK).unlink(missing_ok=True)
+        lock.release()
+
+
+def _holder(folder: Path) -> str:
+    with suppress(ManifestError, KeyError):
+        holder = files.read_json(folder / HOLDER)
+        return f" (process {holder['pid']} on {holder['host']}, since {holder['since']})"
+    return ""
+
+
+def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bool) -> bool:
+    """Whether the folder holds all that is asked for. A folder that can be neither gone on with nor replaced is refused; one that
+    the user wants replaced is emptied."""
+    done, begun = folder / MANIFEST, folder / STATE
+    if not done.is_file() and not begun.is_file():
+        others = [p for p in folder.iterdir() if p.name not in BEFORE_IMAGES and ".partial" not in p.name]
+        if others or any(any((folder / name).glob("*")) for name in ("lights", "direct")):
+            raise OutputExistsError(f"expected an empty folder or a capture at {folder}, found other files; choose another -o")
+        return False
+    finished = done.is_file() and not begun.is_file()
+    recorded = files.read_json(done).get("source", {}) if finished else files.read_json(begun)
+    if recorded.get("tidying"):
+        tidy(folder)
+        return is_finished(folder, identity, force, restart)
+    if recorded.get("emptying"):
+        _empty(folder)
+        return False
+    changed = _differences(recorded, identity)
+    if not changed and not restart and not (force and finished):
+        return finished and not _may_grow(folder, recorded, identity)
+    if not (force or (restart and not finished)):
+        if not changed:
+            raise OutputExistsError(f"expected an unfinished capture to restart at {folder}, found a finished one; --force replaces it")
+        state = "a finished capture" if finished else "a capture half done"
+        raise OutputExistsError(
+            f"expected {state} of the same scene and settings at {folder}, found another {', '.join(changed)}; "
+            f"choose another -o, or {'--force' if finished else '--restart'} to bake anew"
+        )
+    _empty(folder)
+    return False
+
+
+def sweep(folder: Path) -> None:
+    """Remove what a killed process left half-written."""
+    shutil.rmtree(folder / SCRATCH, ignore_errors=True)
+    for place in ("", "lights/", "direct/", f"{SUMS}/"):
+        for partial in folder.glob(f"{place}.*.partial*"):
+            partial.unlink()
+
+
+def tidy(folder: Path) -> None:
+    """Drop the sums of a finished bake, and the mark that it was unfinished. Killed on the way, the next run does it."""
+    files.write_json(folder / STATE, {"tidying": True})
+    sums.remove(folder)
+    (folder / STATE).unlink()
+
+
+def _may_grow(folder: Path, recorded: dict[str, Any], asked: dict[str, Any]) -> bool:
+    """Whether a finished capture is to have more samples; OutputExistsError where it is, and its sums are gone."""
+    has, wants = recorded["settings"]["samples"], asked["settings"]["samples"]
+    more = not recorded.get("validation_curve") if wants == "auto" else wants > has
+    if more and not any((folder / SUMS).glob("[0-9]*")):
+        raise OutputExistsError(
+            f"expected the sums of {folder}, to add to its {has} samples a texel, found none: they are kept by --keep-sums, "
+            "--samples auto and --time; choose another -o, or --force to bake anew"
+        )
+    return more
+
+
+def _empty(folder: Path) -> None:
+    """Remove an old capture. Killed on the way, the next run goes on: no light of the old bake may pass for one of the new."""
+    files.write_json(folder / STATE, {"emptying": True})
+    (folder / MANIFEST).unlink(missing_ok=True)
+    for name in WRITTEN:
+        path = folder / name
+        shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+    (folder / STATE).unlink()
+
+
+def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:
+    """Names of what differs between a recorded bake and this one; samples may: more are added, fewer are there."""
+    changed = ["scene"] if recorded.get("scene_sha256") != asked["scene_sha256"] else []
+    before, now = recorded.get("settings", {}), asked["settings"]
+    return changed + [name.replace("_", " ") for name in now if name != "samples" and before.get(name) != now[name]]

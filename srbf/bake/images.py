@@ -1,0 +1,141 @@
+"""A capture's images as a bake writes them: geometry and ambient once, then every light's mean, dilated, without what shines anyway."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf import files
+from srbf.arrays import Float32, Int
+from srbf.bake.settings import PlannedLight
+from srbf.bake.sums import SUMS, load_array, save_array
+from srbf.dilation import dilate, nearest_covered
+from srbf.errors import BakeError, ImageError, ManifestError
+from srbf.image import HALF_MAX, read_image, write_image
+
+GEOMETRY = ("position", "normal", "albedo", "coverage")
+SCENE_FILE = "scene.glb"
+PREPARED = "prepared.json"  # in the folder of sums: the receiver is known and its geometry written
+READABLE = "readable.npz"  # where light can be read off the receiver
+LEFT = "left.npz"  # what shines with every lamp and emission off
+
+
+class CaptureImages:
+    """Writes the images of a capture. `prepared` holds what the worker told of scene and receiver, once that is known.
+
+    prepared: facts, sampling, tints, ambient and seams (whether there are such images), uv (checksum of a layer that was made).
+    """
+
+    def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None) -> None:
+        self._folder = folder
+        self._say = say
+        self._raw: dict[str, ndarray] = {}
+        self._left: Float32[ndarray, "H W 3"] | None = None
+        self._nearest: Int[ndarray, "H W"] | None = None
+        self.prepared: dict[str, Any] | None = None
+        path = folder / SUMS / PREPARED
+        if path.is_file():
+            try:
+                self._load(files.read_json(path))
+            except (ImageError, ManifestError):
+                path.unlink()  # of a damaged preparation: made again
+
+    def take(self, name: str, array: ndarray) -> None:
+        """An array of the preparation; `prepare` writes what follows from all of them."""
+        self._raw[name] = array
+
+    def prepare(self, facts: dict[str, Any], sampling: dict[str, Any], tints: dict[str, Any] | None) -> None:
+        """Write geometry, ambient and a made UV layer; last, that the preparation is whole. Positions are real where `hit`."""
+        raw, self._raw = self._raw, {}
+        readable, hit = raw.pop("readable"), raw.pop("hit")
+        save_array(self._folder / SUMS / READABLE, readable)
+        self._nearest = nearest_covered(readable[:, :, 0])
+        left, ambient, seams = (raw.pop(name, None) for name in ("left", "ambient", "seams"))
+        self._left = None
+        (self._folder / SUMS / LEFT).unlink(missing_ok=True)
+        if left is not None and left.any():
+            self._left = dilate(left, self._nearest)
+            save_array(self._folder / SUMS / LEFT, self._left)
+        shines = ambient is not None and bool(ambient.any())
+        if ambient is not None and shines:
+            write_image(self._folder / "ambient.exr", dilate(ambient, self._nearest), "float")
+        if seams is not None:
+            write_image(self._folder / "seams.exr", seams, "float")
+        nearest, of_hits = nearest_covered(raw["coverage"][:, :, 0]), nearest_covered(hit[:, :, 0])
+        for name, image in raw.items():
+            if name != "coverage":
+                image = dilate(image, nearest if name == "albedo" else of_hits)
+            write_image(self._folder / f"{name}.exr", image, "float")
+        if "uv" in facts:
+            files.write_json(self._folder / "uv.json", {"uv_layer": facts["made_uv_layer"], "per_loop": facts["uv"]})
+        self.prepared = {
+            "facts": without_uv(facts),
+            "sampling": sampling,
+            "tints": tints,
+            "ambient": shines,
+            "seams": seams is not None,
+            "uv": uv_checksum(facts),
+        }
+        files.write_json(self._folder / SUMS / PREPARED, self.prepared)
+
+    def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
+        """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
+        if not np.isfinite(mean).all():
+            raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
+        mean = dilate(mean, self._nearest)
+        return mean if self._left is None else mean - self._left
+
+    def publish(self, light: PlannedLight, own: Float32[ndarray, "H W 3"], direct: Float32[ndarray, "H W 3"] | None = None) -> None:
+        """Write one light's answer as half floats, fireflies beyond them clipped, and said.
+
+        With `direct` given that is taken from it and written beside it, first: a light whose image is there has both.
+        """
+        if direct is not None:
+            if not np.isfinite(direct).all():
+                raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
+            direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
+            own = own - direct  # as the file has it, so that the two add up again
+            write_image(self._folder / light.direct_file, direct, "half")
+        beyond = int((np.abs(own) > HALF_MAX).sum())
+        if beyond:
+            self._say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
+            own = np.clip(own, -HALF_MAX, HALF_MAX)
+        write_image(self._folder / light.file, own, "half")
+
+    def is_published(self, light: PlannedLight, apart: bool, size: tuple[int, int]) -> bool:
+        """Whether the light's images are there, whole and of this (height, width)."""
+        try:
+            return all(
+                read_image(self._folder / name, 3).shape[:2] == size for name in [light.file, *([light.direct_file] if apart else [])]
+            )
+        except ImageError:
+            return False
+
+    def _load(self, prepared: dict[str, Any]) -> None:
+        names = [*GEOMETRY, *(name for name in ("ambient", "seams") if prepared.get(name))]
+        for name in names:
+            read_image(self._folder / f"{name}.exr")
+        if prepared["tints"] is not None and not (self._folder / SCENE_FILE).is_file():
+            raise ImageError(f"expected {SCENE_FILE}, found none")
+        if prepared["uv"] is not None and not (self._folder / "uv.json").is_file():
+            raise ImageError("expected uv.json, found none")
+        self._nearest = nearest_covered(load_array(self._folder / SUMS / READABLE)[:, :, 0])
+        left = self._folder / SUMS / LEFT
+        self._left = load_array(left) if left.is_file() else None
+        self.prepared = prepared
+
+
+def without_uv(facts: dict[str, Any]) -> dict[str, Any]:
+    """Facts of a scene without the long list of a made layer's coordinates."""
+    return {key: value for key, value in facts.items() if key not in ("uv", "event")}
+
+
+def uv_checksum(facts: dict[str, Any]) -> str | None:
+    """Of the layer that was made, where one was: every worker must make the same."""
+    return hashlib.sha256(json.dumps(facts["uv"]).encode()).hexdigest() if "uv" in facts else None

@@ -1,0 +1,148 @@
+"""What a bake has rendered so far, on disk: a running sum a light, from which the capture's images are written."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy import ndarray
+
+from srbf import files
+from srbf.arrays import Float32
+from srbf.bake.settings import PlannedLight
+from srbf.errors import ImageError
+
+SUMS = "sums"
+
+
+@dataclass(frozen=True)
+class Sum:
+    """`samples` of a light in `passes`; the arrays (H, W, 3) float32 are sums over samples, or None once they are no longer needed.
+
+    `direct`, of an indirect capture, is the part of `whole` that is direct diffuse light. `squares` is the sum over passes of samples
+    times the square of the capture's image, as the pass alone would have it: what tells a validation light's noise.
+    """
+
+    passes: int
+    samples: int
+    whole: Float32[ndarray, "H W 3"] | None
+    direct: Float32[ndarray, "H W 3"] | None = None
+    squares: Float32[ndarray, "H W 3"] | None = None
+
+    def with_pass(self, samples: int, whole: ndarray, direct: ndarray | None, squares: bool) -> Sum:
+        """The sum with one more pass: the means `whole` and `direct` of `samples` samples."""
+        return Sum(
+            self.passes + 1,
+            self.samples + samples,
+            _added(self.whole, whole * np.float32(samples)),
+            None if direct is None else _added(self.direct, direct * np.float32(samples)),
+            _added(self.squares, (whole if direct is None else whole - direct) ** 2 * np.float32(samples)) if squares else None,
+        )
+
+    @property
+    def mean(self) -> Float32[ndarray, "H W 3"]:
+        assert self.whole is not None
+        return self.whole / np.float32(self.samples)
+
+    @property
+    def direct_mean(self) -> Float32[ndarray, "H W 3"] | None:
+        return None if self.direct is None else self.direct / np.float32(self.samples)
+
+    def noise_variance(self) -> Float32[ndarray, "H W 3"]:
+        """Variance of the mean, unbiased, from how the passes differ: (sum s x^2 - (sum s x)^2 / S) / ((passes - 1) S)."""
+        assert self.whole is not None and self.squares is not None and self.passes > 1
+        own = self.whole if self.direct is None else self.whole - self.direct
+        spread = self.squares - own * own / np.float32(self.samples)
+        return np.maximum(spread, 0) / np.float32((self.passes - 1) * self.samples)
+
+
+NOTHING = Sum(0, 0, None)
+
+
+class Sums:
+    """The folder of sums, one file a light: read once, then written as passes come. A light's file appears whole or not at all.
+
+    It is written after the light's images, so that after a kill they are at least as far as it says; the pass in question is then
+    rendered and written once more, to the same bits.
+    """
+
+    def __init__(self, folder: Path, lights: Sequence[PlannedLight]) -> None:
+        self._folder = folder / SUMS
+        files.make_folder(self._folder)
+        self._known = {light.index: self._read_counts(light.index) for light in lights}
+
+    def passes(self, light: PlannedLight) -> int:
+        return self._known[light.index][0]
+
+    def samples(self, light: PlannedLight) -> int:
+        return self._known[light.index][1]
+
+    def can_grow(self, light: PlannedLight) -> bool:
+        """Whether another pass can be added: nothing is there yet, or its sum is."""
+        return self._known[light.index][2] or self.passes(light) == 0
+
+    def read(self, light: PlannedLight) -> Sum:
+        """What is there of `light`; nothing where its file is missing or damaged."""
+        with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
+            passes, samples = (int(n) for n in stored["counts"])
+            arrays = {name: stored[name] for name in ("whole", "direct", "squares") if name in stored}
+            return Sum(passes, samples, arrays.get("whole"), arrays.get("direct"), arrays.get("squares"))
+        return NOTHING
+
+    def write(self, light: PlannedLight, total: Sum, keep: bool) -> None:
+        """Commit `total`; without `keep` only its counts."""
+        arrays = {"whole": total.whole, "direct": total.direct, "squares": total.squares} if keep else {}
+        with files.atomic_path(self._path(light.index)) as temporary:
+            np.savez(temporary, counts=np.array([total.passes, total.samples]), **{k: v for k, v in arrays.items() if v is not None})
+        self._known[light.index] = (total.passes, total.samples, keep)
+
+    def forget(self, light: PlannedLight) -> None:
+        """Begin `light` anew."""
+        self._path(light.index).unlink(missing_ok=True)
+        self._known[light.index] = (0, 0, False)
+
+    def refresh(self, light: PlannedLight) -> None:
+        """Read again what another process may have written."""
+        self._known[light.index] = self._read_counts(light.index)
+
+    def _path(self, index: int) -> Path:
+        return self._folder / f"{index:04d}.npz"
+
+    def _read_counts(self, index: int) -> tuple[int, int, bool]:
+        """(passes, samples, whether the sum is there) of a file whose every byte is as it was written."""
+        path = self._path(index)
+        with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
+            if archive.testzip() is None:
+                with np.load(path) as stored:
+                    return int(stored["counts"][0]), int(stored["counts"][1]), "whole" in stored
+        return 0, 0, False
+
+
+def save_array(path: Path, array: ndarray) -> None:
+    """An array of the bake's own, with a checksum."""
+    with files.atomic_path(path) as temporary:
+        np.savez(temporary, array=array)
+
+
+def load_array(path: Path) -> ndarray:
+    """What `save_array` wrote; ImageError where it is damaged."""
+    try:
+        with np.load(path) as stored:
+            return stored["array"]
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise ImageError(f"cannot read {path}: {error}") from error
+
+
+def remove(folder: Path) -> None:
+    """Remove a capture's sums: it can then no longer be gone on with."""
+    shutil.rmtree(folder / SUMS, ignore_errors=True)
+
+
+def _added(total: ndarray | None, part: ndarray) -> Float32[ndarray, "H W 3"]:
+    part = np.asarray(part, np.float32)
+    return part if total is None else total + part
