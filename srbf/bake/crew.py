@@ -263,6 +263,9 @@ class _Slot:
 
 
 def _taken(path: Path) -> ndarray:
-    array = np.load(path)
+    try:
+        array = np.load(path)
+    except (OSError, ValueError, EOFError) as error:
+        raise WorkerDiedError(f"Blender's process handed over {path.name}, which cannot be read: {error}") from error
     path.unlink()
     return array

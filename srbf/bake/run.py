@@ -225,6 +225,10 @@ class _Passes:
 
     def _take(self, task: Task, answer: Answer) -> None:
         light = task.light
+        size = (self._settings.height, self._settings.width, 3)
+        for image in (answer.whole, answer.direct):
+            if image is not None and image.shape != size:
+                raise BakeError(f"expected {size} values of light {light.index} from Blender, found {image.shape}; its log is {self._folder / LOG}")
         total = self._sums.read(light) if self._sums.passes(light) else NOTHING
         if total.passes != self._sums.passes(light):  # damaged since the stock was taken
             self._sums.forget(light)
