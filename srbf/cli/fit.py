@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
@@ -26,7 +28,7 @@ from srbf.cli.parameters import CaptureFolder, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
-from srbf.fitting import method_for, settings_of
+from srbf.fitting import encode, method_for, settings_of
 
 
 def fit(
@@ -45,6 +47,9 @@ def fit(
     encoding: Encoding = None,
     budget: Budget = None,
     psnr: Psnr = None,
+    stitch: Annotated[
+        bool, typer.Option("--stitch/--no-stitch", help="Make the two sides of UV seams agree, where the capture has any.")
+    ] = True,
     force: Force = False,
 ) -> None:
     """Fit an asset to the train lights and measure its error on every role of the capture.
@@ -61,13 +66,18 @@ def fit(
     chosen = method_for(opened, method, settings, note)
     watch = TrainWatch(opened)
     with progress_bar("fit") as update:
-        asset = chosen.encode(opened, update, watch.look)
+        asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     asset.save(output, force)
     note(f"fitted {_summary(asset)} to {asset.manifest['source']['fit']['train_lights']} lights in {fitted - started:.1f} s")
+    if "seams" in asset.manifest:
+        seams = asset.manifest["seams"]
+        note(
+            f"seams: {seams['edges']} edges stitched, their difference {seams['before']:.4f} of the mean before, {seams['after']:.4f} after"
+        )
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
