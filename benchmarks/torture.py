@@ -26,7 +26,8 @@ import hostility
 import numpy as np
 from faults import Lab, LostError, Strike, contents, fake_lab, wait_for_orphans
 
-SCENES = Path(__file__).resolve().parent.parent / "data" / "scenes"
+HERE = Path(__file__).resolve().parent
+SCENES = HERE.parent / "data" / "scenes"
 HANG_AFTER = "2"  # seconds; an answer of the fake takes a thousandth
 Trials = Iterator[Callable[[], object]]
 KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-sums"), ("--samples", "auto"))
@@ -129,6 +130,7 @@ def killed_at_random(labs: Labs, rng: np.random.Generator) -> Trials:
         lab = labs.real()
         folder = lab.fresh()
         lab.kill(folder, lab.start(folder), after, lambda host, workers: [host], signal.SIGKILL)
+        folder.mkdir(exist_ok=True)
         lab.go_on(folder)
 
     while True:
@@ -168,8 +170,14 @@ def interrupted(labs: Labs, rng: np.random.Generator) -> Trials:
         lab = labs.real()
         folder = lab.fresh()
         ended = lab.kill(folder, lab.start(folder), after, lambda host, workers: [host], signal.SIGINT)
-        if ended.status != 0 and (ended.status != 1 or "Traceback" in ended.said or "srbf:" not in ended.said):
+        over = ended.status == -signal.SIGINT and (not ended.said or "srbf: baked" in ended.said)  # Python was not up yet, or gone
+        if not over and ended.status != 0 and (ended.status != 1 or "Traceback" in ended.said or "srbf:" not in ended.said):
             raise LostError(f"Ctrl-C after {after:.2f} s ended as {ended.status}: {ended.said.strip()[-400:]!r}")
+        if ended.status != 0 and (folder / "capture.json").is_file():
+            told = {Path(light["file"]).stem for light in json.loads((folder / "capture.json").read_text())["lights"]}
+            if told != {path.stem for path in (folder / "sums").glob("[0-9]*")}:
+                raise LostError(f"Ctrl-C after {after:.2f} s left lights that the manifest does not tell of")
+        folder.mkdir(exist_ok=True)
         lab.go_on(folder)
 
     while True:
@@ -251,11 +259,11 @@ def damaged_files(labs: Labs, rng: np.random.Generator) -> Trials:
         shutil.copytree(begun, folder)
         _damage(folder / name, damage, place)
         ended = lab.run(folder)
-        if ended.status != 0:  # the two small texts may be refused, never be gone on with wrongly
-            if name.name not in ("bake.json", "capture.json"):
+        if ended.status != 0:  # the small texts may be refused, never be gone on with wrongly
+            if name.name not in ("bake.json", "capture.json", "curve.json"):
                 raise LostError(f"{name} {damage} at {place:.3f} ended as {ended.status}: {ended.said.strip()[-400:]!r}")
             lab.refuse(ended)
-            lab.succeed(lab.run(folder, "--force"))
+            lab.succeed(lab.run(folder, "--restart"))
         try:
             lab.go_on(folder)
         except LostError as error:
