@@ -7,7 +7,7 @@ SCENE ?= caustics
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
 
-.PHONY: setup demo test test-fast check torture bench clean
+.PHONY: setup demo test test-fast check torture bench extension clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
@@ -38,6 +38,9 @@ torture: setup
 bench: setup
 	$(BIN)/python benchmarks/pipeline.py
 	$(BIN)/python benchmarks/fit.py
+
+extension: setup
+	$(BIN)/python scripts/build_extension.py $(addprefix --platform ,$(PLATFORMS))
 
 clean:
 	rm -rf .venv .venv-* out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
