@@ -169,8 +169,10 @@ def interrupted(labs: Labs, rng: np.random.Generator) -> Trials:
     def trial(after: float) -> None:
         lab = labs.real()
         folder = lab.fresh()
-        ended = lab.kill(folder, lab.start(folder), after, lambda host, workers: [host], signal.SIGINT)
-        over = ended.status == -signal.SIGINT and (not ended.said or "srbf: baked" in ended.said)  # Python was not up yet, or gone
+        process = lab.start(folder)
+        _wait(lambda: folder.exists() or process.poll() is not None)  # before that nothing has begun, Python itself perhaps not
+        ended = lab.kill(folder, process, after, lambda host, workers: [host], signal.SIGINT)
+        over = "srbf: baked" in ended.said  # it met Python on its way out
         if not over and ended.status != 0 and (ended.status != 1 or "Traceback" in ended.said or "srbf:" not in ended.said):
             raise LostError(f"Ctrl-C after {after:.2f} s ended as {ended.status}: {ended.said.strip()[-400:]!r}")
         if ended.status != 0 and (folder / "capture.json").is_file():
@@ -181,7 +183,7 @@ def interrupted(labs: Labs, rng: np.random.Generator) -> Trials:
         lab.go_on(folder)
 
     while True:
-        yield partial(trial, _moment(labs.real(), rng))
+        yield partial(trial, float(rng.uniform(0, 1.2)) * labs.real().seconds)
 
 
 def _moment(lab: Lab, rng: np.random.Generator) -> float:
