@@ -5,8 +5,9 @@ VENV ?= $(if $(filter python3.11,$(NAME)),.venv,.venv-$(NAME))
 BIN := $(VENV)/bin
 SCENE ?= caustics
 OUT ?= out/$(SCENE)
+MINUTES ?= 9
 
-.PHONY: setup demo test test-fast check bench extension clean
+.PHONY: setup demo test test-fast check torture bench extension clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
@@ -30,6 +31,9 @@ check: setup
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+torture: setup
+	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)
 
 bench: setup
 	$(BIN)/python benchmarks/pipeline.py

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import bpy
 
-from blender_bake.channel import Channel, WorkerError
+from blender_bake import hardening
+from blender_bake.channel import Channel, WorkerError, leave
 
 WORKING_SPACE = "Linear Rec.709"
 
@@ -18,14 +19,34 @@ def version() -> str:
 
 
 def open_scene(path: str, channel: Channel) -> bpy.types.Scene:
-    """The .blend's active scene. Its scripts, drivers with Python and handlers do not run; what it misses is named."""
+    """The .blend's active scene, disarmed (see `hardening`): nothing in it runs or writes; what is left out or missing is named."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.filepaths.use_scripts_auto_execute = False
+    said: list[str] = []
+    read = False
+
+    @bpy.app.handlers.persistent
+    def disarm(*_: object) -> None:
+        nonlocal read
+        read = True
+        try:
+            said.extend(hardening.disarm())
+        except Exception as error:  # noqa: BLE001 - Blender would print it and go on to evaluate what is still armed
+            channel.emit("error", message=str(error) if isinstance(error, WorkerError) else f"Blender's worker failed: {error!r}")
+            leave(1)
+
+    bpy.app.handlers.load_post.insert(0, disarm)
     try:
         bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
     except RuntimeError as error:
         reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
         raise WorkerError(f"expected a .blend that Blender {version()} can open, found {path}: {reason}") from error
+    finally:
+        bpy.app.handlers.load_post.remove(disarm)
+    if not read:
+        raise WorkerError(f"expected Blender {version()} to say that it has read {path}, found it silent; use another Blender")
+    for line in said:
+        channel.warn(line)
     for missing in missing_files():
         channel.warn(missing)
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
@@ -73,22 +94,29 @@ def configure(scene: bpy.types.Scene) -> None:
         "time_limit": 0.0,
         "sample_offset": 0,
         "use_sample_subset": False,
+        "auto_scrambling_distance": False,
+        "scrambling_distance": 1.0,
+        "use_auto_tile": True,
+        "tile_size": 2048,
     }.items():
         if hasattr(cycles, name):  # Blender versions differ in what they have
             setattr(cycles, name, value)
     render = scene.render
+    bake = render.bake
+    bake.normal_r, bake.normal_g, bake.normal_b = "POS_X", "POS_Y", "POS_Z"  # what the operator takes from here, told or not
+    bake.use_cage, bake.cage_object, bake.cage_extrusion, bake.max_ray_distance = False, None, 0.0, 0.0
     render.use_compositing = False
     render.use_sequencer = False
     render.use_motion_blur = False
-    render.use_border = False
+    render.use_border = render.use_crop_to_border = False
     render.pixel_aspect_x = render.pixel_aspect_y = 1.0
     render.use_multiview = False
     render.use_freestyle = False
     render.use_persistent_data = False  # it would keep the samples, seed and filter of the render before
     if hasattr(render, "use_bake_multires"):
         render.use_bake_multires = False
-    elif hasattr(render.bake, "use_multires"):  # Blender 5
-        render.bake.use_multires = False
+    elif hasattr(bake, "use_multires"):  # Blender 5
+        bake.use_multires = False
     render.use_stamp = False
     render.use_overwrite = True
     render.use_file_extension = True

@@ -126,14 +126,16 @@ class Crew:
         The first error of scene, disk or `take` ends all of it. KeyboardInterrupt lets the lights at hand finish, then is raised.
         """
         self._waiting.extend(tasks)
-        threads = [threading.Thread(target=self._serve, args=(slot, take), daemon=True) for slot in self._slots]
-        for thread in threads:
-            thread.start()
+        # Events, not joins: Python 3.11 takes a thread for ended whose join a Ctrl-C interrupts.
+        ended = [threading.Event() for _ in self._slots]
+        for slot, event in zip(self._slots, ended, strict=True):
+            threading.Thread(target=self._serve, args=(slot, take, event), daemon=True).start()
         interrupt: KeyboardInterrupt | None = None
-        while any(thread.is_alive() for thread in threads):
+        while True:
             try:
-                for thread in threads:
-                    thread.join(0.2)
+                while not all(event.wait(0.2) for event in ended):
+                    pass
+                break
             except KeyboardInterrupt as pressed:
                 if interrupt is not None:
                     for slot in self._slots:
@@ -147,7 +149,7 @@ class Crew:
         if interrupt is not None:
             raise interrupt
 
-    def _serve(self, slot: _Slot, take: Callable[[Task, Answer], None]) -> None:
+    def _serve(self, slot: _Slot, take: Callable[[Task, Answer], None], ended: threading.Event) -> None:
         try:
             while self._work(slot, take):
                 pass
@@ -155,6 +157,8 @@ class Crew:
             with self._lock:
                 self._error = self._error or error
             self.stop()
+        finally:
+            ended.set()
 
     def _work(self, slot: _Slot, take: Callable[[Task, Answer], None]) -> bool:
         """Ask and take until the list is empty (False) or the worker is to be replaced (True)."""
@@ -264,6 +268,9 @@ class _Slot:
 
 
 def _taken(path: Path) -> ndarray:
-    array = np.load(path)
+    try:
+        array = np.load(path)
+    except (OSError, ValueError, EOFError) as error:
+        raise WorkerDiedError(f"Blender's process handed over {path.name}, which cannot be read: {error}") from error
     path.unlink()
     return array

@@ -82,7 +82,13 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
             raise OutputExistsError(f"expected an empty folder or a capture at {folder}, found other files; choose another -o")
         return False
     finished = done.is_file() and not begun.is_file()
-    recorded = files.read_json(done).get("source", {}) if finished else files.read_json(begun)
+    try:
+        recorded = files.read_json(done).get("source", {}) if finished else files.read_json(begun)
+    except ManifestError as error:
+        if force or (restart and not finished):
+            _empty(folder)
+            return False
+        raise ManifestError(f"{error}; {'--force' if finished else '--restart'} bakes anew") from error
     if recorded.get("tidying"):
         tidy(folder)
         return is_finished(folder, identity, force, restart)

@@ -17,7 +17,7 @@ from srbf.bake.settings import PlannedLight
 from srbf.bake.sums import SUMS, load_array, save_array
 from srbf.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
-from srbf.image import HALF_MAX, read_image, write_image
+from srbf.image import HALF_MAX, write_image
 
 GEOMETRY = ("position", "normal", "albedo", "coverage")
 SCENE_FILE = "scene.glb"
@@ -29,7 +29,8 @@ LEFT = "left.npz"  # what shines with every lamp and emission off
 class CaptureImages:
     """Writes the images of a capture. `prepared` holds what the worker told of scene and receiver, once that is known.
 
-    prepared: facts, sampling, tints, ambient and seams (whether there are such images), uv (checksum of a layer that was made).
+    prepared: facts, sampling, tints, ambient and seams (whether there are such images), uv (checksum of a layer that was made), files
+    (checksums of all that was written).
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None) -> None:
@@ -74,15 +75,24 @@ class CaptureImages:
             write_image(self._folder / f"{name}.exr", image, "float")
         if "uv" in facts:
             files.write_json(self._folder / "uv.json", facts["uv"])
-        self.prepared = {
+        names = [
+            *(f"{name}.exr" for name in (*GEOMETRY, "ambient", "seams")),
+            "uv.json",
+            SCENE_FILE,
+            f"{SUMS}/{READABLE}",
+            f"{SUMS}/{LEFT}",
+        ]
+        prepared = {
             "facts": without_uv(facts),
             "sampling": sampling,
             "tints": tints,
             "ambient": shines,
             "seams": seams is not None,
             "uv": uv_checksum(facts),
+            "files": {name: files.sha256_of(self._folder / name) for name in names if (self._folder / name).is_file()},
         }
-        files.write_json(self._folder / SUMS / PREPARED, self.prepared)
+        files.write_json(self._folder / SUMS / PREPARED, {"sha256": _checksum(prepared), "prepared": prepared})
+        self.prepared = prepared
 
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
         """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
@@ -108,23 +118,20 @@ class CaptureImages:
             own = np.clip(own, -HALF_MAX, HALF_MAX)
         write_image(self._folder / light.file, own, "half")
 
-    def is_published(self, light: PlannedLight, apart: bool, size: tuple[int, int]) -> bool:
-        """Whether the light's images are there, whole and of this (height, width)."""
-        try:
-            return all(
-                read_image(self._folder / name, 3).shape[:2] == size for name in [light.file, *([light.direct_file] if apart else [])]
-            )
-        except ImageError:
-            return False
+    def checksum(self, light: PlannedLight, apart: bool) -> str:
+        """Of the light's images as they are on disk, empty where one is missing; `apart` where there are two."""
+        paths = [self._folder / name for name in (light.file, *([light.direct_file] if apart else []))]
+        if not all(path.is_file() for path in paths):
+            return ""
+        return hashlib.sha256("".join(files.sha256_of(path) for path in paths).encode()).hexdigest()
 
-    def _load(self, prepared: dict[str, Any]) -> None:
-        names = [*GEOMETRY, *(name for name in ("ambient", "seams") if prepared.get(name))]
-        for name in names:
-            read_image(self._folder / f"{name}.exr")
-        if prepared["tints"] is not None and not (self._folder / SCENE_FILE).is_file():
-            raise ImageError(f"expected {SCENE_FILE}, found none")
-        if prepared["uv"] is not None and not (self._folder / "uv.json").is_file():
-            raise ImageError("expected uv.json, found none")
+    def _load(self, stored: dict[str, Any]) -> None:
+        prepared = stored.get("prepared")
+        if stored.get("sha256") != _checksum(prepared) or not isinstance(prepared, dict):
+            raise ManifestError(f"expected {PREPARED} as it was written, found another")
+        for name, checksum in prepared["files"].items():
+            if not (self._folder / name).is_file() or files.sha256_of(self._folder / name) != checksum:
+                raise ImageError(f"expected {name} as it was written, found another")
         self._nearest = nearest_covered(load_array(self._folder / SUMS / READABLE)[:, :, 0])
         left = self._folder / SUMS / LEFT
         self._left = load_array(left) if left.is_file() else None
@@ -139,3 +146,7 @@ def without_uv(facts: dict[str, Any]) -> dict[str, Any]:
 def uv_checksum(facts: dict[str, Any]) -> str | None:
     """Of the layer that was made, where one was: every worker must make the same."""
     return hashlib.sha256(json.dumps(facts["uv"]).encode()).hexdigest() if "uv" in facts else None
+
+
+def _checksum(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()

@@ -120,6 +120,7 @@ class _Passes:
         self._images = CaptureImages(bake.folder, reporter.say)
         self._sums = Sums(bake.folder, self._lights)
         self._auto = bake.settings.samples == "auto"
+        self._apart = bake.settings.transport == "indirect"
         self._keep = bake.keeps_sums
         self._goal = 1 if self._auto else int(bake.settings.samples)
         self._first = FirstLights(len(self._lights), bake.settings.receiver.place, reporter.say)
@@ -191,11 +192,10 @@ class _Passes:
 
     def _take_stock(self) -> None:
         """A light whose images are gone or damaged is written or begun anew; likewise one that has to grow and cannot."""
-        apart, size = self._settings.transport == "indirect", (self._settings.height, self._settings.width)
         for light in self._lights:
             if self._sums.passes(light) == 0:
                 continue
-            if not self._images.is_published(light, apart, size):
+            if self._images.checksum(light, self._apart) != self._sums.checksum(light):
                 total = self._sums.read(light)
                 if total.whole is None:
                     self._sums.forget(light)
@@ -235,6 +235,12 @@ class _Passes:
 
     def _take(self, task: Task, answer: Answer) -> None:
         light = task.light
+        size = (self._settings.height, self._settings.width, 3)
+        for image in (answer.whole, answer.direct):
+            if image is not None and image.shape != size:
+                raise BakeError(
+                    f"expected {size} values of light {light.index} from Blender, found {image.shape}; its log is {self._folder / LOG}"
+                )
         total = self._sums.read(light) if self._sums.passes(light) else NOTHING
         if total.passes != self._sums.passes(light):  # damaged since the stock was taken
             self._sums.forget(light)
@@ -249,7 +255,7 @@ class _Passes:
             self._reporter.say(f"{error}; the rest goes on")
             self._failed[light.index] = str(error)
             return
-        self._sums.write(light, total, self._keep or total.samples < self._goal_of(light))
+        self._sums.write(light, total, self._keep or total.samples < self._goal_of(light), self._images.checksum(light, self._apart))
         with self._mutex:
             self._first.look(own)
             self._tell_progress(total.passes)

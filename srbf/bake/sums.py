@@ -82,6 +82,10 @@ class Sums:
     def samples(self, light: PlannedLight) -> int:
         return self._known[light.index][1]
 
+    def checksum(self, light: PlannedLight) -> str:
+        """Of the light's images when they were written."""
+        return self._known[light.index][3]
+
     def can_grow(self, light: PlannedLight) -> bool:
         """Whether another pass can be added: nothing is there yet, or its sum is."""
         return self._known[light.index][2] or self.passes(light) == 0
@@ -94,17 +98,18 @@ class Sums:
             return Sum(passes, samples, arrays.get("whole"), arrays.get("direct"), arrays.get("squares"))
         return NOTHING
 
-    def write(self, light: PlannedLight, total: Sum, keep: bool) -> None:
-        """Commit `total`; without `keep` only its counts."""
+    def write(self, light: PlannedLight, total: Sum, keep: bool, checksum: str = "") -> None:
+        """Commit `total`, whose images have this `checksum`; without `keep` only its counts."""
         arrays = {"whole": total.whole, "direct": total.direct, "squares": total.squares} if keep else {}
         with files.atomic_path(self._path(light.index)) as temporary:
-            np.savez(temporary, counts=np.array([total.passes, total.samples]), **{k: v for k, v in arrays.items() if v is not None})
-        self._known[light.index] = (total.passes, total.samples, keep)
+            counts = np.array([total.passes, total.samples])
+            np.savez(temporary, counts=counts, checksum=np.array(checksum), **{k: v for k, v in arrays.items() if v is not None})
+        self._known[light.index] = (total.passes, total.samples, keep, checksum)
 
     def forget(self, light: PlannedLight) -> None:
         """Begin `light` anew."""
         self._path(light.index).unlink(missing_ok=True)
-        self._known[light.index] = (0, 0, False)
+        self._known[light.index] = (0, 0, False, "")
 
     def refresh(self, light: PlannedLight) -> None:
         """Read again what another process may have written."""
@@ -113,14 +118,14 @@ class Sums:
     def _path(self, index: int) -> Path:
         return self._folder / f"{index:04d}.npz"
 
-    def _read_counts(self, index: int) -> tuple[int, int, bool]:
-        """(passes, samples, whether the sum is there) of a file whose every byte is as it was written."""
+    def _read_counts(self, index: int) -> tuple[int, int, bool, str]:
+        """(passes, samples, whether the sum is there, checksum of the images) of a file whose every byte is as it was written."""
         path = self._path(index)
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
             if archive.testzip() is None:
                 with np.load(path) as stored:
-                    return int(stored["counts"][0]), int(stored["counts"][1]), "whole" in stored
-        return 0, 0, False
+                    return int(stored["counts"][0]), int(stored["counts"][1]), "whole" in stored, str(stored["checksum"])
+        return 0, 0, False, ""
 
 
 def save_array(path: Path, array: ndarray) -> None:

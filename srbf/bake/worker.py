@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -18,20 +20,23 @@ from srbf.errors import BakeError, MissingLibraryError
 
 
 def command(blender: Path | None, job: Path) -> list[str]:
-    """The worker's command line: an installed Blender, else the bpy module of this Python."""
+    """The worker's command line: an installed Blender, else the bpy module of this Python, able to write beside `job` alone (`confine`)."""
     package = importlib.util.find_spec("blender_bake")
     if package is None or package.origin is None:
         raise MissingLibraryError("expected the package blender_bake beside srbf, found none; install srbf again")
+    confined = [sys.executable, str(Path(package.origin).parent / "confine.py"), str(job.parent)] if sys.platform != "win32" else []
     if blender is not None:
+        if shutil.which(blender) is None:
+            raise BakeError(f"cannot start Blender at {blender}: expected a program, found none; correct --blender")
         script = str(Path(package.origin).parent / "__main__.py")
-        return [str(blender), "--background", "--factory-startup", "--disable-autoexec", "--python", script, "--", str(job)]
+        return [*confined, str(blender), "--background", "--factory-startup", "--disable-autoexec", "--python", script, "--", str(job)]
     if importlib.util.find_spec("bpy") is None:
         version = f"{sys.version_info.major}.{sys.version_info.minor}"
         raise MissingLibraryError(
             f"baking needs Blender: this Python {version} has no bpy (there is one for 3.11 and 3.13); "
             "add --blender /path/to/blender, or install srbf[blender] under such a Python"
         )
-    return [sys.executable, "-m", "blender_bake", str(job)]
+    return [*confined, sys.executable, "-m", "blender_bake", str(job)]
 
 
 class WorkerDiedError(BakeError):
@@ -58,6 +63,8 @@ class Worker:
                 encoding="utf-8",
                 errors="replace",
                 start_new_session=True,
+                # Begun with factory settings, Blender removes the wheels of all extensions that the user has.
+                env={**os.environ, "BLENDER_USER_EXTENSIONS": str(scratch / "extensions")},
             )
         except OSError as error:
             self._log.close()

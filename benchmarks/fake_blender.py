@@ -1,0 +1,116 @@
+"""A worker that speaks as blender_bake does and renders by a formula, at once: `--blender` for what is tried of the host alone.
+
+It misbehaves as SRBF_FAULT says, KIND:LIGHT, only the first time where the kind ends in -once (SRBF_FAULT_STATE is the file that
+remembers): die, stop (the process stops answering), error, nan, short (a torn file), small (another size), wrong (another light);
+`garbage` talks nonsense between its events, `slow` takes its time.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SLOW = 0.03  # seconds a light
+
+
+class FakeBlender:
+    """One job: the scene's facts and geometry, then lights as they are asked for."""
+
+    def __init__(self, job: dict[str, Any]) -> None:
+        self._job = job
+        self._size = (job["height"], job["width"])
+        kind, _, light = os.environ.get("SRBF_FAULT", "").partition(":")
+        self._once, self._kind, self._light = kind.endswith("-once"), kind.removesuffix("-once"), int(light or -1)
+
+    def serve(self) -> None:
+        self._prepare()
+        for light in _requests():
+            if self._kind == "slow":
+                time.sleep(SLOW)
+            self._answer(light, self._kind if light["index"] == self._light and self._strikes() else "")
+        self._emit("done")
+
+    def _prepare(self) -> None:
+        receiver = {"kind": "lightmap", "object": self._job["receiver"].get("object"), "uv_layer": "UV"}
+        self._emit("scene", blender="4.5.0", receivers=[receiver], polygons=1)
+        y, x = (np.mgrid[: self._size[0], : self._size[1]] + 0.5) / np.array(self._size)[:, None, None]
+        ones = np.ones((*self._size, 1), np.float32)
+        plane = np.stack([x, y, np.zeros_like(x)], axis=2)
+        self._normal = np.stack([x - 0.5, y - 0.5, np.ones_like(x)], axis=2)
+        self._normal /= np.linalg.norm(self._normal, axis=2, keepdims=True)
+        hole = ones.copy()
+        hole[0, 0] = 0
+        if self._job["geometry"]:
+            images = {"position": plane, "normal": self._normal, "albedo": plane, "coverage": hole, "readable": hole, "hit": hole}
+            for name, array in images.items():
+                self._emit("image", name=name, file=self._hand_over(name, array), seconds=0.0)
+        if self._job["ambient"]:
+            self._emit("image", name="ambient", file=self._hand_over("ambient", plane), seconds=0.0)
+            self._emit("image", name="left", file=self._hand_over("left", plane * 0.01), seconds=0.0)
+        if self._job["transport"] == "indirect" and self._job.get("tints") is None:
+            (Path(self._job["scratch"]) / "scene.glb").write_bytes(b"glTF" + bytes(range(256)))
+            self._emit("file", file="scene.glb", sampling={"footprint": 0.5}, tints={})
+        self._emit("ready")
+
+    def _answer(self, light: dict[str, Any], fault: str) -> None:
+        if fault == "die":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if fault == "stop":
+            os.kill(os.getpid(), signal.SIGSTOP)
+        if fault == "error":
+            self._emit("error", message="Blender could not bake 'Plane': so it was asked")
+            sys.exit(1)
+        noise = np.random.default_rng([light["seed"], light["samples"]]).normal(scale=light["samples"] ** -0.5, size=(*self._size, 1))
+        direct = np.maximum(self._normal @ np.array(light["direction"]), 0)[:, :, None] * np.array([1.0, 0.5, 0.25])
+        whole = direct + 0.02 * noise + 0.1
+        if fault == "nan":
+            whole[1, 1] = np.nan
+        name = f"light_{light['index']}"
+        fields = {"name": name, "light": light["index"], "file": self._hand_over(name, whole[1:] if fault == "small" else whole)}
+        if self._job["transport"] == "indirect":
+            fields["direct"] = self._hand_over(f"direct_{light['index']}", direct)
+        if fault == "short":
+            os.truncate(Path(self._job["scratch"]) / fields["file"], 100)
+        if fault == "wrong":
+            fields["light"] += 1
+        self._emit("image", seconds=0.001, **fields)
+
+    def _strikes(self) -> bool:
+        if not self._once:
+            return True
+        state = Path(os.environ["SRBF_FAULT_STATE"])
+        if state.exists():
+            return False
+        state.touch()
+        return True
+
+    def _hand_over(self, name: str, array: np.ndarray) -> str:
+        np.save(Path(self._job["scratch"]) / f"{name}.npy", array.astype(np.float32))
+        return f"{name}.npy"
+
+    def _emit(self, event: str, **fields: Any) -> None:
+        if self._kind == "garbage":
+            sys.stdout.write('Fra:1 Mem:1M\n{"event"\n[]\n\x00\x1b[2J\n"event"\n')
+        sys.stdout.write(json.dumps({"event": event, **fields}) + "\n")
+        sys.stdout.flush()
+
+
+def _requests() -> Iterator[dict[str, Any]]:
+    """Until the host ends it or is no more."""
+    for line in iter(sys.stdin.readline, ""):
+        request = json.loads(line)
+        if request.get("end"):
+            return
+        yield request
+
+
+if __name__ == "__main__":
+    FakeBlender(json.loads(Path(sys.argv[-1]).read_text(encoding="utf-8"))).serve()
