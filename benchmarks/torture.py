@@ -384,7 +384,7 @@ def stale_leavings(labs: Labs, rng: np.random.Generator) -> Trials:
         (folder / ".scratch" / "worker0").mkdir(parents=True, exist_ok=True)
         (folder / ".scratch" / "worker0" / "light_1.npy").write_bytes(b"half an array")
         for place in ("lights", "sums", "direct"):
-            if (folder / place).is_dir():
+            if (folder / "bake.json").is_file() and (folder / place).is_dir():  # none is written there before that
                 (folder / place / ".0001.4711-dead.partial.exr").write_bytes(b"half an image")
         lab.go_on(folder)
 
