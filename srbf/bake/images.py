@@ -84,6 +84,12 @@ class CaptureImages:
         }
         files.write_json(self._folder / SUMS / PREPARED, self.prepared)
 
+    def require_receiver(self, facts: dict[str, Any]) -> None:
+        """BakeError where a worker tells of another receiver than what is prepared."""
+        assert self.prepared is not None
+        if without_uv(facts) != self.prepared["facts"] or uv_checksum(facts) != self.prepared["uv"]:
+            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
         """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
         if not np.isfinite(mean).all():
@@ -107,6 +113,11 @@ class CaptureImages:
             self._say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
             own = np.clip(own, -HALF_MAX, HALF_MAX)
         write_image(self._folder / light.file, own, "half")
+
+    def published(self, light: PlannedLight, apart: bool) -> Float32[ndarray, "H W 3"]:
+        """All light of one that is published; of an indirect capture (`apart`), both its images together."""
+        image = read_image(self._folder / light.file, 3)
+        return image + read_image(self._folder / light.direct_file, 3) if apart else image
 
     def is_published(self, light: PlannedLight, apart: bool, size: tuple[int, int]) -> bool:
         """Whether the light's images are there, whole and of this (height, width)."""

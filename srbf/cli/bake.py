@@ -10,10 +10,13 @@ import typer
 
 from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
+from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
+from srbf.bake.part import Part
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.cli.parameters import Blender, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
+from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
+from srbf.errors import InputError
 
 UNLIMITED = 1 << 16  # samples a texel: more than any bake's time allows
 
@@ -59,6 +62,21 @@ def bake(
         typer.Option(help="Seconds after which a silent Blender is replaced; default: learnt from the lights before.", show_default=False),
     ] = None,
     keep_sums: Annotated[bool, typer.Option("--keep-sums", help="Keep what --samples N can later add to; --time and auto do.")] = False,
+    dask: Dask = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            help="Bake all passes of the I-th of N parts alone, I/N, once `prepare` has been; a bake without it then finishes.",
+            show_default=False,
+        ),
+    ] = None,
+    farm: Annotated[
+        Literal["openjd"] | None,
+        typer.Option(help="Bake nothing: write a render farm's job into -o, an Open Job Description bundle.", show_default=False),
+    ] = None,
+    farm_tasks: Annotated[
+        int | None, typer.Option(help="Tasks of the farm's bake; default: one for 32 lights.", min=1, show_default=False)
+    ] = None,
     json_progress: Annotated[
         bool, typer.Option("--json-progress", help="Progress as JSON lines on stderr: done, total, what, seconds_left.")
     ] = False,
@@ -90,14 +108,31 @@ def bake(
         settings = settings.with_matched_sun()
         note(f"a sun of {settings.sun_angle:.4g} rad ({degrees(settings.sun_angle):.1f} degrees), as far as the fitted lights stand apart")
     crew = CrewSettings(workers, lights_a_worker, hang_after)
-    job = Bake(scene, output, settings, blender, crew, None if time is None else parse_duration(time), keep_sums)
+    job = Bake(scene, output, settings, blender, crew, None if time is None else parse_duration(time), keep_sums, dask)
+    _check_spread(job, part, farm, restart or force)
+    if farm is not None:
+        write_bundle(job, output, farm_tasks, force)
+        note(f"wrote {output / TEMPLATE}; try it by: openjd run {output / TEMPLATE} -p file://{output / PARAMETERS}")
+        return
     if dry_run:
         for line in estimate(job, note):
             typer.echo(line)
         return
     with json_progress_lines() if json_progress else progress_bar("bake") as update:
-        baked = job.run(Reporter(update, note), force, restart)
-    note(f"baked {output}" if baked else f"{output} is complete already")
+        baked = job.run(Reporter(update, note), force, restart, None if part is None else Part.parse(part))
+    what = {None: "baked", "prepare": "prepared"}.get(part, f"baked part {part} of")
+    note(f"{what} {output}" if baked else f"{output} is complete already")
+
+
+def _check_spread(job: Bake, part: str | None, farm: str | None, anew: bool) -> None:
+    """InputError where ways to spread the work exclude each other."""
+    given = [name for name, value in (("--dask", job.dask), ("--part", part), ("--farm", farm)) if value is not None]
+    if len(given) > 1:
+        raise InputError(f"expected one way to spread the work, found {' and '.join(given)}; leave one")
+    if job.dask is not None and job.crew.workers > 1:
+        raise InputError("--workers counts Blenders of this machine, found it with --dask; start as many dask workers instead")
+    if part not in (None, "prepare") and anew:
+        raise InputError("--force and --restart would drop what other parts baked; give them with --part prepare")
 
 
 def _samples(text: str | None, time: str | None) -> int | Literal["auto"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
 from srbf.asset import MANIFEST, Asset
@@ -22,11 +23,15 @@ from srbf.cli.fit_parameters import (
     Spread,
     Weighting,
 )
-from srbf.cli.parameters import CaptureFolder, Force, Output
+from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
+from srbf.cluster import Cluster, checked
+from srbf.errors import InputError
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
 from srbf.fitting import method_for, settings_of
+from srbf.methods.relighting_map import RelightingMap
+from srbf.tiles import fit_tiles
 
 
 def fit(
@@ -45,13 +50,16 @@ def fit(
     encoding: Encoding = None,
     budget: Budget = None,
     psnr: Psnr = None,
+    dask: Dask = None,
     force: Force = False,
 ) -> None:
     """Fit an asset to the train lights and measure its error on every role of the capture.
 
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
-    they are many: `srbf evaluate` reads them all again.
+    they are many: `srbf evaluate` reads them all again. With --dask other machines fit tiles of rows, and train is read once more here.
     """
+    if dask is not None and method != "relighting-map":
+        raise InputError(f"expected --dask with --method relighting-map, whose tiles are independent, found it with {method}")
     given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
     given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
     settings = settings_of(method, given, domain, spread, ridge)
@@ -59,9 +67,15 @@ def fit(
     opened = Capture.open(capture)
     started = time.perf_counter()
     chosen = method_for(opened, method, settings, note)
-    watch = TrainWatch(opened)
-    with progress_bar("fit") as update:
-        asset = chosen.encode(opened, update, watch.look)
+    watch = None
+    if dask is not None:
+        assert isinstance(chosen, RelightingMap)
+        with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
+            asset = chosen.encode(opened, update, tiles=partial(_tiles, cluster))
+    else:
+        watch = TrainWatch(opened)
+        with progress_bar("fit") as update:
+            asset = chosen.encode(opened, update, watch.look)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
@@ -71,6 +85,10 @@ def fit(
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
+
+
+def _tiles(cluster: Cluster, capture: Capture, lights: list[int], matrix: Any, ridge: float, progress: Any) -> Any:
+    return fit_tiles(capture, lights, matrix, ridge, cluster.map, cluster.threads, progress)
 
 
 def _summary(asset: Asset) -> str:
