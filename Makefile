@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 SCENE ?= caustics
 OUT ?= out/$(SCENE)
 
-.PHONY: setup demo test test-fast check bench clean
+.PHONY: setup demo test test-fast check bench extension clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
@@ -34,6 +34,9 @@ check: setup
 bench: setup
 	$(BIN)/python benchmarks/pipeline.py
 	$(BIN)/python benchmarks/fit.py
+
+extension: setup
+	$(BIN)/python scripts/build_extension.py $(addprefix --platform ,$(PLATFORMS))
 
 clean:
 	rm -rf .venv .venv-* out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -2,7 +2,7 @@
 """`python -m blender_bake JOB.json`, or `blender --background --python blender_bake/__main__.py -- JOB.json`.
 
 The job says scene, receiver, size, quantity, lights and scratch folder; see `run`. Events come out as JSON lines:
-scene, warning, image (name or light, file, seconds), file, ready, error, done.
+scene, warning, image (name or light, file, seconds), file, ready, survey, error, done.
 """
 
 from __future__ import annotations
@@ -48,9 +48,10 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     geometry (bool), ambient {samples, seed} or null; `serve` where lights are asked for on stdin, after those in the job.
     A light: index, kind, direction | position, samples, seed.
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
-    by which the tints of translucent materials are chosen, unless `tints` has them already.
+    by which the tints of translucent materials are chosen, unless `tints` has them already. Where there is a `survey`, its
+    question is answered, and nothing else done.
     """
-    from blender_bake import emission, scene_file, translucency
+    from blender_bake import emission, point_grid, scene_file, translucency
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
@@ -58,6 +59,9 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
 
     scratch = Path(job["scratch"])
     scene = scenes.open_scene(job["scene"], channel)
+    if "survey" in job:
+        channel.emit("survey", points=point_grid.survey(scene, job["survey"]["points"]))
+        return
     scenes.configure(scene)
     own_light = scenes.OwnLight(scene)
     kind = {"lightmap": LightmapReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]

@@ -11,6 +11,7 @@ import numpy as np
 
 from blender_bake import materials, unwrap
 from blender_bake.channel import Channel, WorkerError
+from blender_bake.seam_edges import seam_edges
 from blender_bake.translucency import Switch
 
 NOT_DIFFUSE = 1e-3  # an albedo below this everywhere on a slot leaves Cycles nothing to divide irradiance by
@@ -61,12 +62,13 @@ class LightmapReceiver:
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
     def geometry(self) -> dict[str, np.ndarray]:
-        """World position at texel centres, world normal, albedo and coverage."""
+        """World position at texel centres, world normal, albedo and coverage; (1, E, 8) `seams` where the layer has any."""
         position = self._bake("POSITION", 1, 0)[:, :, :3]  # one sample stands on the texel centre; more would be summed
         encoded = self._bake("NORMAL", 1, 0, normal_space="OBJECT")[:, :, :3]
         normal = (2 * (encoded - NORMAL_OFFSET) - 1) @ np.array(self._object.matrix_world.to_3x3().inverted_safe(), np.float32)
         normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-20)
         covered = self._coverage
+        seams = seam_edges(self._object.data, self._uv_layer, within_material=not self._irradiance)
         return {
             "position": position * covered,
             "normal": normal * covered,
@@ -74,6 +76,7 @@ class LightmapReceiver:
             "coverage": covered,
             "readable": self._readable,
             "hit": covered,
+            **({"seams": seams[None]} if len(seams) else {}),
         }
 
     def answer(self, samples: int, seed: int) -> np.ndarray:

@@ -14,11 +14,12 @@ from numpy import ndarray
 
 from srbf import files, schemas
 from srbf.arrays import Float, Float32, Float64, Int
-from srbf.errors import ImageError, ManifestError
+from srbf.errors import ImageError, InputError, ManifestError
 from srbf.half import finite_to_float32
 from srbf.image import holds_half, read_image, read_stored, require_finite, size_of
 from srbf.parallel import cores, each
 
+LightKind = Literal["directional", "point"]
 Role = Literal["train", "validation", "holdout"]
 Quantity = Literal["irradiance", "radiance"]
 Transport = Literal["combined", "indirect"]
@@ -35,15 +36,32 @@ Look = Callable[[int, ndarray], None]  # (position within the lights asked for, 
 
 @dataclass(frozen=True)
 class CapturedLight:
-    """One illuminant of a capture: a directional light of unit irradiance, and the image that answers it.
+    """One illuminant of a capture, and the image that answers it.
 
-    `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks.
+    `place` of a directional light, of unit irradiance, is the unit direction towards it; of a point light, of unit irradiance at 1 m and
+    inverse-square fall-off, its position in metres. `direct`, of an indirect capture, is the image of the direct diffuse light
+    that `file` lacks.
     """
 
-    direction: tuple[float, float, float]
+    place: tuple[float, float, float]
     role: Role
     file: str
     direct: str | None = None
+    kind: LightKind = "directional"
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """Towards the light; InputError of a point light, which has no one direction."""
+        if self.kind != "directional":
+            raise InputError(f"expected a directional light, found a point light ({self.file}): it has no one direction")
+        return self.place
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """Of a point light, metres; InputError of a directional one."""
+        if self.kind != "point":
+            raise InputError(f"expected a point light, found a directional one ({self.file}): it has no position")
+        return self.place
 
 
 @dataclass(frozen=True)
@@ -66,16 +84,21 @@ class Capture:
         schemas.check(manifest, "capture", str(path))
         lights = []
         for i, light in enumerate(manifest["lights"]):
-            length = float(np.linalg.norm(light["direction"]))
-            if not abs(length - 1) <= UNIT_TOLERANCE:
-                raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalise it")
+            kind: LightKind = light["kind"]
+            if kind != (first := manifest["lights"][0]["kind"]):
+                raise ManifestError(f"expected lights of one kind in {path}, found {first} and {kind} ones; part them into two captures")
+            place = np.asarray(light["direction" if kind == "directional" else "position"], np.float64)
+            if kind == "directional":
+                length = float(np.linalg.norm(place))
+                if not abs(length - 1) <= UNIT_TOLERANCE:
+                    raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalise it")
+                place = place / length
             files.inside(folder, light["file"], path)
             if "direct" in light:
                 files.inside(folder, light["direct"], path)
-            unit = np.asarray(light["direction"], np.float64) / length
-            direction = (float(unit[0]), float(unit[1]), float(unit[2]))
-            lights.append(CapturedLight(direction, light["role"], light["file"], light.get("direct")))
-        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene"):
+            x, y, z = place.tolist()
+            lights.append(CapturedLight((x, y, z), light["role"], light["file"], light.get("direct"), kind))
+        for name in ("position", "normal", "albedo", "coverage", "ambient", "scene", "seams"):
             if name in manifest:
                 files.inside(folder, manifest[name], path)
         return Capture(folder, manifest, tuple(lights))
@@ -95,6 +118,16 @@ class Capture:
     @property
     def transport(self) -> Transport:
         return self.manifest.get("transport", "combined")
+
+    @property
+    def kind(self) -> LightKind:
+        """Of all its lights."""
+        return self.lights[0].kind if self.lights else "directional"
+
+    def require_directional(self, what: str) -> None:
+        """InputError where the lights are not directional, which `what` needs."""
+        if self.kind != "directional":
+            raise InputError(f"expected a capture under directional lights for {what}, found {self.kind} lights in {self.folder}")
 
     @property
     def has_direct(self) -> bool:
@@ -128,9 +161,15 @@ class Capture:
         return [i for i, light in enumerate(self.lights) if light.role == role]
 
     def directions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
-        """Unit directions from the surface to the lights."""
+        """Unit directions from the surface to the lights; InputError where they are not directional."""
+        self.require_directional("directions")
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.direction for light in chosen], np.float64).reshape(-1, 3)
+
+    def positions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
+        """Positions of point lights, metres; InputError where they are directional."""
+        chosen = self.lights if indices is None else [self.lights[i] for i in indices]
+        return np.array([light.position for light in chosen], np.float64).reshape(-1, 3)
 
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
         """What the receivers answer to light `index`; ImageError on another size, a damaged file, or NaN."""
@@ -182,7 +221,7 @@ class Capture:
         answers = self.sample(range(len(self.lights)), whole)
         manifest = self.manifest
         if texels is not None:
-            manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient")}
+            manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient", "seams")}
             manifest |= {"width": len(texels), "height": 1}
         coverage = self.coverage() if texels is None else self.coverage().reshape(1, -1)[:, texels]
         return _KeptCapture(self.folder, manifest, self.lights, answers, coverage)
@@ -258,6 +297,15 @@ class Capture:
     def ambient(self) -> Float32[ndarray, "H W 3"] | None:
         """What the scene shows with no light of the capture, where it emits."""
         return self._read(self.manifest["ambient"], 3) if "ambient" in self.manifest else None
+
+    def seam_edges(self) -> Float32[ndarray, "E 8"] | None:
+        """Edges that the UV layer cuts where the surface is smooth, if there are any: u0 v0 u1 v1, v up, on one side, then on the other."""
+        if "seams" not in self.manifest:
+            return None
+        path = self.folder / self.manifest["seams"]
+        edges = read_image(path, 8)
+        require_finite(edges, path)
+        return edges.reshape(-1, 8)
 
     def _read(self, name: str, channels: int) -> np.ndarray:
         return self._checked(name, read_image, channels)

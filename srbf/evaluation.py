@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from threading import Lock
 from typing import Any
@@ -16,7 +16,8 @@ from srbf.capture import COVERED, ROLES, Capture, Role
 from srbf.direct.choice import Added, Direct
 from srbf.errors import InputError
 from srbf.half import finite_to_float32
-from srbf.methods import directional_responses
+from srbf.lights import PointLight
+from srbf.methods import directional_responses, linear_response
 from srbf.parallel import each, one_blas_thread
 
 PEAK_QUANTILE = 0.999
@@ -157,9 +158,10 @@ def evaluate(
 
     The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
     and all but `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the clamp
-    comes after the direct light; with it, against the combined answer. With a `watch` that has seen the train images they are not read
-    again: peak, validation and holdout are the same, and train's error is that of the watched texels, whose number stands beside it as
-    `texels` where they are not all. InputError where asset and capture cannot be compared.
+    comes after the direct light; with it, against the combined answer. A capture under point lights tells how far true lamps are from what
+    directional lights foretell, its train lights being as unseen as the rest. With a `watch` that has seen the train images they are
+    not read again: peak, validation and holdout are the same, and train's error is that of the watched texels, whose number stands beside
+    it as `texels` where they are not all. InputError where asset and capture cannot be compared.
     """
     reference, peak_source = _references(asset, capture, direct)
     if (asset.width, asset.height) != (capture.width, capture.height):
@@ -183,12 +185,7 @@ def evaluate(
             indices = capture.indices(role) if role != "train" or watch is None else []
             for first, block in reference.blocks(indices):
                 chosen = indices[first : first + len(block)]
-                directions = capture.directions(chosen)
-                relit = directional_responses(asset, directions).reshape(block.shape)
-                for index, direction, answer, true in zip(chosen, directions, relit, block, strict=True):
-                    lit = added.directional(direction[None])
-                    if not isinstance(lit, float):
-                        answer = answer + lit.reshape(answer.shape)
+                for index, answer, true in zip(chosen, _relit(asset, capture, chosen, added), block, strict=True):
                     true = true[covered]
                     if role == "train" and peak_source is reference:
                         peaks.add(true)
@@ -210,6 +207,23 @@ def evaluate(
         if i in squares
     ]
     return result
+
+
+def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) -> Iterator[Float32[ndarray, "P 3"]]:
+    """The asset's answer to each of a capture's lights, before the clamp, with what direct light is to be added.
+
+    A point light is relit as such, inverse-square and of unit irradiance at 1 m, as it was captured.
+    """
+    if capture.kind == "point":
+        for position in capture.positions(lights):
+            lamp = [PointLight(tuple(position), falloff="inverse-square")]
+            answer, direct = linear_response(asset, lamp), added.answer(lamp)
+            yield (answer if direct is None else answer + direct).reshape(-1, 3)
+        return
+    directions = capture.directions(lights)
+    for direction, answer in zip(directions, directional_responses(asset, directions), strict=True):
+        lit = added.directional(direction[None])
+        yield (answer if isinstance(lit, float) else answer + lit[0]).reshape(-1, 3)
 
 
 def _covered(capture: Capture) -> Bool[ndarray, " P"]:

@@ -12,6 +12,8 @@ from srbf.capture import ROLES, Capture
 from srbf.errors import ManifestError
 from srbf.image import size_of
 
+UNFINISHED = "bake.json"  # beside the manifest of a bake that can still be gone on with
+
 
 def describe(path: Path) -> dict[str, Any]:
     """Facts of the folder at `path`; ManifestError where it is neither, ImageError where a file of it is damaged."""
@@ -36,8 +38,23 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
         "width": capture.width,
         "height": capture.height,
         "lights": {role: len(capture.indices(role)) for role in ROLES},
+        **_samples(capture),
+        **({"unfinished": True} if (capture.folder / UNFINISHED).is_file() else {}),
+        **(
+            {"light_kind": capture.kind, "fitted_by": "none of the methods: they fit directional lights"} if capture.kind == "point" else {}
+        ),
         **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
         "disk_bytes": folder_bytes(capture.folder),
+    }
+
+
+def _samples(capture: Capture) -> dict[str, Any]:
+    """The fewest samples a texel that a light of each role has, where the capture says so."""
+    lights = capture.manifest["lights"]
+    if not all("samples" in light for light in lights):
+        return {}
+    return {
+        "samples": {role: min(light["samples"] for light in lights if light["role"] == role) for role in ROLES if capture.indices(role)}
     }
 
 

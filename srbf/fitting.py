@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from srbf.asset import Asset
 from srbf.budget import DEFAULT_BUDGET, Planes, within_budget
-from srbf.capture import Capture
+from srbf.capture import Capture, Look
 from srbf.errors import InputError
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
-from srbf.methods.relighting_map import RelightingMap
+from srbf.methods.relighting_map import RelightingMap, Tiles
+from srbf.stitch import Stitch
 
-__all__ = ["DEFAULT_BUDGET", "method_for", "settings_of"]
+__all__ = ["DEFAULT_BUDGET", "encode", "method_for", "settings_of"]
 
 CLASSES: dict[str, type[RelightingMap] | type[EigenMap] | type[ClusteredEigenMap]] = {
     "relighting-map": RelightingMap,
@@ -42,10 +44,28 @@ def settings_of(method: str, given: dict[str, Any], domain: str, spread: str, ri
 def method_for(
     capture: Capture, method: str, settings: dict[str, Any], say: Callable[[str], None] = lambda line: None
 ) -> RelightingMap | Planes:
-    """The method with its settings; `auto` tries what fits on a sample of the capture."""
+    """The method with its settings; `auto` tries what fits on a sample of the capture. InputError where its lights are not directional."""
+    capture.require_directional(f"--method {method}")
     if method == "auto":
         return within_budget(capture, say=say, **settings)
     return CLASSES[method](**settings)
+
+
+def encode(
+    chosen: RelightingMap | Planes,
+    capture: Capture,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    look: Look = lambda row, image: None,
+    stitched: bool = True,
+    tiles: Tiles | None = None,
+) -> Asset:
+    """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so; by `tiles` a relighting map."""
+    stitch = Stitch.of(capture) if stitched else None
+    if isinstance(chosen, RelightingMap):
+        return chosen.encode(capture, progress, look, stitch, tiles)
+    if tiles is not None:
+        raise InputError("expected a relighting map to be fitted by tiles, found another method")
+    return chosen.encode(capture, progress, look, stitch)
 
 
 def _spread(text: str, method: str) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 
 import srbf
 from srbf import files
-from srbf.capture import MANIFEST, Quantity, Role
+from srbf.capture import MANIFEST, LightKind, Quantity, Role
 from srbf.errors import ImageError, InputError
 from srbf.image import HALF_MAX, bits_of, decode_srgb, read_image, require_finite, write_image
 from srbf.light_list import LightListEntry, read_light_list
@@ -23,7 +23,8 @@ Transfer = Literal["srgb", "linear"]
 class LightListImport:
     """A .lp list and its images (JPG, PNG, TIFF, EXR), paired by the name in the list; an optional list of unseen lights.
 
-    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are. `mask` becomes coverage.
+    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are. `mask` becomes coverage. `kind` says whether the
+    lists hold directions, or positions of point lights in metres, whose irradiance the images have at 1 m from each.
     """
 
     lights: Path
@@ -31,6 +32,7 @@ class LightListImport:
     holdout: Path | None = None
     mask: Path | None = None
     quantity: Quantity = "radiance"
+    kind: LightKind = "directional"
 
     def write(self, folder: Path, force: bool = False, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
         """Write the capture, whole or not at all; returns its manifest.
@@ -39,9 +41,9 @@ class LightListImport:
         """
         if self.transfer not in ("srgb", "linear"):
             raise InputError(f"expected a transfer of srgb, linear, found {self.transfer!r}")
-        pairs: list[tuple[Path, LightListEntry, Role]] = [(p, e, "train") for p, e in paired(self.lights)]
+        pairs: list[tuple[Path, LightListEntry, Role]] = [(p, e, "train") for p, e in paired(self.lights, self.kind)]
         if self.holdout is not None:
-            pairs += [(p, e, "holdout") for p, e in paired(self.holdout)]
+            pairs += [(p, e, "holdout") for p, e in paired(self.holdout, self.kind)]
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
             (temporary / "lights").mkdir()
             size: tuple[int, int] = (0, 0)
@@ -55,7 +57,8 @@ class LightListImport:
                 file = f"lights/{index:04d}.exr"
                 wide = bits_of(path) > 8 and float(np.abs(pixels - pixels.astype(np.float16)).max()) > 0
                 write_image(temporary / file, pixels, "float" if wide or np.abs(pixels).max() > HALF_MAX else "half")
-                lights.append({"kind": "directional", "direction": list(entry.direction), "role": role, "file": file})
+                place = "direction" if self.kind == "directional" else "position"
+                lights.append({"kind": self.kind, place: list(entry.place), "role": role, "file": file})
                 progress(index + 1, len(pairs))
             manifest: dict[str, Any] = {
                 "format": "srbf-capture",
@@ -88,9 +91,9 @@ class LightListImport:
         return decode_srgb(pixels).astype(np.float32) if self.transfer == "srgb" else pixels
 
 
-def paired(light_list: Path) -> list[tuple[Path, LightListEntry]]:
+def paired(light_list: Path, kind: LightKind = "directional") -> list[tuple[Path, LightListEntry]]:
     """Each entry of a list with its image beside the list: by the name as written, else its last part, else its stem alone."""
-    entries = read_light_list(light_list)
+    entries = read_light_list(light_list, kind)
     folder = light_list.parent
     stems: dict[str, list[Path]] = {}
     for path in sorted(folder.iterdir()):

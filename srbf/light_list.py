@@ -1,4 +1,7 @@
-"""Light lists (.lp): a count, then `name x y z` a line, as photographers of relightable images keep them."""
+"""Light lists (.lp): a count, then `name x y z` a line, as photographers of relightable images keep them.
+
+For near lights the same file holds positions instead of directions.
+"""
 
 from __future__ import annotations
 
@@ -7,20 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
+from srbf.capture import LightKind
 from srbf.errors import ManifestError
 from srbf.sphere import normalize
 
 
 @dataclass(frozen=True)
 class LightListEntry:
-    """One image's name as the list spells it, and the unit direction towards its light (axes as they stand)."""
+    """One image's name as the list spells it, and its light's unit direction, or position in metres (axes as they stand)."""
 
     name: str
-    direction: tuple[float, float, float]
+    place: tuple[float, float, float]
 
 
-def read_light_list(path: Path) -> list[LightListEntry]:
-    """All entries of a .lp file, directions normalised; ManifestError names the line that cannot be used."""
+def read_light_list(path: Path, kind: LightKind = "directional") -> list[LightListEntry]:
+    """All entries of a .lp file, directions normalised, positions of point lights as they are; ManifestError names the line that is bad."""
     try:
         lines = [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
@@ -41,11 +45,11 @@ def read_light_list(path: Path) -> list[LightListEntry]:
             name, vector = "", np.zeros(0)
         if vector.shape != (3,) or not np.isfinite(vector).all():
             raise ManifestError(f"expected `name x y z` on line {number} of {path}, found {line!r}")
-        if np.abs(vector).max() < 1e-12:
+        if kind == "directional" and np.abs(vector).max() < 1e-12:
             raise ManifestError(f"expected a direction on line {number} of {path}, found the zero vector")
         if name in seen:
             raise ManifestError(f"expected each image once in {path}, found {name!r} again on line {number}")
         seen.add(name)
-        x, y, z = normalize(vector)
+        x, y, z = normalize(vector) if kind == "directional" else vector
         entries.append(LightListEntry(name, (float(x), float(y), float(z))))
     return entries

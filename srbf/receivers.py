@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,16 @@ from numpy import ndarray
 
 import srbf
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.asset import GEOMETRY, SCENE_FILE, Asset
+from srbf.asset import GEOMETRY, LAYERS, SCENE_FILE, Asset
 from srbf.capture import Capture
 from srbf.dilation import dilate
 from srbf.errors import InputError
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, environment_samples, moved, spot_cone
 from srbf.sphere import Domain, normalize
+from srbf.stitch import Stitch
 
+SEAM_LIGHTS = 32  # of the train lights, by which the seams of a fit are told
+SEAM_TEXELS = 1 << 13  # that give the pictures' mean
 CHUNK = 1 << 16  # receivers, or environment texels, weighed at a time: (CHUNK, K) float64 stays in cache-sized memory
 
 Combine = Callable[[ndarray, slice], ndarray]  # (layers (N, h, W, C), rows) -> (h, W, 3)
@@ -148,6 +152,40 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
             if below > 0:
                 notes.append(f"light {i} is below {below:.0%} of the receivers, outside the captured hemisphere: extrapolated there")
     return notes
+
+
+def seam_report(
+    asset: Asset,
+    capture: Capture,
+    stitch: Stitch,
+    loose: Float32[ndarray, "N n C"],
+    respond: Callable[[Asset, np.ndarray], np.ndarray],
+    loose_index: Int[ndarray, " n"] | None = None,
+) -> dict[str, Any]:
+    """What stitching did to the pictures: rms difference across the seams through a bilinear filter, over the pictures' mean.
+
+    Under SEAM_LIGHTS of the train lights, unclamped, by a method's `respond` (its directional_responses): `before`, with the maps' own
+    values `loose` of the stitch's texels (and clusters `loose_index`), and `after`, with those that the asset stores.
+    """
+    train = capture.indices("train")
+    directions = capture.directions(train[:: -(-len(train) // SEAM_LIGHTS)])
+    sewn = asset.at(stitch.texels)
+    entries = [{**entry, "encoding": "float"} for entry in asset.layers]
+    as_fitted = replace(
+        sewn,
+        manifest={**sewn.manifest, LAYERS[asset.method]: entries},
+        stored=loose[:, None],
+        scale=np.ones_like(asset.scale),
+        bias=np.zeros_like(asset.bias),
+        tables=sewn.tables if loose_index is None else {**sewn.tables, "cluster_index": loose_index[None].astype(np.uint8)},
+    )
+    covered = np.flatnonzero(asset.covered)
+    mean = float(np.abs(respond(asset.at(covered[:: -(-len(covered) // SEAM_TEXELS)]), directions)).mean())
+    gaps = {}
+    for name, part in (("before", as_fitted), ("after", sewn)):
+        relit = respond(part, directions)[:, 0].transpose(1, 0, 2)  # (n, b, 3)
+        gaps[name] = stitch.difference(relit.reshape(len(relit), -1)) / max(mean, 1e-30)
+    return {"edges": stitch.edges, "samples": stitch.samples, **gaps}
 
 
 def covered_texels(capture: Capture) -> Bool[ndarray, " P"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, get_args
 
 import numpy as np
@@ -18,8 +19,9 @@ from srbf.errors import InputError
 from srbf.image import Encoding
 from srbf.lights import Light
 from srbf.quantization import layer_entries, quantize
-from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, sum_over_lights
+from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, seam_report, sum_over_lights
 from srbf.sphere import Domain
+from srbf.stitch import Stitch
 
 CHANNELS = 4  # planes to an image
 MOST_SCALARS = 1024
@@ -110,6 +112,14 @@ def first_function(asset: Asset, rows: slice) -> Int[ndarray, "h W"]:
     return np.zeros((height, asset.width), np.int64)
 
 
+@dataclass(frozen=True, eq=False)
+class SewnPlanes:
+    """What planes `loose` (S, n) and clusters `loose_index` (n,) the texels of a stitch would have had without it."""
+
+    loose: Float32[ndarray, "S n"]
+    loose_index: Int[ndarray, " n"]
+
+
 def planes_asset(
     capture: Capture,
     method: str,
@@ -120,14 +130,31 @@ def planes_asset(
     settings: dict[str, Any],
     fit: dict[str, Any],
     index: Int[ndarray, " P"] | None = None,
+    stitch: Stitch | None = None,
+    sewn: SewnPlanes | None = None,
 ) -> Asset:
-    """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters."""
+    """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters.
+
+    `stitch` closes the seams of the dilated planes before they are rounded. Where there are clusters they must be `sewn`: planes and index
+    of a stitched capture, its gutter included.
+    """
     scalars, shape = len(planes), (capture.height, capture.width)
     nearest = nearest_covered(capture.coverage())
     images = carried_images(capture, nearest)
+    if nearest is not None and stitch is not None and sewn is not None:
+        nearest = nearest.copy()
+        nearest.flat[stitch.texels] = stitch.texels
     layers = np.zeros((-(-scalars // CHANNELS), *shape, CHANNELS), np.float32)
     for j, plane in enumerate(planes):
         layers[j // CHANNELS, :, :, j % CHANNELS] = dilate(plane.reshape(*shape, 1), nearest)[:, :, 0]
+    loose = None
+    if stitch is not None:
+        loose = layers.reshape(len(layers), -1, CHANNELS)[:, stitch.texels]
+        if sewn is None:
+            stitch.apply(layers)
+        else:
+            for j, plane in enumerate(sewn.loose):
+                loose[j // CHANNELS, :, j % CHANNELS] = plane
     stored, scale, bias = quantize(layers, encoding)
     unused = range(scalars % CHANNELS or CHANNELS, CHANNELS)
     scale[-1, unused], bias[-1, unused] = 0, 0
@@ -149,4 +176,7 @@ def planes_asset(
         manifest["clusters"] = len(functions.spreads) // (scalars + 1)
         manifest["cluster_index"] = {"file": "cluster_index.png"}
         tables["cluster_index"] = dilate(index.reshape(*shape, 1), nearest)[:, :, 0].astype(np.uint8)
-    return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+    asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+    if stitch is not None and loose is not None:
+        manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses, None if sewn is None else sewn.loose_index)
+    return asset

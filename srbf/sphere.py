@@ -97,6 +97,22 @@ def random_directions(n: int, domain: Domain, rng: np.random.Generator) -> Float
     return _from_z_and_azimuth(z, 2 * np.pi * rng.random(n))
 
 
+def farthest_points(points: Float[ndarray, "n d"], count: int) -> list[int]:
+    """At most `count` indices of points in any space, each the farthest from those before it; starts at the largest last coordinate.
+
+    Every prefix covers the set within twice the radius that the best choice of as many would [Gonzalez1985]. n x count work.
+    """
+    taken: list[int] = []
+    distance = np.full(len(points), np.inf)
+    chosen = int(np.argmax(points[:, -1])) if len(points) else 0
+    while len(taken) < min(count, len(points)):
+        taken.append(chosen)
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen], axis=1))
+        distance[taken] = -1  # before no other, be they equal
+        chosen = int(np.argmax(distance))
+    return taken
+
+
 def domain_of(directions: Float[ndarray, "n 3"]) -> Domain:
     """`hemisphere` where every direction has z > 0, else `sphere`."""
     return "hemisphere" if bool((np.asarray(directions)[:, 2] > 0).all()) else "sphere"

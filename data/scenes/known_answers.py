@@ -206,6 +206,71 @@ def subdivided():
     camera()
 
 
+def torus(around=48, across=24):
+    """A smooth torus in four charts, each a quarter of it, turned against one another in UV, over a floor that lights it from below.
+
+    Its seams: four circles across, where quarters meet, and one around, cut open underneath.
+    """
+    steps = [(2 * math.pi * i / around, 2 * math.pi * j / across - math.pi / 2) for i in range(around) for j in range(across)]
+    corners = [((1 + 0.4 * math.cos(b)) * math.cos(a), (1 + 0.4 * math.cos(b)) * math.sin(a), 0.4 * math.sin(b)) for a, b in steps]
+    mesh = bpy.data.meshes.new("Torus")
+    cells = [(i, j) for i in range(around) for j in range(across)]
+    faces = [[(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in cells]
+    mesh.from_pydata(corners, [], [[(i % around) * across + j % across for i, j in face] for face in faces])
+    mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
+    quarter = around // 4
+    turns = [math.radians(angle) for angle in (0, 90, 17, -33)]
+    coordinates = []
+    for (i, _), face in zip(cells, faces, strict=True):
+        chart = i // quarter
+        cosine, sine = math.cos(turns[chart]), math.sin(turns[chart])
+        for x, y in ((0.36 * ((a - chart * quarter) / quarter - 0.5), 0.36 * (b / across - 0.5)) for a, b in face):
+            coordinates.append((0.25 + 0.5 * (chart % 2) + cosine * x - sine * y, 0.25 + 0.5 * (chart // 2) + sine * x + cosine * y))
+    add_uv(mesh, "UV", coordinates)
+    mesh.materials.append(material("Torus", (0.8, 0.8, 0.8)))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Torus", mesh))
+    quad("Floor", corners=[(-3, -3, -0.6), (3, -3, -0.6), (3, 3, -0.6), (-3, 3, -0.6)], color=(0.7, 0.5, 0.3))
+    camera()
+
+
+def folded():
+    """Three squares side by side that share no vertices, in UV apart: the second of another material, the third folded up by 40 degrees."""
+    mesh = bpy.data.meshes.new("Strip")
+    up, out = math.sin(math.radians(40)), 2 + math.cos(math.radians(40))
+    rows = [[(0, 0), (1, 0)], [(1, 0), (2, 0)], [(2, 0), (out, up)]]
+    corners = [(x, y, z) for (a, za), (b, zb) in rows for x, y, z in ((a, 0, za), (b, 0, zb), (b, 1, zb), (a, 1, za))]
+    mesh.from_pydata(corners, [], [(0, 1, 2, 3), (4, 5, 6, 7), (8, 9, 10, 11)])
+    places = [(0.1, 0.1), (0.6, 0.1), (0.1, 0.6)]
+    add_uv(mesh, "UV", [(u + 0.3 * x, v + 0.3 * y) for u, v in places for x, y in UNIT_UV])
+    mesh.materials.append(material("one", (0.8, 0.8, 0.8)))
+    mesh.materials.append(material("other", (0.2, 0.2, 0.2)))
+    mesh.polygons[1].material_index = 1
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Strip", mesh))
+    camera()
+
+
+def blocks():
+    """A floor with a closed block, mirrored and of vertices split at its edges, an open crate, and a room's walls, which look inwards."""
+    quad("Plane", corners=[(-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)])
+    cube = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]  # outwards
+
+    def box(name, corners, faces):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(corners, [], faces)
+        mesh.materials.append(material(name))
+        obj = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(obj)
+        return obj
+
+    block = box("Block", [cube[i] for side in sides for i in side], [tuple(range(4 * i, 4 * i + 4)) for i in range(6)])
+    block.location, block.scale = (-1, 0, 1), (-0.5, 0.5, 0.5)  # mirrored: x from -1.5 to -0.5, z from 0.5 to 1.5
+    crate = box("Crate", cube, sides[:-1])  # without a lid
+    crate.location, crate.scale = (1, 0, 1), (0.5, 0.5, 0.5)
+    walls = box("Walls", cube, [side[::-1] for side in sides])
+    walls.location, walls.scale = (0, 0, 1.5), (2.5, 2.5, 2)
+
+
 def bake_under_hdri(blend, sky, out):
     """Irradiance of Plane under an equirectangular sky, straight from Cycles, (32, 32, 3), row 0 at the top."""
     bpy.ops.wm.open_mainfile(filepath=blend)
@@ -249,6 +314,9 @@ SCENES = {
     "hostile": hostile,
     "subdivided": subdivided,
     "scattered": scattered,
+    "torus": torus,
+    "folded": folded,
+    "blocks": blocks,
     "overriding": overriding,
     "no camera": lambda: quad("Plane"),
 }

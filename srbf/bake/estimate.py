@@ -61,14 +61,18 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
-    train_from = settings.domain if settings.light_list is None else "from the light list"
+    if settings.points is not None:
+        train_from = f"lamps {settings.points.spacing:g} m apart"
+    else:
+        train_from = settings.domain if settings.light_list is None else "from the light list"
+        train_from += f", a sun of {np.degrees(settings.sun_angle):.3g} degrees"
     receiver = ", ".join(f"{key} {value}" for key, value in facts["receiver"].items() if key != "kind")
     covered = f", {facts['covered_texels']} texels covered" if "covered_texels" in facts else ""
     return [
         f"scene      {bake.scene} (Blender {facts['blender']})",
         f"receiver   {facts['receiver']['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
         f"lights     {roles['train']} train at {_samples(bake)}, {roles['validation']} validation and "
-        f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}, a sun of {np.degrees(settings.sun_angle):.3g} degrees",
+        f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
         f"time       about {_duration(time)} {'a sample of all lights ' if bake.is_open_ended else ''}on this machine as busy as it is now",
     ]

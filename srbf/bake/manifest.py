@@ -38,8 +38,7 @@ def capture_manifest(
         "receiver": facts["receiver"],
         "lights": [
             {
-                "kind": "directional",
-                "direction": list(light.direction),
+                **light.placed(),
                 "role": light.role,
                 "file": light.file,
                 **({"direct": light.direct_file} if apart else {}),

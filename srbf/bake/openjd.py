@@ -74,7 +74,7 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
 
 def arguments(settings: BakeSettings) -> list[str]:
     """The flags of `srbf bake` that give these settings, to the bit; a light list is the job's parameter."""
-    receiver = settings.receiver
+    receiver, points = settings.receiver, settings.points
     named = {
         "receiver": f"{receiver.kind}:{receiver.name}" if receiver.name else receiver.kind,
         "uv-layer": receiver.uv_layer,
@@ -89,6 +89,8 @@ def arguments(settings: BakeSettings) -> list[str]:
         "transport": settings.transport,
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
+        "light-set": None if points is None else f"point:{points.spacing!r}",
+        "light-box": None if points is None or points.box is None else ",".join(map(repr, points.box)),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     flags = [f"--{name}={value}" for name, value in named.items() if value is not None]

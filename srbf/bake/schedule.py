@@ -5,35 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy import ndarray
 
-from srbf.arrays import Float64, Int
 from srbf.bake.settings import PlannedLight
+from srbf.sphere import farthest_points
 
 FIRST_SAMPLES = 2  # of a light's first pass: a pass costs as much again as half a sample, whatever it renders
 TESTED_GROWTH = 4  # validation and holdout lights, few and of many samples, grow faster than the others
-
-
-def farthest_point_order(points: Float64[ndarray, "n 3"], start: int) -> Int[ndarray, " n"]:
-    """Indices of `points`, each the farthest from those before it: every prefix covers what all of them cover within twice the best
-    radius that as many points could have [Gonzalez1985]. n x n work."""
-    order = np.empty(len(points), np.int64)
-    distance = np.full(len(points), np.inf)
-    chosen = start
-    for i in range(len(points)):
-        order[i] = chosen
-        distance = np.minimum(distance, ((points - points[chosen]) ** 2).sum(axis=1))
-        distance[chosen] = -1  # before any other, equal ones too
-        chosen = int(distance.argmax())
-    return order
 
 
 def render_order(lights: Sequence[PlannedLight]) -> list[PlannedLight]:
     """Train lights from the highest on, each the farthest from those before; validation and holdout lights evenly between them."""
     train = [light for light in lights if light.role == "train"]
     tested = [light for light in lights if light.role != "train"]
-    places = np.array([light.direction for light in train]).reshape(-1, 3)
-    order = farthest_point_order(places, int(places[:, 2].argmax())).tolist() if train else []
+    places = np.array([light.place for light in train]).reshape(-1, 3)
+    order = farthest_points(places, len(places))
     ranked = [((i + 1.0) / len(train), 0, train[j]) for i, j in enumerate(order)]
     # Their roles stand one after the other: taken in turn, so that a prefix has some of each.
     turned = sorted(range(len(tested)), key=lambda i: (_turn(tested, i), i))

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from srbf.capture import Quantity, Role, Transport
+from srbf.bake.point_lights import PointGrid
+from srbf.capture import LightKind, Quantity, Role, Transport
 from srbf.errors import InputError
 from srbf.light_list import read_light_list
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
@@ -64,6 +65,7 @@ class BakeSettings:
     keep_lamps: bool = False
     light_list: Path | None = None
     transport: Transport = "combined"
+    points: PointGrid | None = None  # lamps instead of directional lights
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -78,10 +80,19 @@ class BakeSettings:
             raise InputError(f"expected a size of at most 16384 texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
+        if self.points is not None:
+            if self.light_list is not None or self.sun_angle > 0:
+                raise InputError("expected point lights without --light-list and --sun-angle, which are of directional ones")
+            if self.samples == "auto":
+                raise InputError("expected a number of samples with point lights, found auto, which judges by fits of directional ones")
+            if self.transport != "combined":
+                raise InputError("expected --transport combined with point lights: only a sun's direct light is taken apart")
 
     def with_matched_sun(self) -> BakeSettings:
         """The same with a sun as large as the train lights stand apart: penumbrae as soft as that many lights can resolve."""
-        train = [light.direction for light in plan_lights(self) if light.role == "train"]
+        if self.points is not None:
+            raise InputError("expected directional lights for a matched sun, found point lights; leave --sun-angle away")
+        train = [light.place for light in plan_lights(self) if light.role == "train"]
         return replace(self, sun_angle=min(mean_spacing(np.array(train)), float(np.pi)))
 
     def record(self) -> dict[str, Any]:
@@ -89,7 +100,12 @@ class BakeSettings:
         record = asdict(self)
         if self.transport == "combined":
             del record["transport"]  # captures of before there was a choice stay what they were
-        if self.light_list is not None:
+        del record["points"]
+        if self.points is not None:
+            for directional in ("lights", "domain", "sun_angle", "light_list"):
+                del record[directional]
+            record["points"] = self.points.record()
+        elif self.light_list is not None:
             read_light_list(self.light_list)
             record["light_list"] = hashlib.sha256(self.light_list.read_bytes()).hexdigest()
         return record
@@ -97,13 +113,14 @@ class BakeSettings:
 
 @dataclass(frozen=True)
 class PlannedLight:
-    """A light to bake: its place in the capture, direction, role, samples a texel, and the seed of its own noise."""
+    """A light to bake: where in the capture, its direction or position (m), role, samples a texel, the seed of its own noise, its kind."""
 
     index: int
-    direction: tuple[float, float, float]
+    place: tuple[float, float, float]
     role: Role
     samples: int
     seed: int
+    kind: LightKind = "directional"
 
     @property
     def file(self) -> str:
@@ -114,30 +131,41 @@ class PlannedLight:
         """The direct light that an indirect capture's image lacks."""
         return f"direct/{self.index:04d}.exr"
 
+    def placed(self) -> dict[str, Any]:
+        """Its kind and where it is, as manifest and worker read them."""
+        return {"kind": self.kind, ("direction" if self.kind == "directional" else "position"): list(self.place)}
+
     def job(self) -> dict[str, Any]:
         """As the worker reads it."""
-        return {"index": self.index, "kind": "directional", "direction": self.direction, "samples": self.samples, "seed": self.seed}
+        return {"index": self.index, **self.placed(), "samples": self.samples, "seed": self.seed}
 
 
 def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
-    """Train lights (Hammersley, or the light list's), then validation, then holdout: uniform random, of more samples."""
-    if settings.light_list is not None:
-        train = np.array([entry.direction for entry in read_light_list(settings.light_list)])
-        domain = domain_of(train)
+    """Train lights (Hammersley, the light list's, or a grid of lamps), then validation, then holdout: uniform random, of more samples."""
+    kind: LightKind = "directional"
+    if settings.points is not None:
+        kind = "point"
+        train, validation, holdout = settings.points.places(settings.validation, settings.holdout)
     else:
-        domain = settings.domain
-        train = point_set("hammersley", settings.lights, domain)
-    rng = np.random.default_rng(settings.seed)
+        if settings.light_list is not None:
+            train = np.array([entry.place for entry in read_light_list(settings.light_list)])
+            domain = domain_of(train)
+        else:
+            domain = settings.domain
+            train = point_set("hammersley", settings.lights, domain)
+        rng = np.random.default_rng(settings.seed)
+        validation = random_directions(settings.validation, domain, rng)
+        holdout = random_directions(settings.holdout, domain, rng)
     groups: list[tuple[Role, np.ndarray, int]] = [
         ("train", train, 1 if settings.samples == "auto" else settings.samples),
-        ("validation", random_directions(settings.validation, domain, rng), settings.holdout_samples),
-        ("holdout", random_directions(settings.holdout, domain, rng), settings.holdout_samples),
+        ("validation", validation, settings.holdout_samples),
+        ("holdout", holdout, settings.holdout_samples),
     ]
     planned: list[PlannedLight] = []
-    for role, directions, samples in groups:
-        for x, y, z in directions:
+    for role, places, samples in groups:
+        for x, y, z in places:
             index = len(planned)
-            planned.append(PlannedLight(index, (float(x), float(y), float(z)), role, samples, noise_seed(settings.seed, index)))
+            planned.append(PlannedLight(index, (float(x), float(y), float(z)), role, samples, noise_seed(settings.seed, index), kind))
     return planned
 
 

@@ -12,7 +12,8 @@ from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
 from srbf.bake.part import Part
-from srbf.bake.run import Bake, Reporter
+from srbf.bake.point_lights import PointGrid, survey
+from srbf.bake.run import Bake, Reporter, base_job
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
@@ -50,6 +51,13 @@ def bake(
     light_list: Annotated[
         Path | None, typer.Option(help="A .lp file of directions to fit, instead of --lights.", show_default=False)
     ] = None,
+    light_set: Annotated[
+        str | None,
+        typer.Option(help="point:SPACING: a box filled with lamps so many metres apart, instead of --lights.", show_default=False),
+    ] = None,
+    light_box: Annotated[
+        str | None, typer.Option(help="x0,y0,z0,x1,y1,z1 of --light-set, m; default: all that renders.", show_default=False)
+    ] = None,
     sun_angle: Annotated[
         str, typer.Option(help="Angular diameter of the light, rad; auto: as large as the fitted lights stand apart.")
     ] = "0",
@@ -84,7 +92,7 @@ def bake(
     force: Force = False,
     restart: Annotated[bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin anew.")] = False,
 ) -> None:
-    """Bake SCENE under many directional lights, in passes. Stopped at any moment, the same command goes on."""
+    """Bake SCENE under many lights, one at a time, in passes. Stopped at any moment, the same command goes on."""
     width, height = parse_size(size)
     parsed, angle = Receiver.parse(receiver, uv_layer), parse_sun_angle(sun_angle)
     settings = BakeSettings(
@@ -103,10 +111,16 @@ def bake(
         keep_lamps=keep_lamps,
         light_list=light_list,
         transport=transport,
+        points=None if light_set is None else PointGrid.parse(light_set, light_box),
     )
+    if light_set is None and light_box is not None:
+        raise InputError("expected --light-set point:SPACING with --light-box, found none")
     if angle == "auto":
         settings = settings.with_matched_sun()
         note(f"a sun of {settings.sun_angle:.4g} rad ({degrees(settings.sun_angle):.1f} degrees), as far as the fitted lights stand apart")
+    if settings.points is not None:
+        Bake(scene, output, settings, blender).check_scene()
+        settings = survey(settings, base_job(scene, settings, output), blender, note)
     crew = CrewSettings(workers, lights_a_worker, hang_after)
     job = Bake(scene, output, settings, blender, crew, None if time is None else parse_duration(time), keep_sums, dask)
     _check_spread(job, part, farm, restart or force)

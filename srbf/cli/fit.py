@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
@@ -29,8 +31,7 @@ from srbf.cluster import Cluster, checked
 from srbf.errors import InputError
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
-from srbf.fitting import method_for, settings_of
-from srbf.methods.relighting_map import RelightingMap
+from srbf.fitting import encode, method_for, settings_of
 from srbf.tiles import fit_tiles
 
 
@@ -51,6 +52,9 @@ def fit(
     budget: Budget = None,
     psnr: Psnr = None,
     dask: Dask = None,
+    stitch: Annotated[
+        bool, typer.Option("--stitch/--no-stitch", help="Make the two sides of UV seams agree, where the capture has any.")
+    ] = True,
     force: Force = False,
 ) -> None:
     """Fit an asset to the train lights and measure its error on every role of the capture.
@@ -69,19 +73,23 @@ def fit(
     chosen = method_for(opened, method, settings, note)
     watch = None
     if dask is not None:
-        assert isinstance(chosen, RelightingMap)
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
-            asset = chosen.encode(opened, update, tiles=partial(_tiles, cluster))
+            asset = encode(chosen, opened, update, stitched=stitch, tiles=partial(_tiles, cluster))
     else:
         watch = TrainWatch(opened)
         with progress_bar("fit") as update:
-            asset = chosen.encode(opened, update, watch.look)
+            asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     asset.save(output, force)
     note(f"fitted {_summary(asset)} to {asset.manifest['source']['fit']['train_lights']} lights in {fitted - started:.1f} s")
+    if "seams" in asset.manifest:
+        seams = asset.manifest["seams"]
+        note(
+            f"seams: {seams['edges']} edges stitched, their difference {seams['before']:.4f} of the mean before, {seams['after']:.4f} after"
+        )
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")

@@ -22,10 +22,13 @@ def import_capture(
         Path | None, typer.Option("--holdout-lp", help="Light list of images to test by, not to fit.", show_default=False)
     ] = None,
     mask: Annotated[Path | None, typer.Option(help="Image that becomes coverage: white is real.", show_default=False)] = None,
+    light_kind: Annotated[
+        Literal["directional", "point"], typer.Option(help="Whether the lists hold directions, or positions in metres.")
+    ] = "directional",
     quantity: Annotated[Literal["radiance", "irradiance"], typer.Option(help="What the images measure.")] = "radiance",
     force: Force = False,
 ) -> None:
-    """Pair images with the directions of a light list by name, and write a capture."""
+    """Pair images with the lights of a list by name, and write a capture."""
     with progress_bar("import") as update:
-        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity).write(output, force, update)
+        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity, light_kind).write(output, force, update)
     note(f"imported {len(manifest['lights'])} images of {manifest['width']}x{manifest['height']} into {output}")

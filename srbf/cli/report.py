@@ -39,6 +39,7 @@ def report(
     else:
         check_replaceable(output, force, PAGE)
     opened, images = Asset.open(asset), Capture.open(capture)
+    images.require_directional("a report")
     started = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(opened, images, update)

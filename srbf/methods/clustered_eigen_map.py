@@ -18,12 +18,21 @@ from srbf.image import Encoding
 from srbf.light_space import LightSpace
 from srbf.model_selection import TexelSample, choose_dense, dense_centers, fit_light_functions
 from srbf.receivers import covered_texels
-from srbf.scalar_planes import check_plane_settings, directional_responses, folded_weights, linear_response, planes_asset, relight
+from srbf.scalar_planes import (
+    SewnPlanes,
+    check_plane_settings,
+    directional_responses,
+    folded_weights,
+    linear_response,
+    planes_asset,
+    relight,
+)
 from srbf.solve.clustered_pca import Clusters, cluster
 from srbf.solve.grouped_product import GroupedProduct
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct, in_tasks
 from srbf.sphere import Domain, domain_of
+from srbf.stitch import Stitch
 
 __all__ = ["ClusteredEigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
 
@@ -62,11 +71,14 @@ class ClusteredEigenMap:
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
         look: Look = lambda row, image: None,
+        stitch: Stitch | None = None,
     ) -> Asset:
         """Clusters from a texel sample; a pass over the images to assign every texel, another to project it.
 
         Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `scalars`) + 40 bytes a texel, two blocks of
         `capture.STREAM_BYTES`, twice the sample (12 bytes a light and sampled texel), what `look` keeps, and some 0.2 GB of libraries.
+        Scalars of two clusters cannot be compared, so `stitch` closes the seams of the images, and what its texels show is read once
+        more: both sides then agree as well as their clusters hold them.
         InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
         """
         train = capture.indices("train")
@@ -84,17 +96,38 @@ class ClusteredEigenMap:
         for first, block in capture.stream(train, look):
             seen.add(first, block)
             progress(first + len(block), 2 * len(train))
-        index = _assigned(seen.result, space, features, found)
-        del seen
+        columns = seen.result if stitch is None else _with_sewn(seen.result, stitch)
+        index = _assigned(columns, space, features, found)
+        del seen, columns
         axes = found.axes.transpose(0, 2, 1)  # (C, S, M)
-        product = GroupedProduct(np.stack([space.weights(a) for a in axes]).astype(np.float32), index)
+        weights = np.stack([space.weights(a) for a in axes]).astype(np.float32)
+        texels = capture.width * capture.height
+        product = GroupedProduct(weights, index[:texels])
         for first, block in capture.stream(train):
             product.add(first, block)
             progress(len(train) + first + len(block), 2 * len(train))
-        planes, values = _in_own_range(product.result, index, covered_texels(capture), space, found)
+        projected, covered = product.result, covered_texels(capture)
+        del product
+        sewn = None
+        if stitch is not None:
+            again = GroupedProduct(weights, index[texels:])
+            for first, block in stitch.blocks(capture, train):
+                again.add(first, block)
+            # The stitched texels come first; what they would be without stands behind, where it sets no range.
+            loose, loose_index = projected[:, stitch.sources], index[stitch.sources]
+            projected[:, stitch.texels], index[stitch.texels] = again.result, index[texels:]
+            projected = np.concatenate([projected, loose], axis=1)
+            index = np.concatenate([index[:texels], loose_index])
+            covered = np.concatenate([covered, np.zeros(len(loose_index), bool)])
+        planes, values = _in_own_range(projected, index, covered, space, found)
+        if stitch is not None:
+            sewn = SewnPlanes(planes[:, texels:], index[texels:])
+            planes, index = planes[:, :texels], index[:texels]
         functions = self._functions(sample, values, dense_centers(directions, domain))
         fit = {"chosen_by": "validation" if sample.validated else "leave-one-light-out"}
-        return planes_asset(capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index)
+        return planes_asset(
+            capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index, stitch, sewn
+        )
 
     def _functions(self, sample: TexelSample, values: Float64[ndarray, "L F 3"], centers: Float64[ndarray, "B 3"]) -> LightFunctions:
         """Light functions of all clusters: one spread and ridge that predict the validation lights best, or each its own by light left out.
@@ -107,6 +140,12 @@ class ClusteredEigenMap:
             choice = choose_dense(sample, centers, spread, ridge)
             spread, ridge = choice.spread, choice.ridge
         return fit_light_functions(sample, values, np.zeros((0, values.shape[1], 3)), centers, spread, ridge)
+
+
+def _with_sewn(seen: Float32[ndarray, "D P"], stitch: Stitch) -> Float32[ndarray, "D Q"]:
+    """Features of all texels, and behind them those of the stitch's texels once their (dilated) images are: features are sums."""
+    values = seen[:, stitch.sources].T
+    return np.concatenate([seen, (values + stitch.change(values)).T.astype(np.float32)], axis=1)
 
 
 def _assigned(seen: Float32[ndarray, "D P"], space: LightSpace, features: Float32[ndarray, "D M"], found: Clusters) -> Int[ndarray, " P"]:

@@ -18,6 +18,7 @@ from srbf.scalar_planes import check_plane_settings, directional_responses, fold
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct
 from srbf.sphere import Domain, domain_of
+from srbf.stitch import Stitch
 
 __all__ = ["EigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
 
@@ -55,11 +56,12 @@ class EigenMap:
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
         look: Look = lambda row, image: None,
+        stitch: Stitch | None = None,
     ) -> Asset:
         """Axes from a texel sample, then one projection of every texel: each image read once, and some of its rows before.
 
         Peak memory, whatever the number of lights: about 12 `scalars` + 40 bytes a texel, two blocks of `capture.STREAM_BYTES`, the sample
-        (12 bytes a light and texel of SAMPLE_TEXELS), what `look` keeps, and some 0.2 GB of libraries.
+        (12 bytes a light and texel of SAMPLE_TEXELS), what `look` keeps, and some 0.2 GB of libraries. `stitch` closes the planes' seams.
         InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
         """
         train = capture.indices("train")
@@ -91,4 +93,4 @@ class EigenMap:
             "singular_values": (values / max(float(values[0]), 1e-30)).tolist(),
             "energy_kept": space.energy_kept(values),
         }
-        return planes_asset(capture, "eigen-map", domain, planes, functions, self.encoding, asdict(self), fit)
+        return planes_asset(capture, "eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, stitch=stitch)

@@ -21,9 +21,21 @@ from srbf.lights import Light, PointLight
 from srbf.model_selection import RIDGES, Choice, TexelSample, choose, spread_candidates
 from srbf.parallel import each
 from srbf.quantization import layer_entries, metric, quantize, quantize_together, rounding_variance
-from srbf.receivers import CHUNK, carried_images, carried_scene, common_manifest, far_lights, finish, inside, light_vectors, sum_over_lights
+from srbf.receivers import (
+    CHUNK,
+    carried_images,
+    carried_scene,
+    common_manifest,
+    far_lights,
+    finish,
+    inside,
+    light_vectors,
+    seam_report,
+    sum_over_lights,
+)
 from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
+from srbf.stitch import Stitch
 
 # (capture, lights, matrix, ridge, progress) -> maps (K, P 3) and report: as `srbf.tiles.fit_tiles` with machines to do it
 Tiles = Callable[[Capture, list[int], ndarray, float, Callable[[int, int], None]], tuple[ndarray, LeastSquaresReport]]
@@ -72,13 +84,15 @@ class RelightingMap:
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
         look: Look = lambda row, image: None,
+        stitch: Stitch | None = None,
         tiles: Tiles | None = None,
     ) -> Asset:
         """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
 
-        `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`). Peak memory,
-        whatever the number of lights: 18 k + 40 bytes a texel, two blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB
-        of libraries. With `tiles` others stream the images and solve, and `look` sees none.
+        `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`); `stitch` closes
+        the seams of the dilated maps before they are rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes a texel, two
+        blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB of libraries. With `tiles` others stream the images and
+        solve, and `look` sees none.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
@@ -111,6 +125,9 @@ class RelightingMap:
                 coefficients[i] = dilate(coefficients[i], nearest)
 
             each(fill, self.k)
+        loose = coefficients.reshape(self.k, -1, 3)[:, stitch.texels] if stitch is not None else None
+        if stitch is not None:
+            stitch.apply(coefficients)
         if self.encoding == "uint8":
             stored, scale, bias = quantize_together(coefficients, basis.evaluate(all_around(domain)))
         else:
@@ -126,7 +143,10 @@ class RelightingMap:
             manifest["r_table"] = {"file": "r_table.exr", "size": len(tables["r_table"])}
         else:
             manifest["basis"] = {"kind": self.basis}
-        return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+        asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+        if stitch is not None and loose is not None:
+            manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses)
+        return asset
 
     def model(self, capture: Capture, domain: Domain) -> tuple[Basis, float, Choice | None]:
         """(basis, ridge, what chose them, if anything was to be chosen)."""

@@ -17,8 +17,9 @@ from srbf.flip import Flip
 from srbf.methods import directional_responses
 from srbf.motion import TEXELS, Motion, dense_reference, sampled_texels, sweep
 from srbf.quality import Method, Score, contest, planes_bound, score_asset, spectrum
-from srbf.report.subject import Subject, farthest_points
+from srbf.report.subject import Subject
 from srbf.shadow_sampling import ShadowSampling, shadow_sampling
+from srbf.sphere import farthest_points
 from srbf.unseen import LIGHTS, Negative, UnseenError, negative, unseen_error
 
 STEPS = 4  # of `measure`, for progress

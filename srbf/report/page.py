@@ -23,6 +23,7 @@ from srbf.report.findings import Findings
 from srbf.report.in_motion import motion_curves, motion_figures
 from srbf.report.inline import Table, data_uri, figure, image, paragraphs
 from srbf.report.light_functions import light_functions
+from srbf.report.samples import samples_plot
 from srbf.report.spectrum import spectrum_plots
 from srbf.report.subject import Picture, Subject
 from srbf.report.unseen_light import how_measured, table_of_lights, worst_directions
@@ -68,6 +69,9 @@ def write_page(
         sections.append(Section("Spectrum", spectrum_plots(subject, findings, findings.spectrum)))
     if "light_basis" in asset.manifest:
         sections.append(Section("Light functions", light_functions(subject)))
+    curve = subject.capture.manifest.get("source", {}).get("validation_curve")
+    if curve:
+        sections.append(Section("Samples", samples_plot(curve)))
     sections += [
         Section("Where the error is", by_texel(subject, findings.unseen)),
         Section("In motion", motion_section(findings, pictures, folder)),

@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32, Float64
+from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import ROLES, Capture, Role
 from srbf.evaluation import COVERED, psnr
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import directional_responses
 from srbf.report.lamps import demonstration_lamps
+from srbf.sphere import farthest_points
 
 SHOWN = 6  # unseen directions compared
 EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # that quantile of the references is shown at this linear level
@@ -81,13 +82,3 @@ def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_ligh
     gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
     points, spots = demonstration_lamps(asset, covered, demo_lights)
     return Subject(asset, capture, evaluation, covered, role, tuple(chosen), references, relit, gain, points, spots)
-
-
-def farthest_points(points: Float[ndarray, "N D"], count: int) -> list[int]:
-    """At most `count` indices, greedily the farthest from those taken; starts at the largest last coordinate. N x count work."""
-    taken = [int(np.argmax(points[:, -1]))]
-    distance = np.linalg.norm(points - points[taken[0]], axis=1)
-    while len(taken) < min(count, len(points)):
-        taken.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[taken[-1]], axis=1))
-    return taken

@@ -23,7 +23,8 @@ from srbf.rebinning import (
     tile_directions,
 )
 from srbf.report.canvas import DPI, MARGIN, SOFT, Sheet, gain_text, shown
-from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, Picture, Subject, farthest_points
+from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, Picture, Subject
+from srbf.sphere import farthest_points
 
 FILE = "abrdf_tiles.png"
 TILES = {"hemisphere": 432, "sphere": 216}  # a sphere's tile is twice as wide

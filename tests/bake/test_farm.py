@@ -22,6 +22,7 @@ from srbf.bake.images import CaptureImages
 from srbf.bake.light_pass import add_pass
 from srbf.bake.openjd import LIGHT_LIST, arguments, template
 from srbf.bake.part import Part
+from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.schedule import render_order
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
@@ -263,8 +264,13 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     for flag in ("--receiver=lightmap:A b", "--uv-layer=UV 2", "--size=8x9", f"--sun-angle={0.1 + 0.2!r}", "--keep-lamps", "--samples=3"):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list"}
+    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points"}
     assert not missing
+    lamps = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
+    flags = arguments(BakeSettings(Receiver("view"), points=lamps))
+    (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
+    (light_box,) = (flag.removeprefix("--light-box=") for flag in flags if flag.startswith("--light-box="))
+    assert PointGrid.parse(light_set, light_box) == PointGrid(lamps.spacing, lamps.box)
     job = template(bake_of(tmp_path, lights=77), None)
     assert [step["name"] for step in job["steps"]] == ["Prepare", "Bake", "Finish", "Fit"]
     assert job["steps"][1]["parameterSpace"]["taskParameterDefinitions"][0]["range"] == "1-4"  # 125 lights

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from srbf.bake.schedule import farthest_point_order, next_samples, render_order
+from srbf.bake.schedule import next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, plan_lights
-from srbf.sphere import all_around, point_set
+from srbf.sphere import all_around, farthest_points, point_set
 
 RECEIVER = Receiver("lightmap", "Plane")
 
@@ -22,7 +22,7 @@ def test_every_prefix_covers_the_domain(domain: str) -> None:
     """Greedy farthest point is within twice the best radius; the best for n caps of angle r has n (1 - cos r) / 2 >= the domain's share."""
     settings = BakeSettings(RECEIVER, lights=400, domain=domain, holdout=0, validation=0)
     lights = render_order(plan_lights(settings))
-    directions = np.array([light.direction for light in lights])
+    directions = np.array([light.place for light in lights])
     whole = covering_radius(directions, domain)
     area = 0.5 if domain == "hemisphere" else 1.0
     for n in [2, 3, 5, 8, 13, 25, 50, 100, 150, 200, 300, 399]:
@@ -34,14 +34,14 @@ def test_hammersleys_own_order_does_not() -> None:
     """Why there is an order: half of the set in its own order leaves a hole as wide as a quarter of the sky."""
     points = point_set("hammersley", 400, "sphere")
     assert covering_radius(points[:200], "sphere") > np.pi / 3
-    chosen = points[farthest_point_order(points, 0)[:200]]
+    chosen = points[farthest_points(points, 200)]
     assert covering_radius(chosen, "sphere") < np.pi / 10
 
 
 def test_the_order_is_a_permutation_even_of_equal_points() -> None:
     points = np.repeat(np.eye(3), 3, axis=0)
-    order = farthest_point_order(points, 4)
-    assert sorted(order) == list(range(9)) and order[0] == 4
+    order = farthest_points(points, 9)
+    assert sorted(order) == list(range(9)) and order[0] == 6
     assert {int(i) // 3 for i in order[:3]} == {0, 1, 2}
 
 
@@ -50,7 +50,7 @@ def test_tested_lights_stand_between_the_others() -> None:
     planned = plan_lights(settings)
     lights = render_order(planned)
     assert sorted(light.index for light in lights) == [light.index for light in planned]
-    assert lights[0].direction[2] == max(light.direction[2] for light in planned if light.role == "train")
+    assert lights[0].place[2] == max(light.place[2] for light in planned if light.role == "train")
     for n in (30, 65, 104):
         roles = [light.role for light in lights[:n]]
         assert abs(roles.count("holdout") - n * 20 / 130) <= 2

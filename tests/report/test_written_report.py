@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,8 @@ from srbf.report import write_report
 from srbf.report.canvas import UNCOVERED, shown, shown_signed
 from srbf.report.contact_sheet import difference_gain
 from srbf.report.lamps import demonstration_lamps, stage_of
-from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, farthest_points, gather
+from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, gather
+from srbf.sphere import farthest_points
 
 ALWAYS = {"contact_sheet.png", "sum_of_maps.png", "centers.png", "r_curve.png", "abrdf_tiles.png"}
 LAMPS = {"point_light.png", "point_strip.png", "spot_strip.png"}
@@ -222,3 +223,12 @@ def test_the_pages_numbers_are_the_evaluations(full: Case, report: Path) -> None
             assert f">{shown_as}<" in row
     one = next(line for line in html.splitlines() if line.startswith('<tr><td>1</td><td class="number">8</td>'))
     assert f">{full.evaluation['holdout']['psnr']:.2f} dB<" in one  # every held-out light alone: the same mean by another way
+
+
+def test_the_curve_of_the_samples_is_shown_where_the_bake_chose_them(full: Case, tmp_path: Path) -> None:
+    curve = [{"samples": n, "relative_rmse": e, "noise": 0.1} for n, e in ((1, 0.31), (2, 0.25), (4, 0.248))]
+    manifest = {**full.capture.manifest, "source": {"validation_curve": curve}}
+    page = replace(full, capture=replace(full.capture, manifest=manifest)).write(tmp_path)
+    text = page.read_text()
+    assert "stopped at 4 samples" in text
+    assert "stopped at" not in full.write(tmp_path / "without").read_text()

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the panel asks for, kept in the scene, and the same as arguments of `srbf`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import bpy
+
+SCENE_COPY = "scene.blend"  # what is baked: a bake may be resumed after the file it was made of has changed
+State = Literal["nothing", "half done", "done"]
+
+
+class SrbfSettings(bpy.types.PropertyGroup):
+    """Settings of the panel; see their descriptions."""
+
+    receiver: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Receiver",
+        items=[("OBJECT", "Object", "The texels of an object's UV layer"), ("CAMERA", "Camera", "The pixels of a camera's view")],
+    )
+    object: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        name="Object", type=bpy.types.Object, poll=lambda _, obj: obj.type == "MESH", description="The mesh whose lightmap is baked"
+    )
+    camera: bpy.props.PointerProperty(  # type: ignore[valid-type]
+        name="Camera", type=bpy.types.Object, poll=lambda _, obj: obj.type == "CAMERA", description="The camera whose view is baked"
+    )
+    width: bpy.props.IntProperty(name="Width", default=256, min=1, max=16384, description="Texels")  # type: ignore[valid-type]
+    height: bpy.props.IntProperty(name="Height", default=256, min=1, max=16384, description="Texels")  # type: ignore[valid-type]
+    lights: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Lights", default=400, min=1, description="Directions of light to bake and fit; random ones to test by come on top"
+    )
+    domain: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="From",
+        items=[("hemisphere", "Above", "Light comes from above the ground"), ("sphere", "All Around", "Light comes from everywhere")],
+    )
+    soft: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Soft Shadows", description="A sun as large as the lights stand apart: penumbrae that so many lights can resolve"
+    )
+    auto_samples: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Automatic", description="Add samples until the error on lights kept apart no longer falls"
+    )
+    samples: bpy.props.IntProperty(name="Samples", default=2, min=1, description="Samples a texel of each light")  # type: ignore[valid-type]
+    folder: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Folder",
+        default="//srbf",
+        subtype="DIR_PATH",
+        description="Captures and assets go here, each receiver's into a folder of its own",
+    )
+    k: bpy.props.IntProperty(name="Maps", default=25, min=1, max=2048, description="Relighting maps to fit")  # type: ignore[valid-type]
+    albedo: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Albedo", default=True, description="Show irradiance times albedo / pi of the object's own materials, instead of as it is"
+    )
+    layout: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Textures",
+        items=[
+            ("IMAGES", "One a Map", "An image texture a map: for Cycles, which has no limit"),
+            ("ATLAS", "Atlas", "All maps in one image: for EEVEE, which has few texture slots"),
+        ],
+    )
+    falloff: bpy.props.EnumProperty(  # type: ignore[valid-type]
+        name="Fall-off",
+        items=[
+            ("INVERSE_SQUARE", "Inverse Square", "As Blender's lamps fall off"),
+            ("LINEAR", "Linear", "The article's: equal to Blender's at the distance a0"),
+        ],
+    )
+    a0: bpy.props.FloatProperty(  # type: ignore[valid-type]
+        name="a0", default=1.0, min=1e-3, unit="LENGTH", description="The distance at which a linear fall-off equals Blender's"
+    )
+
+
+def receiver_of(settings: Any) -> bpy.types.Object | None:
+    """The object or camera asked for."""
+    return settings.object if settings.receiver == "OBJECT" else settings.camera
+
+
+def folder_of(settings: Any) -> Path:
+    """Where everything of this receiver goes: capture/, asset/, the copy of the scene and the logs."""
+    receiver = receiver_of(settings)
+    name = bpy.path.clean_name(receiver.name) if receiver else "nothing"
+    return Path(bpy.path.abspath(settings.folder)).resolve() / name
+
+
+def problem(settings: Any) -> str | None:
+    """Why there is nothing to bake yet, for the user; None where there is."""
+    if receiver_of(settings) is None:
+        return "Choose an object" if settings.receiver == "OBJECT" else "Choose a camera"
+    if settings.folder.startswith("//") and not bpy.data.filepath:
+        return "Save the file first: the folder is beside it"
+    return None
+
+
+def state_of(capture: Path) -> State:
+    """How far a bake has come, by what it leaves in the folder."""
+    if (capture / "bake.json").is_file():
+        return "half done"
+    return "done" if (capture / "capture.json").is_file() else "nothing"
+
+
+def bake_arguments(settings: Any, folder: Path, state: State, anew: bool, blender: str) -> list[str]:
+    """`srbf bake` of the scene's copy in `folder`, by the Blender at the path `blender` (empty: the bpy module)."""
+    receiver = receiver_of(settings)
+    kind = "lightmap" if settings.receiver == "OBJECT" else "view"
+    arguments = ["bake", str(folder / SCENE_COPY), "--output", str(folder / "capture"), "--receiver", f"{kind}:{receiver.name}"]
+    arguments += ["--size", f"{settings.width}x{settings.height}", "--lights", str(settings.lights), "--domain", settings.domain]
+    arguments += ["--samples", "auto" if settings.auto_samples else str(settings.samples), "--json-progress"]
+    if settings.soft:
+        arguments += ["--sun-angle", "auto"]
+    if anew and state != "nothing":
+        arguments.append("--force" if state == "done" else "--restart")
+    return arguments + (["--blender", blender] if blender else [])
+
+
+def fit_arguments(settings: Any, folder: Path) -> list[str]:
+    """`srbf fit` of the capture in `folder`, over an asset that is there."""
+    return ["fit", str(folder / "capture"), "--output", str(folder / "asset"), "-k", str(settings.k), "--force"]

@@ -1,0 +1,35 @@
+"""How many samples a capture took, and why no more: the curve by which `srbf bake --samples auto` stopped."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from srbf.report.inline import figure
+from srbf.report.plot import Axis, Plot
+
+
+def samples_plot(curve: list[dict[str, Any]]) -> str:
+    """Error on the validation lights, their noise taken off, after each doubling of the samples; and that noise."""
+    samples = np.array([entry["samples"] for entry in curve], np.float64)
+    error = np.array([entry["relative_rmse"] for entry in curve])
+    noise = np.array([entry["noise"] for entry in curve])
+    across = Axis(
+        float(samples[0]) * 0.9,
+        float(samples[-1]) * 1.1,
+        "samples a texel of each fitted light (log scale)",
+        log=True,
+        ticks=tuple(samples),
+    )
+    plot = Plot(520, 280, across, Axis(0.0, 1.15 * float(max(error.max(), noise.max())), "share of the rms", form=".2g"), (24, 90, 42, 58))
+    plot.line(samples, error, "blue")
+    plot.dots(samples, error, "blue")
+    plot.label(float(samples[-1]), float(error[-1]), "error", "strong blue", dx=10, dy=4)
+    plot.line(samples, noise, "red thin dash")
+    plot.label(float(samples[-1]), float(noise[-1]), "their noise", "red", dx=10, dy=4)
+    caption = (
+        f"The bake stopped at {samples[-1]:.0f} samples: after each doubling all fitted images are interpolated, and the relative RMSE "
+        "on the validation lights, less their own noise, is measured. The holdout lights were not looked at."
+    )
+    return figure('<div class="plots">' + plot.svg("Validation error by samples") + "</div>", caption)

@@ -1,0 +1,146 @@
+"""Captures under point lights: read, imported, refused where a method wants directions, and what an asset is measured against."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.cli import app
+from srbf.errors import InputError, ManifestError
+from srbf.evaluation import evaluate
+from srbf.facts import describe
+from srbf.image import write_image
+from srbf.importing import LightListImport
+from srbf.light_list import read_light_list
+from srbf.methods.relighting_map import RelightingMap
+
+LAMPS = {"train": [(0.3, 0.1, 0.8), (-0.4, 0.2, 0.6), (0.0, 0.0, 1.5)], "validation": [(0.5, -0.5, 0.9)], "holdout": [(-0.2, -0.6, 1.1)]}
+FIT = 0.03  # of 40 Gaussians to the cosine, relative
+
+
+@pytest.fixture
+def suns(make_capture, plane_positions) -> Capture:
+    """A white square under directional lights: the cosine."""
+    return make_capture(lambda d: np.full((10, 14, 3), max(0, d[2])), lights=200, position=plane_positions)
+
+
+@pytest.fixture
+def lamps(plane_positions: np.ndarray, tmp_path: Path) -> Callable[..., Capture]:
+    """The same square under point lights: cos / d^2, times `shade` (H, W, 1)."""
+
+    def make(shade: float | np.ndarray = 1.0, **changes: object) -> Capture:
+        folder = tmp_path / "lamps"
+        (folder / "lights").mkdir(parents=True, exist_ok=True)
+        entries: list[dict[str, object]] = []
+        for role, places in LAMPS.items():
+            for place in places:
+                vectors = np.array(place) - plane_positions
+                answer = vectors[..., 2:] / np.linalg.norm(vectors, axis=2, keepdims=True) ** 3 * shade
+                file = f"lights/{len(entries):04d}.exr"
+                write_image(folder / file, np.repeat(answer, 3, axis=2).astype(np.float32), "float")
+                entries.append({"kind": "point", "position": list(place), "role": role, "file": file, **changes})
+        manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": 14, "height": 10, "lights": entries}
+        files.write_json(folder / "capture.json", manifest)
+        return Capture.open(folder)
+
+    return make
+
+
+def test_a_point_capture_is_read(lamps) -> None:
+    capture = lamps()
+    assert capture.kind == "point" and capture.indices("holdout") == [4]
+    np.testing.assert_array_equal(capture.positions([4, 0]), [LAMPS["holdout"][0], LAMPS["train"][0]])
+    assert capture.lights[0].position == LAMPS["train"][0]
+    for ask in (capture.directions, lambda: capture.lights[0].direction):
+        with pytest.raises(InputError, match="directional"):
+            ask()
+    assert describe(capture.folder)["light_kind"] == "point"
+
+
+def test_a_directional_capture_has_no_positions(suns: Capture) -> None:
+    assert suns.kind == "directional" and "light_kind" not in describe(suns.folder)
+    with pytest.raises(InputError, match="point"):
+        suns.positions()
+
+
+def test_mixed_and_half_said_lights_are_refused(lamps) -> None:
+    folder = lamps().folder
+    manifest = files.read_json(folder / "capture.json")
+    one, *rest = manifest["lights"]
+    for light, words in [
+        ({"kind": "directional", "direction": [0, 0, 1], "role": "train", "file": one["file"]}, "one kind"),
+        ({"kind": "point", "direction": [0, 0, 1], "role": "train", "file": one["file"]}, "position"),
+        ({"kind": "point", "position": [0, 0], "role": "train", "file": one["file"]}, "position"),
+        ({"kind": "laser", "position": [0, 0, 1], "role": "train", "file": one["file"]}, "laser"),
+    ]:
+        files.write_json(folder / "capture.json", {**manifest, "lights": [light, *rest]})
+        with pytest.raises(ManifestError, match=words) as caught:
+            Capture.open(folder)
+        assert "\n" not in str(caught.value)
+
+
+def test_the_approximation_is_measured_by_role(suns: Capture, lamps) -> None:
+    """Without occluders a directional asset foretells lamps exactly but for its fit; lamps twice as strong are missed by half."""
+    asset = RelightingMap(k=40).encode(suns)
+    errors = evaluate(asset, lamps())
+    assert [light["role"] for light in errors["lights"]] == ["train"] * 3 + ["validation", "holdout"]
+    assert all(errors[role]["relative_rmse"] < FIT for role in LAMPS)
+    shade = np.linspace(0, 1, 14)[:, None]  # what an occluder near the lamp would take away, and directional lights know nothing of
+    shaded = evaluate(asset, lamps(shade))
+    assert all(shaded[role]["relative_rmse"] > 0.3 for role in LAMPS)
+    doubled = evaluate(asset, lamps(2.0))
+    assert doubled["holdout"]["relative_rmse"] == pytest.approx(0.5, abs=FIT)
+
+
+def test_an_asset_without_positions_cannot_be_compared(make_capture, lamps) -> None:
+    asset = RelightingMap(k=9).encode(make_capture(lambda d: np.full((10, 14, 3), max(0, d[2]))))
+    with pytest.raises(InputError, match="position map"):
+        evaluate(asset, lamps())
+
+
+def test_commands_say_which_captures_they_take(suns: Capture, lamps, tmp_path: Path) -> None:
+    def run(*arguments: object) -> tuple[int, str, str]:
+        done = CliRunner().invoke(app, list(map(str, arguments)))
+        return done.exit_code, done.stdout, done.stderr
+
+    folder = lamps().folder
+    RelightingMap(k=9).encode(suns).save(tmp_path / "asset")
+    flags = [["--method", name] for name in ("relighting-map", "eigen-map", "clustered-eigen-map", "auto")]
+    for command in [
+        *(["fit", folder, "-o", tmp_path / "new", *method] for method in flags),
+        ["evaluate", folder, "--leave-one-out"],
+        ["report", tmp_path / "asset", folder, "-o", tmp_path / "page.html"],
+    ]:
+        code, out, error = run(*command)
+        assert code == 1 and out == "" and len(error.strip().splitlines()) == 1, command
+        assert "expected a capture under directional lights" in error and "found point lights" in error
+    assert not (tmp_path / "new").exists() and not (tmp_path / "page.html").exists()
+    code, out, _ = run("evaluate", tmp_path / "asset", folder, "--json")
+    assert code == 0 and set(json.loads(out)) == {"train", "validation", "holdout", "lights"}
+    code, out, _ = run("info", folder)
+    assert code == 0 and "point" in out and "directional" in out
+    assert Asset.open(tmp_path / "asset").k == 9
+
+
+def test_positions_are_imported_as_they_are(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        write_image(tmp_path / f"{name}.exr", np.full((2, 3, 3), 0.5, np.float32), "float")
+    (tmp_path / "l.lp").write_text("2\na.exr 0 0 0\nb.exr 1.5 -2 0.25\n")
+    (tmp_path / "h.lp").write_text("1\nc.exr 3 0 1\n")
+    LightListImport(tmp_path / "l.lp", "linear", tmp_path / "h.lp", kind="point").write(tmp_path / "capture")
+    capture = Capture.open(tmp_path / "capture")
+    np.testing.assert_array_equal(capture.positions(), [[0, 0, 0], [1.5, -2, 0.25], [3, 0, 1]])
+    assert capture.indices("holdout") == [2]
+    with pytest.raises(ManifestError, match="zero vector"):
+        read_light_list(tmp_path / "l.lp")
+    arguments = ["import", "--lp", tmp_path / "l.lp", "-o", tmp_path / "again", "--transfer", "linear", "--light-kind", "point"]
+    assert CliRunner().invoke(app, list(map(str, arguments))).exit_code == 0
+    assert Capture.open(tmp_path / "again").kind == "point"
