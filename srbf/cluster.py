@@ -37,7 +37,8 @@ class Cluster:
             from distributed import Client
         except ImportError as error:
             raise MissingLibraryError("--dask needs dask.distributed: pip install srbf[farm]") from error
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told in one line
+        for name in ("distributed", "distributed.client"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line
         try:
             self._client = Client(self._address, timeout=CONNECTING, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:

@@ -28,6 +28,7 @@ from srbf.bake.schedule import render_order
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.sums import Sums
 from srbf.capture import Capture
+from srbf.cli.fit import fit
 from srbf.cluster import Cluster, ClusterError, checked
 from srbf.errors import BakeError, InputError
 from srbf.evaluation import evaluate
@@ -231,7 +232,8 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
     assert Sums(tmp_path, [light]).refresh(light, 2) and not sums.refresh(light, 3)
 
 
-def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("srbf.cluster.CONNECTING", 1.0)
     for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, seconds=60.0)):
         with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
             template(bake)
@@ -241,8 +243,10 @@ def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path) -> None:
         template(Bake(bake_of(tmp_path).scene, tmp_path / "c", BakeSettings(Receiver("lightmap", "{{Param.Scene}}"))))
     with pytest.raises(InputError, match="tcp://"):
         checked("localhost:8786")
-    with pytest.raises(ClusterError, match="no scheduler|none"), Cluster("tcp://127.0.0.1:9"):
+    with pytest.raises(ClusterError, match="expected a dask scheduler at tcp://127.0.0.1:9"), Cluster("tcp://127.0.0.1:9"):
         pass
+    with pytest.raises(InputError, match="relighting-map.*eigen-map"):
+        fit(tmp_path, tmp_path / "asset", method="eigen-map", dask="tcp://x:1")
     for flags in (["--part", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--part", "1/2", "--force"]):
         words = srbf("bake", tmp_path / "scene.blend", "-o", tmp_path / "x", "--receiver", "view", *flags)
         refused = subprocess.run(words, capture_output=True, text=True)
