@@ -183,18 +183,20 @@ class Capture:
         size = max(1, BLOCK_BYTES // (self.width * self.height * 12))
         return self._blocks(indices, size, np.dtype(np.float32), 0)
 
-    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+    def stream(
+        self, indices: Sequence[int], look: Look = lambda row, image: None, rows: Rows = None
+    ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
         """`blocks` as stored, for sums over many lights: float16 where all of `indices` are half floats, else float32; all finite.
 
         A block's memory is used again for the next but one: be done with it when the next is asked for. `look` sees every image
         once, warm from its file, in whatever thread read it. Memory: two blocks of STREAM_BYTES (or one image) and an image a
-        core, however many lights there are.
+        core, however many lights there are. With `rows` the images have those alone, in blocks of as many lights as without.
         """
         with ThreadPoolExecutor(cores()) as readers:
             half = all(readers.map(lambda index: holds_half(self.folder / self.lights[index].file), indices))
         stored = np.dtype(np.float16 if half else np.float32)
         size = max(1, STREAM_BYTES // (self.width * self.height * 3 * stored.itemsize))
-        return self._blocks(indices, size, stored, 2, look)
+        return self._blocks(indices, size, stored, 2, look, rows)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
         """Rows of T: what receivers `texels` (flat) answer to each of `indices`. Only an image's strips with such texels are undone."""
@@ -234,14 +236,15 @@ class Capture:
         return replace(self, lights=lights)
 
     def _blocks(
-        self, indices: Sequence[int], size: int, stored: np.dtype, buffers: int, look: Look | None = None
+        self, indices: Sequence[int], size: int, stored: np.dtype, buffers: int, look: Look | None = None, rows: Rows = None
     ) -> Iterator[tuple[int, np.ndarray]]:
         """Blocks of `size` images of type `stored`, a thread a core reading one block ahead; in `buffers` arrays, or new ones if 0."""
-        shape = (min(size, len(indices)), self.width * self.height, 3)
+        height = self.height if rows is None else sum(end - begin for begin, end in rows)
+        shape = (min(size, len(indices)), self.width * height, 3)
         ring = [np.empty(shape, stored) for _ in range(buffers)]
 
         def read(row: int, target: np.ndarray) -> None:
-            image = self._stored(indices[row])
+            image = self._stored(indices[row], rows)
             if look is not None:
                 look(row, image)
             if image.dtype == np.float16 and stored == np.float32:
@@ -326,8 +329,10 @@ class _KeptCapture(Capture):
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
         return self._stored(index).reshape(self.height, self.width, 3)
 
-    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
-        return self._blocks(indices, max(1, STREAM_BYTES // (len(self.answers) * 12)), np.dtype(np.float32), 2, look)
+    def stream(
+        self, indices: Sequence[int], look: Look = lambda row, image: None, rows: Rows = None
+    ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+        return self._blocks(indices, max(1, STREAM_BYTES // (len(self.answers) * 12)), np.dtype(np.float32), 2, look, rows)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
         return self.answers[np.ix_(texels, np.asarray(indices, np.int64))]
@@ -335,8 +340,10 @@ class _KeptCapture(Capture):
     def coverage(self) -> Float32[ndarray, "H W"]:
         return self.covered
 
-    def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "P 3"]:
-        return self.answers[:, index]
+    def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "n 3"]:
+        if rows is None:
+            return self.answers[:, index]
+        return np.concatenate([self.answers[begin * self.width : end * self.width, index] for begin, end in rows])
 
     def _of(self, lights: tuple[CapturedLight, ...], chosen: Sequence[int]) -> Capture:
         return replace(self, lights=lights, answers=self.answers[:, list(chosen)])
@@ -348,9 +355,11 @@ class CombinedCapture(Capture):
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
         return self._stored(index).reshape(self.height, self.width, 3)
 
-    def stream(self, indices: Sequence[int], look: Look = lambda row, image: None) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
+    def stream(
+        self, indices: Sequence[int], look: Look = lambda row, image: None, rows: Rows = None
+    ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
         size = max(1, STREAM_BYTES // (self.width * self.height * 12))
-        return self._blocks(indices, size, np.dtype(np.float32), 2, look)
+        return self._blocks(indices, size, np.dtype(np.float32), 2, look, rows)
 
     def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "n 3"]:
         direct = self.lights[index].direct

@@ -11,7 +11,7 @@ from srbf.capture import Capture, Look
 from srbf.errors import InputError
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
-from srbf.methods.relighting_map import RelightingMap
+from srbf.methods.relighting_map import RelightingMap, Tiles
 from srbf.stitch import Stitch
 
 __all__ = ["DEFAULT_BUDGET", "encode", "method_for", "settings_of"]
@@ -57,9 +57,15 @@ def encode(
     progress: Callable[[int, int], None] = lambda done, total: None,
     look: Look = lambda row, image: None,
     stitched: bool = True,
+    tiles: Tiles | None = None,
 ) -> Asset:
-    """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so."""
-    return chosen.encode(capture, progress, look, Stitch.of(capture) if stitched else None)
+    """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so; by `tiles` a relighting map."""
+    stitch = Stitch.of(capture) if stitched else None
+    if isinstance(chosen, RelightingMap):
+        return chosen.encode(capture, progress, look, stitch, tiles)
+    if tiles is not None:
+        raise InputError("expected a relighting map to be fitted by tiles, found another method")
+    return chosen.encode(capture, progress, look, stitch)
 
 
 def _spread(text: str, method: str) -> Any:

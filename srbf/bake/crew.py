@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
@@ -30,11 +30,17 @@ LEAST_PATIENCE = 30.0  # seconds
 
 @dataclass(frozen=True)
 class Task:
-    """One pass of a light: `samples` more of it, by their own `seed`."""
+    """One pass of a light: `samples` more of it, by their own `seed`, to what `before` passes gave.
+
+    `squares`: its sum of squares is wanted too. `keep`: the sum is, since more may come.
+    """
 
     light: PlannedLight
     samples: int
     seed: int
+    before: int = 0
+    squares: bool = False
+    keep: bool = False
     denoise: bool = False
 
     def job(self) -> dict[str, Any]:
@@ -49,6 +55,30 @@ class Answer:
     whole: ndarray
     direct: ndarray | None
     seconds: float
+
+
+@dataclass(frozen=True)
+class Committed:
+    """What another machine says of a task: its pass is in the folder, after so many seconds; or `error` kept it from that."""
+
+    seconds: float
+    error: str | None = None
+
+
+Take = Callable[[Task, Answer | Committed], None]
+
+
+@runtime_checkable
+class Renderer(Protocol):
+    """Whoever renders a bake's tasks: a `Crew` of this machine, or others."""
+
+    failed: dict[int, str]
+
+    def open(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def render(self, tasks: Sequence[Task], take: Take) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -120,7 +150,7 @@ class Crew:
             self._stop = True
             self._waiting.clear()
 
-    def render(self, tasks: Sequence[Task], take: Callable[[Task, Answer], None]) -> None:
+    def render(self, tasks: Sequence[Task], take: Take) -> None:
         """Have every task rendered and hand over its answer, from the threads of several workers; lights given up are in `failed`.
 
         The first error of scene, disk or `take` ends all of it. KeyboardInterrupt lets the lights at hand finish, then is raised.
@@ -149,7 +179,7 @@ class Crew:
         if interrupt is not None:
             raise interrupt
 
-    def _serve(self, slot: _Slot, take: Callable[[Task, Answer], None], ended: threading.Event) -> None:
+    def _serve(self, slot: _Slot, take: Take, ended: threading.Event) -> None:
         try:
             while self._work(slot, take):
                 pass
@@ -160,7 +190,7 @@ class Crew:
         finally:
             ended.set()
 
-    def _work(self, slot: _Slot, take: Callable[[Task, Answer], None]) -> bool:
+    def _work(self, slot: _Slot, take: Take) -> bool:
         """Ask and take until the list is empty (False) or the worker is to be replaced (True)."""
         asked: deque[Task] = deque()
         try:

@@ -13,7 +13,8 @@ from typing import Any
 
 from srbf import files
 from srbf.bake import sums
-from srbf.bake.images import GEOMETRY, SCENE_FILE
+from srbf.bake.images import GEOMETRY, PREPARED, SCENE_FILE
+from srbf.bake.part import Part
 from srbf.bake.sums import SUMS
 from srbf.capture import MANIFEST
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
@@ -23,6 +24,7 @@ LOG = "bake.log"
 SCRATCH = ".scratch"
 LOCK = ".lock"
 HOLDER = ".holder.json"
+FINDING_A_PLACE = 5.0  # seconds that parts may need to do so, one after the other
 BEFORE_IMAGES = (LOCK, HOLDER, SCRATCH, LOG, SUMS, "lights", "direct")  # what may be there of a bake that never wrote an image
 WRITTEN = (
     "lights",
@@ -40,22 +42,16 @@ WRITTEN = (
 
 @contextmanager
 def hold(folder: Path) -> Iterator[None]:
-    """Hold the folder; the system lets go of it however this process ends."""
-    try:
-        import filelock
-    except ImportError as error:
-        raise MissingLibraryError("baking needs filelock: pip install filelock") from error
+    """Hold the folder, parts of a bake included; the system lets go of it however this process ends."""
     if folder.exists() and not folder.is_dir():
         raise OutputExistsError(f"expected a folder or nothing at {folder}, found a file; choose another -o")
     files.make_folder(folder)
-    lock = filelock.FileLock(str(folder / LOCK))
+    lock = locked(folder, LOCK)
+    if lock is None:
+        raise BakeError(f"another process{_holder(folder)} is baking into {folder}; wait for it, or choose another -o")
     try:
-        lock.acquire(timeout=0)
-    except filelock.Timeout as error:
-        raise BakeError(f"another process{_holder(folder)} is baking into {folder}; wait for it, or choose another -o") from error
-    except OSError as error:
-        raise files.WriteError(f"cannot write into {folder}: {error.strerror}; choose a folder that can be written") from error
-    try:
+        if held := _parts_held(folder):
+            raise BakeError(f"other processes are baking parts {', '.join(held)} into {folder}; wait for them, or choose another -o")
         files.write_json(folder / HOLDER, {"host": socket.gethostname(), "pid": os.getpid(), "since": time.strftime("%F %T")})
         yield
     finally:
@@ -63,6 +59,65 @@ def hold(folder: Path) -> Iterator[None]:
         if folder.exists() and not any((folder / name).exists() for name in (STATE, MANIFEST)):
             (folder / LOCK).unlink(missing_ok=True)
         lock.release()
+
+
+@contextmanager
+def hold_part(folder: Path, part: Part) -> Iterator[None]:
+    """Hold one part of a bake beside others of as many; BakeError where another process holds it, or all of the folder."""
+    if not folder.is_dir():
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
+    # A part holds the folder for a moment, to find its place: so no bake of all of it can begin unseen, and none be under way.
+    whole = locked(folder, LOCK, FINDING_A_PLACE)
+    if whole is None:
+        raise BakeError(f"another process{_holder(folder)} is baking all of {folder}; wait for it")
+    try:
+        held = _parts_held(folder)
+        if others := [name for name in held if not name.endswith(f"/{part.count}")]:
+            raise BakeError(
+                f"expected parts of {part.count} in {folder}, found part {others[0]} being baked; wait for it, or keep to its number"
+            )
+        own = None if part.name in held else locked(folder, part.lock)
+        if own is None:
+            raise BakeError(f"another process is baking part {part.name} into {folder}; wait for it")
+    finally:
+        whole.release()
+    try:
+        yield
+    finally:
+        whole = locked(folder, LOCK, FINDING_A_PLACE)
+        if whole is not None:
+            (folder / part.lock).unlink(missing_ok=True)  # nobody opens it meanwhile
+            whole.release()
+        own.release()
+
+
+def locked(folder: Path, name: str, patience: float = 0.0) -> Any:
+    """The lock of that name, held; None where another process holds it."""
+    try:
+        import filelock
+    except ImportError as error:
+        raise MissingLibraryError("baking needs filelock: pip install filelock") from error
+    lock = filelock.FileLock(str(folder / name))
+    try:
+        lock.acquire(timeout=patience)
+    except filelock.Timeout:
+        return None
+    except OSError as error:
+        raise files.WriteError(f"cannot write into {folder}: {error.strerror}; choose a folder that can be written") from error
+    return lock
+
+
+def _parts_held(folder: Path) -> list[str]:
+    """Names of the parts that are being baked; what others left behind is removed. To be asked by whoever holds the folder."""
+    held = []
+    for path in sorted(folder.glob(".part-*.lock")):
+        lock = locked(folder, path.name)
+        if lock is None:
+            held.append(path.name.removeprefix(".part-").removesuffix(".lock").replace("-of-", "/"))
+        else:
+            path.unlink(missing_ok=True)
+            lock.release()
+    return held
 
 
 def _holder(folder: Path) -> str:
@@ -107,6 +162,25 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
             f"choose another -o, or {'--force' if finished else '--restart'} to bake anew"
         )
     _empty(folder)
+    return False
+
+
+def is_past_parts(folder: Path, identity: dict[str, Any]) -> bool:
+    """Whether all parts of the bake are done and it is finished; BakeError where none is prepared, OutputExistsError where another is."""
+    state = next((name for name in (STATE, MANIFEST) if (folder / name).is_file()), None)
+    recorded = files.read_json(folder / state) if state else {}
+    if recorded.get("tidying"):
+        return True
+    if state == MANIFEST:
+        recorded = recorded.get("source", {})
+    if recorded and (changed := _differences(recorded, identity)):
+        raise OutputExistsError(
+            f"expected a capture of the same scene and settings at {folder}, found another {', '.join(changed)}; choose another -o"
+        )
+    if state == MANIFEST and not _may_grow(folder, recorded, identity):
+        return True
+    if state != STATE or not (folder / SUMS / PREPARED).is_file():
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
     return False
 
 

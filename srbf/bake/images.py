@@ -17,7 +17,7 @@ from srbf.bake.settings import PlannedLight
 from srbf.bake.sums import SUMS, load_array, save_array
 from srbf.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
-from srbf.image import HALF_MAX, write_image
+from srbf.image import HALF_MAX, read_image, write_image
 
 GEOMETRY = ("position", "normal", "albedo", "coverage")
 SCENE_FILE = "scene.glb"
@@ -39,6 +39,7 @@ class CaptureImages:
         self._raw: dict[str, ndarray] = {}
         self._left: Float32[ndarray, "H W 3"] | None = None
         self._nearest: Int[ndarray, "H W"] | None = None
+        self._size: tuple[int, ...] = (0, 0)
         self.prepared: dict[str, Any] | None = None
         path = folder / SUMS / PREPARED
         if path.is_file():
@@ -56,7 +57,7 @@ class CaptureImages:
         raw, self._raw = self._raw, {}
         readable, hit = raw.pop("readable"), raw.pop("hit")
         save_array(self._folder / SUMS / READABLE, readable)
-        self._nearest = nearest_covered(readable[:, :, 0])
+        self._nearest, self._size = nearest_covered(readable[:, :, 0]), readable.shape[:2]
         left, ambient, seams = (raw.pop(name, None) for name in ("left", "ambient", "seams"))
         self._left = None
         (self._folder / SUMS / LEFT).unlink(missing_ok=True)
@@ -94,6 +95,19 @@ class CaptureImages:
         files.write_json(self._folder / SUMS / PREPARED, {"sha256": _checksum(prepared), "prepared": prepared})
         self.prepared = prepared
 
+    def require_receiver(self, facts: dict[str, Any]) -> None:
+        """BakeError where a worker tells of another receiver than what is prepared."""
+        assert self.prepared is not None
+        if without_uv(facts) != self.prepared["facts"] or uv_checksum(facts) != self.prepared["uv"]:
+            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+
+    def require_size(self, light: PlannedLight, image: ndarray) -> None:
+        """BakeError where an answer has not the size of the receiver."""
+        if image.shape != (*self._size, 3):
+            raise BakeError(
+                f"expected {(*self._size, 3)} values of light {light.index} from Blender, found {image.shape}; see the bake's log"
+            )
+
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
         """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
         if not np.isfinite(mean).all():
@@ -125,6 +139,11 @@ class CaptureImages:
             return ""
         return hashlib.sha256("".join(files.sha256_of(path) for path in paths).encode()).hexdigest()
 
+    def published(self, light: PlannedLight, apart: bool) -> Float32[ndarray, "H W 3"]:
+        """All light of one that is published; of an indirect capture (`apart`), both its images together."""
+        image = read_image(self._folder / light.file, 3)
+        return image + read_image(self._folder / light.direct_file, 3) if apart else image
+
     def _load(self, stored: dict[str, Any]) -> None:
         prepared = stored.get("prepared")
         if stored.get("sha256") != _checksum(prepared) or not isinstance(prepared, dict):
@@ -132,7 +151,8 @@ class CaptureImages:
         for name, checksum in prepared["files"].items():
             if not (self._folder / name).is_file() or files.sha256_of(self._folder / name) != checksum:
                 raise ImageError(f"expected {name} as it was written, found another")
-        self._nearest = nearest_covered(load_array(self._folder / SUMS / READABLE)[:, :, 0])
+        readable = load_array(self._folder / SUMS / READABLE)
+        self._nearest, self._size = nearest_covered(readable[:, :, 0]), readable.shape[:2]
         left = self._folder / SUMS / LEFT
         self._left = load_array(left) if left.is_file() else None
         self.prepared = prepared

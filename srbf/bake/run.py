@@ -6,26 +6,32 @@ import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy import ndarray
 
 from srbf import files
 from srbf.bake import folder, stopping
-from srbf.bake.checks import FirstLights, bytes_needed, check_disk
-from srbf.bake.crew import Answer, Crew, CrewSettings, Task
+from srbf.bake.checks import FIRST_LIGHTS, FirstLights, bytes_needed, check_disk
+from srbf.bake.crew import Answer, Committed, Crew, CrewSettings, Renderer, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
-from srbf.bake.images import CaptureImages, uv_checksum, without_uv
+from srbf.bake.images import CaptureImages
+from srbf.bake.light_pass import add_pass
 from srbf.bake.manifest import capture_manifest
+from srbf.bake.part import Part
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
-from srbf.bake.sums import NOTHING, SUMS, Sums
+from srbf.bake.sums import LATE, SUMS, Sums
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError
+
+if TYPE_CHECKING:
+    from srbf.bake.dask_crew import DaskCrew
 
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
@@ -55,6 +61,7 @@ class Bake:
     crew: CrewSettings = field(default_factory=CrewSettings)
     seconds: float | None = None
     keep_sums: bool = False
+    dask: str | None = None  # address of a scheduler whose workers render, instead of a crew of this machine
 
     def __post_init__(self) -> None:
         if self.seconds is not None and self.settings.denoise:
@@ -70,8 +77,10 @@ class Bake:
         """Whether more samples can be added once it is done."""
         return self.keep_sums or self.is_open_ended
 
-    def run(self, reporter: Reporter, force: bool = False, restart: bool = False) -> bool:
+    def run(self, reporter: Reporter, force: bool = False, restart: bool = False, part: Part | None = None) -> bool:
         """Bake what is not there yet; False where nothing was left to do. Killed at any moment, it goes on when run again.
+
+        Of a `part` only its lights: other parts may be baked at the same time, and no manifest is written. A bake without finds them done.
 
         Finished passes of lights are kept, and every image and the manifest are bit-identical to those of an uninterrupted bake.
         BakeError where Blender fails, a light cannot be rendered, or another process bakes here; OutputExistsError where the folder
@@ -79,6 +88,10 @@ class Bake:
         """
         identity = self._identity()
         existed = self.folder.exists()
+        if part is not None and self.is_open_ended:
+            raise InputError("--part needs to know how much there is to do: expected --samples N, found --samples auto or --time")
+        if part is not None and not part.is_preparation:
+            return self._run_beside(part, identity, reporter)
         with folder.hold(self.folder):
             try:
                 if folder.is_finished(self.folder, identity, force, restart):
@@ -87,7 +100,7 @@ class Bake:
                 for name in (SUMS, "lights", *(["direct"] if self.settings.transport == "indirect" else [])):
                     files.make_folder(self.folder / name)
                 files.make_folder(self.folder / SCRATCH)
-                _Passes(self, identity, reporter).run()
+                _Passes(self, identity, reporter, part).run()
                 return True
             except KeyboardInterrupt:
                 if (self.folder / STATE).is_file():
@@ -97,6 +110,19 @@ class Bake:
                 shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
                 if not (existed or (self.folder / STATE).exists() or (self.folder / MANIFEST).exists()):
                     shutil.rmtree(self.folder, ignore_errors=True)  # Blender never came as far as the first image
+
+    def _run_beside(self, part: Part, identity: dict[str, Any], reporter: Reporter) -> bool:
+        with folder.hold_part(self.folder, part):
+            if folder.is_past_parts(self.folder, identity):
+                return False
+            try:
+                files.make_folder(self.folder / SCRATCH / part.scratch)
+                _Passes(self, identity, reporter, part).run()
+                return True
+            finally:
+                shutil.rmtree(self.folder / SCRATCH / part.scratch, ignore_errors=True)
+                with suppress(OSError):  # other parts are in it
+                    (self.folder / SCRATCH).rmdir()
 
     def check_scene(self) -> None:
         """InputError where there is no scene to bake."""
@@ -112,18 +138,25 @@ class Bake:
 class _Passes:
     """One run of a bake, in a folder that it holds."""
 
-    def __init__(self, bake: Bake, identity: dict[str, Any], reporter: Reporter) -> None:
-        self._bake, self._identity, self._reporter = bake, identity, reporter
+    def __init__(self, bake: Bake, identity: dict[str, Any], reporter: Reporter, part: Part | None = None) -> None:
+        self._bake, self._identity, self._reporter, self._part = bake, identity, reporter, part
         self._folder, self._settings = bake.folder, bake.settings
         self._lights = plan_lights(bake.settings)
         self._order = render_order(self._lights)
+        self._scratch = self._folder / SCRATCH
+        judged = len(self._lights)
+        if part is not None:
+            self._order = part.of(self._order)
+            self._lights = sorted(self._order, key=lambda light: light.index)
+            self._scratch /= part.scratch
+            judged = len(self._lights) if len(self._lights) >= FIRST_LIGHTS else 0
         self._images = CaptureImages(bake.folder, reporter.say)
         self._sums = Sums(bake.folder, self._lights)
         self._auto = bake.settings.samples == "auto"
         self._apart = bake.settings.transport == "indirect"
         self._keep = bake.keeps_sums
         self._goal = 1 if self._auto else int(bake.settings.samples)
-        self._first = FirstLights(len(self._lights), bake.settings.receiver.place, reporter.say)
+        self._first = FirstLights(judged, bake.settings.receiver.place, reporter.say)
         self._settled = not self._auto  # how many samples the fitted lights get
         self._curve: list[stopping.Measure] = []
         self._measured: dict[int, stopping.Measure] = {}  # by samples, in this run or before
@@ -138,8 +171,10 @@ class _Passes:
     def run(self) -> None:
         new = [light for light in self._lights if not (self._folder / light.file).is_file()]
         check_disk(self._folder, bytes_needed(self._settings, len(new), len([light for light in new if self._is_summed(light)])))
-        with Crew(self._bake.crew, self._folder / SCRATCH, self._start, self._ready, self._reporter.say) as crew, self._alarm(crew):
+        with self._renderer() as crew, self._alarm(crew):
             if self._images.prepared is None:
+                if self._part is not None and not self._part.is_preparation:
+                    raise BakeError(f"expected {self._folder} prepared, found it damaged; run --part prepare again")
                 self._reporter.progress(0, 1, "opening the scene")
                 crew.open()
                 assert self._facts is not None
@@ -154,7 +189,16 @@ class _Passes:
                 raise
         self._finish()
 
-    def _passes(self, crew: Crew) -> None:
+    def _renderer(self) -> Crew | DaskCrew:
+        crew = Crew(self._bake.crew, self._scratch, self._start, self._ready, self._reporter.say)
+        if self._bake.dask is None:
+            return crew
+        from srbf.bake.dask_crew import DaskCrew
+        from srbf.cluster import checked
+
+        return DaskCrew(checked(self._bake.dask), self._bake, self._identity, crew, self._say_once)
+
+    def _passes(self, crew: Renderer) -> None:
         while not self._is_time_up():
             tasks = self._tasks()
             if tasks:
@@ -170,6 +214,8 @@ class _Passes:
 
     def _finish(self) -> None:
         self._write_manifest()
+        if self._bake.dask is not None:
+            folder.sweep(self._folder)  # after machines that died while they wrote
         self._log(f"stopped after {time.monotonic() - self._started:.1f} s")
         if self._failed:
             index, reason = next(iter(self._failed.items()))
@@ -184,6 +230,8 @@ class _Passes:
                 if any(reached)
                 else "the time was up before the first light was done; the same command goes on"
             )
+            return
+        if self._part is not None:
             return
         if self._keep:
             (self._folder / STATE).unlink()
@@ -217,49 +265,41 @@ class _Passes:
         due = [light for light in self._order if self._sums.samples(light) < self._goal_of(light) and light.index not in self._failed]
         level = min((self._sums.passes(light) for light in due), default=0)
         first = 1 if self._auto else FIRST_SAMPLES
+        return [self._task(light, level, first) for light in due if self._sums.passes(light) == level]
 
-        def alone(light: PlannedLight) -> bool:
-            """Whether its image is denoised, which is done to a whole image: its samples are one pass."""
-            return self._settings.denoise and light.role == "train"
+    def _task(self, light: PlannedLight, level: int, first: int) -> Task:
+        done, goal = self._sums.samples(light), self._goal_of(light)
+        denoise = self._settings.denoise and light.role == "train"  # of a whole image: its samples are one pass
+        samples = goal - done if denoise else next_samples(light, done, goal, first)
+        seed = noise_seed(self._settings.seed, light.index, level)
+        return Task(light, samples, seed, level, self._needs_squares(light), self._keep or done + samples < goal, denoise)
 
-        return [
-            Task(
-                light,
-                self._goal if alone(light) else next_samples(light, self._sums.samples(light), self._goal_of(light), first),
-                noise_seed(self._settings.seed, light.index, level),
-                alone(light),
-            )
-            for light in due
-            if self._sums.passes(light) == level
-        ]
-
-    def _take(self, task: Task, answer: Answer) -> None:
+    def _take(self, task: Task, answer: Answer | Committed) -> None:
         light = task.light
-        size = (self._settings.height, self._settings.width, 3)
-        for image in (answer.whole, answer.direct):
-            if image is not None and image.shape != size:
-                raise BakeError(
-                    f"expected {size} values of light {light.index} from Blender, found {image.shape}; its log is {self._folder / LOG}"
-                )
-        total = self._sums.read(light) if self._sums.passes(light) else NOTHING
-        if total.passes != self._sums.passes(light):  # damaged since the stock was taken
-            self._sums.forget(light)
-            return
-        total = total.with_pass(task.samples, answer.whole, answer.direct, self._needs_squares(light))
         try:
-            own = self._images.own_light(light, total.mean)
-            self._images.publish(light, own, total.direct_mean)
+            own = self._committed(task, answer) if isinstance(answer, Committed) else add_pass(self._images, self._sums, task, answer)
         except BakeError as error:
             if self._first.looking:
                 raise
             self._reporter.say(f"{error}; the rest goes on")
             self._failed[light.index] = str(error)
             return
-        self._sums.write(light, total, self._keep or total.samples < self._goal_of(light), self._images.checksum(light, self._apart))
+        if own is None:
+            return
         with self._mutex:
             self._first.look(own)
-            self._tell_progress(total.passes)
-            self._log(f"light {light.index} pass {total.passes} of {task.samples} in {answer.seconds:.3f} s")
+            self._tell_progress(task.before + 1)
+            self._log(f"light {light.index} pass {task.before + 1} of {task.samples} in {answer.seconds:.3f} s")
+
+    def _committed(self, task: Task, answer: Committed) -> ndarray:
+        """What another machine wrote, while the first lights are looked at."""
+        if answer.error is not None:
+            raise BakeError(answer.error)
+        if not self._sums.refresh(task.light, task.before + 1, LATE):
+            raise BakeError(
+                f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see one folder?"
+            )
+        return self._images.published(task.light, self._settings.transport == "indirect") if self._first.looking else np.empty(0)
 
     def _is_enough(self) -> bool:
         """`--samples auto`: measure what this many samples gave, and whether the last doubling was still worth it."""
@@ -289,7 +329,9 @@ class _Passes:
         return self._keep or self._goal_of(light) > FIRST_SAMPLES
 
     def _write_manifest(self) -> None:
-        """The folder as it stands becomes a valid capture, once a fitted light is there."""
+        """The folder as it stands becomes a valid capture, once a fitted light is there. Not by a part, which knows only its own."""
+        if self._part is not None:
+            return
         lights = [(light, self._sums.samples(light)) for light in self._lights if self._sums.passes(light)]
         reached = [samples for light, samples in lights if light.role == "train"]
         if reached and self._images.prepared is not None:
@@ -306,31 +348,24 @@ class _Passes:
         files.write_json(path, {**self._identity, "blender": blender})
 
     def _start(self, scratch: Path) -> Worker:
-        settings, prepared = self._settings, self._images.prepared
-        train = [light for light in self._lights if light.role == "train"]
-        job = {
-            **base_job(self._bake.scene, settings, scratch),
-            "serve": True,
-            "geometry": prepared is None,
-            "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)} if prepared is None else None,
-            "lights": [],
-            "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
-            "tints": None if prepared is None else prepared["tints"],
-        }
+        job = serving_job(self._bake.scene, self._settings, self._images.prepared, scratch)
         return Worker(job, scratch, self._folder / LOG, self._bake.blender)
+
+    def _say_once(self, line: str) -> None:
+        with self._mutex:
+            if line in self._told:
+                return
+            self._told.add(line)
+        self._reporter.say(line)
 
     def _ready(self, event: dict[str, Any], scratch: Path) -> None:
         """What a worker tells before it serves: the first one the receiver and its geometry, every other one the same scene."""
         kind, prepared = event["event"], self._images.prepared
         if kind == "warning":
-            with self._mutex:
-                if event["message"] not in self._told:
-                    self._told.add(event["message"])
-                    self._reporter.say(event["message"])
+            self._say_once(event["message"])
         elif kind == "scene" and prepared is not None:
             self._record(event["blender"])
-            if without_uv(event) != prepared["facts"] or uv_checksum(event) != prepared["uv"]:
-                raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+            self._images.require_receiver(event)
         elif kind == "scene":
             self._record(event["blender"])
             self._facts = event
@@ -343,7 +378,7 @@ class _Passes:
             (scratch / event["file"]).unlink()
 
     @contextmanager
-    def _alarm(self, crew: Crew) -> Iterator[None]:
+    def _alarm(self, crew: Renderer) -> Iterator[None]:
         """Stop the crew when the time is up."""
         timer = None
         if self._bake.seconds is not None:
@@ -371,6 +406,20 @@ class _Passes:
     def _log(self, line: str) -> None:
         with open(self._folder / LOG, "a", encoding="utf-8") as log:
             log.write(f"srbf: {line}\n")
+
+
+def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | None, scratch: Path) -> dict[str, Any]:
+    """The job of a worker that is then asked for lights; with nothing `prepared` it hands over what the images of the receiver need."""
+    train = [light for light in plan_lights(settings) if light.role == "train"]
+    return {
+        **base_job(scene, settings, scratch),
+        "serve": True,
+        "geometry": prepared is None,
+        "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)} if prepared is None else None,
+        "lights": [],
+        "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
+        "tints": None if prepared is None else prepared["tints"],
+    }
 
 
 def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, Any]:

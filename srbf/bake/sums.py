@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 import zipfile
 from collections.abc import Sequence
 from contextlib import suppress
@@ -18,6 +19,8 @@ from srbf.bake.settings import PlannedLight
 from srbf.errors import ImageError
 
 SUMS = "sums"
+LATE = 30.0  # seconds after which a shared folder shows what another machine wrote
+POLL = 0.25
 
 
 @dataclass(frozen=True)
@@ -111,9 +114,17 @@ class Sums:
         self._path(light.index).unlink(missing_ok=True)
         self._known[light.index] = (0, 0, False, "")
 
-    def refresh(self, light: PlannedLight) -> None:
-        """Read again what another process may have written."""
-        self._known[light.index] = self._read_counts(light.index)
+    def refresh(self, light: PlannedLight, passes: int = 0, patience: float = 0.0) -> bool:
+        """Read again what another process may have written; whether so many `passes` are there.
+
+        A folder shared by several machines may show late what one of them wrote: it is looked for `patience` seconds long.
+        """
+        deadline = time.monotonic() + patience
+        while True:
+            self._known[light.index] = self._read_counts(light.index)
+            if self.passes(light) >= passes or time.monotonic() >= deadline:
+                return self.passes(light) >= passes
+            time.sleep(POLL)
 
     def _path(self, index: int) -> Path:
         return self._folder / f"{index:04d}.npz"

@@ -10,11 +10,13 @@ import typer
 
 from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
+from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
+from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.bake.survey import objects_of, with_free_lamps, with_size
-from srbf.cli.parameters import Blender, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
+from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
 from srbf.errors import InputError
 
@@ -89,6 +91,21 @@ def bake(
         typer.Option(help="Seconds after which a silent Blender is replaced; default: learnt from the lights before.", show_default=False),
     ] = None,
     keep_sums: Annotated[bool, typer.Option("--keep-sums", help="Keep what --samples N can later add to; --time and auto do.")] = False,
+    dask: Dask = None,
+    part: Annotated[
+        str | None,
+        typer.Option(
+            help="Bake all passes of the I-th of N parts alone, I/N, once `prepare` has been; a bake without it then finishes.",
+            show_default=False,
+        ),
+    ] = None,
+    farm: Annotated[
+        Literal["openjd"] | None,
+        typer.Option(help="Bake nothing: write a render farm's job into -o, an Open Job Description bundle.", show_default=False),
+    ] = None,
+    farm_tasks: Annotated[
+        int | None, typer.Option(help="Tasks of the farm's bake; default: one for 32 lights.", min=1, show_default=False)
+    ] = None,
     json_progress: Annotated[
         bool, typer.Option("--json-progress", help="Progress as JSON lines on stderr: done, total, what, seconds_left.")
     ] = False,
@@ -129,7 +146,7 @@ def bake(
             denoise=denoise,
         )
         settings = settings.with_matched_sun() if angle == "auto" else settings
-        return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_sums)
+        return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_sums, dask)
 
     if collection:
         known = {one.name for one in named if one.kind == "lightmap"}
@@ -144,13 +161,30 @@ def bake(
     for job in jobs:
         job = with_size(job, texels_per_metre if job.settings.receiver.kind == "lightmap" or not several else None, note)
         job = with_free_lamps(job, note)
+        _check_spread(job, part, farm, restart or force)
+        if farm is not None:
+            write_bundle(job, job.folder, farm_tasks, force)
+            note(f"wrote {job.folder / TEMPLATE}; try it by: openjd run {job.folder / TEMPLATE} -p file://{job.folder / PARAMETERS}")
+            continue
         if dry_run:
             for line in estimate(job, note):
                 typer.echo(line)
             continue
         with json_progress_lines() if json_progress else progress_bar("bake") as update:
-            baked = job.run(Reporter(update, note), force, restart)
-        note(f"baked {job.folder}" if baked else f"{job.folder} is complete already")
+            baked = job.run(Reporter(update, note), force, restart, None if part is None else Part.parse(part))
+        what = {None: "baked", "prepare": "prepared"}.get(part, f"baked part {part} of")
+        note(f"{what} {job.folder}" if baked else f"{job.folder} is complete already")
+
+
+def _check_spread(job: Bake, part: str | None, farm: str | None, anew: bool) -> None:
+    """InputError where ways to spread the work exclude each other."""
+    given = [name for name, value in (("--dask", job.dask), ("--part", part), ("--farm", farm)) if value is not None]
+    if len(given) > 1:
+        raise InputError(f"expected one way to spread the work, found {' and '.join(given)}; leave one")
+    if job.dask is not None and job.crew.workers > 1:
+        raise InputError("--workers counts Blenders of this machine, found it with --dask; start as many dask workers instead")
+    if part not in (None, "prepare") and anew:
+        raise InputError("--force and --restart would drop what other parts baked; give them with --part prepare")
 
 
 def _samples(text: str | None, time: str | None) -> int | Literal["auto"]:

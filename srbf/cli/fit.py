@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Annotated, Any
 
 import typer
@@ -24,11 +25,14 @@ from srbf.cli.fit_parameters import (
     Spread,
     Weighting,
 )
-from srbf.cli.parameters import CaptureFolder, Force, Output
+from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
+from srbf.cluster import Cluster, checked
+from srbf.errors import InputError
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
 from srbf.fitting import encode, method_for, settings_of
+from srbf.tiles import fit_tiles
 
 
 def fit(
@@ -47,6 +51,7 @@ def fit(
     encoding: Encoding = None,
     budget: Budget = None,
     psnr: Psnr = None,
+    dask: Dask = None,
     stitch: Annotated[
         bool, typer.Option("--stitch/--no-stitch", help="Make the two sides of UV seams agree, where the capture has any.")
     ] = True,
@@ -55,8 +60,10 @@ def fit(
     """Fit an asset to the train lights and measure its error on every role of the capture.
 
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
-    they are many: `srbf evaluate` reads them all again.
+    they are many: `srbf evaluate` reads them all again. With --dask other machines fit tiles of rows, and train is read once more here.
     """
+    if dask is not None and method != "relighting-map":
+        raise InputError(f"expected --dask with --method relighting-map, whose tiles are independent, found it with {method}")
     given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
     given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
     settings = settings_of(method, given, domain, spread, ridge)
@@ -64,9 +71,14 @@ def fit(
     opened = Capture.open(capture)
     started = time.perf_counter()
     chosen = method_for(opened, method, settings, note)
-    watch = TrainWatch(opened)
-    with progress_bar("fit") as update:
-        asset = encode(chosen, opened, update, watch.look, stitch)
+    watch = None
+    if dask is not None:
+        with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
+            asset = encode(chosen, opened, update, stitched=stitch, tiles=partial(_tiles, cluster))
+    else:
+        watch = TrainWatch(opened)
+        with progress_bar("fit") as update:
+            asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
@@ -81,6 +93,10 @@ def fit(
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
+
+
+def _tiles(cluster: Cluster, capture: Capture, lights: list[int], matrix: Any, ridge: float, progress: Any) -> Any:
+    return fit_tiles(capture, lights, matrix, ridge, cluster.map, cluster.threads, progress)
 
 
 def _summary(asset: Asset) -> str:

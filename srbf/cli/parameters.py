@@ -18,6 +18,12 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on std
 Blender = Annotated[
     Path | None, typer.Option("--blender", help="An installed Blender's executable, instead of the bpy module.", show_default=False)
 ]
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        help="Address of a dask scheduler, tcp://HOST:8786, whose workers do the work; they see the same folders.", show_default=False
+    ),
+]
 
 
 def parse_size(text: str) -> tuple[int, int]:

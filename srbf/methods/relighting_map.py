@@ -33,10 +33,12 @@ from srbf.receivers import (
     seam_report,
     sum_over_lights,
 )
-from srbf.solve.least_squares import StreamedLeastSquares
+from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
 from srbf.stitch import Stitch
 
+# (capture, lights, matrix, ridge, progress) -> maps (K, P 3) and report: as `srbf.tiles.fit_tiles` with machines to do it
+Tiles = Callable[[Capture, list[int], ndarray, float, Callable[[int, int], None]], tuple[ndarray, LeastSquaresReport]]
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
 NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold
 ROUNDING_MARGIN = 16  # of bytes: unseen lights lost 3 to 15 times what these texels foretell
@@ -83,12 +85,14 @@ class RelightingMap:
         progress: Callable[[int, int], None] = lambda done, total: None,
         look: Look = lambda row, image: None,
         stitch: Stitch | None = None,
+        tiles: Tiles | None = None,
     ) -> Asset:
         """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
 
         `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`); `stitch` closes
         the seams of the dilated maps before they are rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes a texel, two
-        blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB of libraries.
+        blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB of libraries. With `tiles` others stream the images and
+        solve, and `look` sees none.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
@@ -103,13 +107,17 @@ class RelightingMap:
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
         basis, ridge, choice = self.model(capture, domain)
-        solve = StreamedLeastSquares(basis.evaluate(directions), ridge)
-        for first, block in capture.stream(train, look):
-            solve.add(first, block)
-            progress(first + len(block), len(train))
-        report = solve.report()
-        coefficients = solve.solve().reshape(self.k, capture.height, capture.width, 3)
-        del solve  # its sums are as large as the maps
+        if tiles is not None:
+            solved, report = tiles(capture, train, basis.evaluate(directions), ridge, progress)
+        else:
+            solve = StreamedLeastSquares(basis.evaluate(directions), ridge)
+            for first, block in capture.stream(train, look):
+                solve.add(first, block)
+                progress(first + len(block), len(train))
+            report, solved = solve.report(), solve.solve()
+            del solve  # its sums are as large as the maps
+        coefficients = solved.reshape(self.k, capture.height, capture.width, 3)
+        del solved
         nearest = nearest_covered(capture.coverage())
         if nearest is not None:
 

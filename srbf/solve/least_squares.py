@@ -62,11 +62,17 @@ class StreamedLeastSquares:
             self._solution = self._projected.transform(self._vt.T * self._filter())
         return self._solution
 
-    def report(self) -> LeastSquaresReport:
-        """Condition, rank and residual; the residual by Pythagoras, so it floors near 1e-4 of the data in float32."""
-        norm_squared = self._projected.norm_squared
+    def energies(self) -> tuple[float, Float64[ndarray, " J"]]:
+        """|B|^2 and that of each row of U^T B: of parts of the columns they add up to those of the whole."""
+        return self._projected.norm_squared, self._row_norms() if self._norms is None else self._norms
+
+    def report(self, energies: tuple[float, Float64[ndarray, " J"]] | None = None) -> LeastSquaresReport:
+        """Condition, rank and residual; the residual by Pythagoras, so it floors near 1e-4 of the data in float32.
+
+        With `energies`, those of columns that others solved.
+        """
+        norm_squared, norms = self.energies() if energies is None else energies
         kept_fraction = self._s * self._filter()  # 1 where untouched, 0 where cut
-        norms = self._row_norms() if self._norms is None else self._norms
         outside = max(0.0, norm_squared - float(norms.sum()))
         damped = float(((1 - kept_fraction) ** 2 * norms).sum())
         residual = np.sqrt((outside + damped) / norm_squared) if norm_squared > 0 else 0.0

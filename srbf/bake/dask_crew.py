@@ -1,0 +1,285 @@
+"""`--dask`: other machines render a bake's lights into the folder that they share with its host, each pass of a light at most once.
+
+The host alone holds the folder, decides what is rendered next, and writes the manifest. A fence, a file that is there as long as it runs,
+keeps away what a process that was taken for dead would still write.
+"""
+
+from __future__ import annotations
+
+import shutil
+import socket
+import tempfile
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+
+import srbf
+from srbf import files
+from srbf.bake import folder
+from srbf.bake.crew import TRIES, Answer, Committed, Crew, CrewSettings, Take, Task
+from srbf.bake.folder import LOG, SCRATCH, STATE
+from srbf.bake.images import CaptureImages
+from srbf.bake.light_pass import add_pass
+from srbf.bake.run import serving_job
+from srbf.bake.settings import BakeSettings
+from srbf.bake.sums import LATE, Sums
+from srbf.bake.worker import Worker
+from srbf.cluster import Cluster, ClusterError, scratch_root
+from srbf.errors import BakeError
+
+if TYPE_CHECKING:
+    from srbf.bake.run import Bake
+
+MOST_LIGHTS = 4  # of one dask task: a bake that is stopped waits for those begun
+IDLE = 300.0  # seconds after which a machine's Blender is closed that nobody asks
+STOP = "stop"  # in the scratch folder: begin nothing more
+
+
+@dataclass(frozen=True)
+class RemoteBake:
+    """What another machine must know of a bake; `folder` and `scene` are paths that it sees too. `token` names the host's run of it."""
+
+    token: str
+    scene: Path
+    scene_sha256: str
+    folder: Path
+    settings: BakeSettings
+    blender: Path | None
+    crew: CrewSettings
+    version: str
+
+    @property
+    def fence(self) -> Path:
+        return self.folder / SCRATCH / self.token
+
+
+@dataclass(frozen=True)
+class Report:
+    """What became of a dask task's lights, by index: committed, or given up and why. Those of which nothing is said are due as before.
+
+    `said`: lines for the user.
+    """
+
+    lights: dict[int, Committed]
+    failed: dict[int, str]
+    said: list[str]
+
+
+class DaskCrew:
+    """A `Crew` whose lights are rendered, and taken into the folder, by the workers of a dask scheduler. The scene is prepared here."""
+
+    def __init__(self, address: str, bake: Bake, identity: dict[str, Any], here: Crew, say: Callable[[str], None]) -> None:
+        self._cluster = Cluster(address, say)
+        self._here, self._say = here, say
+        self._bake = RemoteBake(
+            uuid4().hex,
+            bake.scene.resolve(),
+            identity["scene_sha256"],
+            bake.folder.resolve(),
+            bake.settings,
+            bake.blender,
+            CrewSettings(1, bake.crew.lights_a_worker, bake.crew.hang_after),
+            srbf.__version__,
+        )
+        self._refused: Counter[int] = Counter()
+        self._stop = False
+        self.failed: dict[int, str] = {}
+
+    def __enter__(self) -> DaskCrew:
+        self._cluster.__enter__()
+        self._bake.fence.touch()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._bake.fence.unlink(missing_ok=True)
+        self._cluster.everywhere(close_idle, self._bake.token)
+        self._cluster.__exit__(kind, error, trace)
+
+    def open(self) -> None:
+        """Open the scene on this machine, and close it again."""
+        with self._here as crew:
+            crew.open()
+
+    def stop(self) -> None:
+        """Begin no other light; `render` returns once those at hand are done."""
+        self._stop = True
+        with suppress(OSError):
+            (self._bake.folder / SCRATCH / STOP).touch()
+
+    def render(self, tasks: Sequence[Task], take: Take) -> None:
+        """Have every task rendered and committed, and hand over what was said of it; lights given up are in `failed`.
+
+        KeyboardInterrupt lets the lights at hand finish, then is raised.
+        """
+        size = max(1, min(MOST_LIGHTS, len(tasks) // max(1, 2 * self._cluster.threads)))
+        waiting = [list(tasks[i : i + size]) for i in range(0, len(tasks), size)]
+        interrupt: KeyboardInterrupt | None = None
+        while waiting:
+            chunks, waiting = waiting, []
+            results = self._cluster.map(render_lights, [(self._bake, chunk) for chunk in chunks], lambda: not self._stop)
+            while True:
+                try:
+                    entry = next(results, None)
+                    if entry is None:
+                        break
+                    waiting += self._taken(chunks[entry[0]], entry[1], take)
+                except KeyboardInterrupt as pressed:
+                    if interrupt is not None:
+                        raise
+                    interrupt = pressed
+                    self._say("finishing the lights at hand; press again to stop at once")
+                    self.stop()
+                    results = self._cluster.map(render_lights, [], lambda: False)
+        if interrupt is not None:
+            raise interrupt
+
+    def _taken(self, chunk: list[Task], result: Report | ClusterError, take: Take) -> list[list[Task]]:
+        """Hand over what came of a chunk; what is to be tried again in other chunks."""
+        if isinstance(result, ClusterError):
+            if len(chunk) > 1:  # it may be one of them alone
+                return [[task] for task in chunk]
+            index = chunk[0].light.index
+            self._say(f"light {index}: {result}; given up, the rest goes on")
+            self.failed[index] = str(result)
+            return []
+        for line in result.said:
+            self._say(line)
+        self.failed |= result.failed
+        for task in chunk:
+            index = task.light.index
+            if index in result.lights:
+                take(task, result.lights[index])
+            elif index not in result.failed and not self._stop:
+                self._refused[index] += 1
+                if self._refused[index] >= TRIES:
+                    self.failed[index] = f"expected its pass {task.before} in the folder, found it nowhere; do all machines see one folder?"
+        return []
+
+
+class _Station:
+    """One machine's Blender for one bake, kept from task to task."""
+
+    def __init__(self, bake: RemoteBake) -> None:
+        host = socket.gethostname()
+        if not bake.fence.is_file():
+            raise BakeError(f"expected the capture at {bake.folder} on {host} too, found none; share the folder under one path")
+        if srbf.__version__ != bake.version:
+            raise BakeError(f"expected srbf {bake.version} on {host}, found {srbf.__version__}; install the same everywhere")
+        if not bake.scene.is_file() or files.sha256_of(bake.scene) != bake.scene_sha256:
+            raise BakeError(f"expected the same scene at {bake.scene} on {host}, found {'another' if bake.scene.exists() else 'none'}")
+        self._said: list[str] = []
+        self._images = CaptureImages(bake.folder, self._said.append)
+        if self._images.prepared is None:
+            raise BakeError(f"expected {bake.folder} prepared, found it not so on {host}; share the folder under one path")
+        self.bake = bake
+        self.timer: threading.Timer | None = None
+        self._scratch = Path(tempfile.mkdtemp(prefix="srbf-", dir=scratch_root()))
+        self._crew = Crew(bake.crew, self._scratch, self._start, self._ready, self._said.append)
+
+    def close(self) -> None:
+        self._crew.__exit__(None, None, None)
+        shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def render(self, tasks: list[Task]) -> Report:
+        """Render and commit what is not in yet."""
+        self._said.clear()
+        sums = Sums(self.bake.folder, [task.light for task in tasks])
+        lights: dict[int, Committed] = {}
+        due = []
+        for task in tasks:
+            if sums.refresh(task.light, task.before, LATE):
+                if sums.passes(task.light) == task.before:
+                    due.append(task)
+                else:
+                    lights[task.light.index] = Committed(0.0)
+
+        def take(task: Task, answer: Answer | Committed) -> None:
+            assert isinstance(answer, Answer)
+            try:
+                with self._alone(task) as allowed:
+                    sums.refresh(task.light)
+                    if allowed and sums.passes(task.light) == task.before:
+                        add_pass(self._images, sums, task, answer)
+                    if sums.passes(task.light) > task.before:
+                        lights[task.light.index] = Committed(answer.seconds)
+            except BakeError as error:
+                lights[task.light.index] = Committed(answer.seconds, str(error))
+
+        self._crew.render(due, take)
+        failed = {task.light.index: self._crew.failed.pop(task.light.index) for task in due if task.light.index in self._crew.failed}
+        return Report(lights, failed, list(self._said))
+
+    @contextmanager
+    def _alone(self, task: Task) -> Iterator[bool]:
+        """Alone with one light, its host still there: False where it is not."""
+        if not self.bake.fence.is_file():
+            yield False
+            return
+        lock = folder.locked(self.bake.folder / SCRATCH, f"{task.light.index:04d}.lock", LATE)
+        try:
+            yield lock is not None and self.bake.fence.is_file()
+        finally:
+            if lock is not None:
+                lock.release()
+
+    def _start(self, scratch: Path) -> Worker:
+        job = serving_job(self.bake.scene, self.bake.settings, self._images.prepared, scratch)
+        return Worker(job, scratch, self._scratch / LOG, self.bake.blender)
+
+    def _ready(self, event: dict[str, Any], scratch: Path) -> None:
+        if event["event"] == "warning":
+            self._said.append(event["message"])
+        elif event["event"] == "scene":
+            began = files.read_json(self.bake.folder / STATE).get("blender")
+            if event["blender"] != began:
+                raise BakeError(f"expected Blender {began} on {socket.gethostname()}, as on the host, found {event['blender']}")
+            self._images.require_receiver(event)
+
+
+_idle: list[_Station] = []  # of this process
+_mutex = threading.Lock()
+
+
+def render_lights(bake: RemoteBake, tasks: list[Task]) -> Report:
+    """What a dask worker does: one pass of some lights, by a Blender that it opens once a bake."""
+    if (bake.folder / SCRATCH / STOP).exists():
+        return Report({}, {}, [])
+    station = _from_idle(bake) or _Station(bake)
+    try:
+        report = station.render(tasks)
+    except BaseException:
+        station.close()
+        raise
+    with _mutex:
+        station.timer = threading.Timer(IDLE, close_idle, (bake.token,))
+        station.timer.daemon = True
+        station.timer.start()
+        _idle.append(station)
+    return report
+
+
+def close_idle(token: str) -> None:
+    """End this process's Blenders of a bake that wait for nothing, and those whose host is gone."""
+    with _mutex:
+        closing = [station for station in _idle if station.bake.token == token or not station.bake.fence.is_file()]
+        _idle[:] = [station for station in _idle if station not in closing]
+    for station in closing:
+        if station.timer is not None:
+            station.timer.cancel()
+        station.close()
+
+
+def _from_idle(bake: RemoteBake) -> _Station | None:
+    with _mutex:
+        station = next((station for station in _idle if station.bake.token == bake.token), None)
+        if station is not None:
+            _idle.remove(station)
+            if station.timer is not None:
+                station.timer.cancel()
+    return station

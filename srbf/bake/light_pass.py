@@ -1,0 +1,32 @@
+"""One more pass of a light, taken into a capture: the sum grows, its mean is published, and last the sum says so."""
+
+from __future__ import annotations
+
+from numpy import ndarray
+
+from srbf.arrays import Float32
+from srbf.bake.crew import Answer, Task
+from srbf.bake.images import CaptureImages
+from srbf.bake.sums import NOTHING, Sums
+
+
+def add_pass(images: CaptureImages, sums: Sums, task: Task, answer: Answer) -> Float32[ndarray, "H W 3"] | None:
+    """Add `answer` to the light of `task`; what the capture then holds of it but for the rounding.
+
+    None where the light is not at the pass that `task` adds to: it is rendered again from where it is. BakeError on NaN or another size.
+    """
+    light = task.light
+    if sums.passes(light) != task.before:
+        return None
+    total = sums.read(light) if task.before else NOTHING
+    if total.passes != task.before:  # damaged since it was counted
+        sums.forget(light)
+        return None
+    for image in (answer.whole, answer.direct):
+        if image is not None:
+            images.require_size(light, image)
+    total = total.with_pass(task.samples, answer.whole, answer.direct, task.squares)
+    own = images.own_light(light, total.mean)
+    images.publish(light, own, total.direct_mean)
+    sums.write(light, total, task.keep, images.checksum(light, answer.direct is not None))
+    return own

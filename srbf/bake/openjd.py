@@ -1,0 +1,128 @@
+"""`--farm openjd`: a bake and its fit as a job of a render farm, an Open Job Description bundle (specification jobtemplate-2023-09).
+
+Steps: Prepare, then Bake with a task a part of the lights, then Finish, which takes stock and writes the manifest, then Fit.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+from srbf import files
+from srbf.bake.run import Bake
+from srbf.bake.settings import BakeSettings, plan_lights
+from srbf.errors import InputError
+
+TEMPLATE = "template.json"
+PARAMETERS = "parameters.json"
+LIGHT_LIST = "lights.lp"
+LIGHTS_A_TASK = 32
+NAME_LENGTH = 64  # of a job, at most
+FIT = """import shlex, subprocess, sys
+
+capture, asset, flags = sys.argv[1:]
+command = [sys.executable, "-m", "srbf", "fit", capture, "-o", asset, *shlex.split(flags)]
+sys.exit(subprocess.run(command).returncode)
+"""
+
+
+def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> None:
+    """Write the job of `bake` into `folder`: template.json, and in parameters.json the scene's path.
+
+    InputError where the tasks cannot be known beforehand; OutputExistsError where the folder holds something.
+    """
+    bake.check_scene()
+    job = template(bake, tasks)
+    with files.atomic_folder(folder, force, TEMPLATE) as temporary:
+        files.write_json(temporary / TEMPLATE, job)
+        files.write_json(temporary / PARAMETERS, {"Scene": str(bake.scene.resolve())})
+        if bake.settings.light_list is not None:
+            shutil.copyfile(bake.settings.light_list, temporary / LIGHT_LIST)
+
+
+def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
+    """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_A_TASK lights."""
+    if bake.is_open_ended:
+        raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time")
+    lights = len(plan_lights(bake.settings))
+    count = min(lights, tasks or -(-lights // LIGHTS_A_TASK))
+    command = ["-m", "srbf", "bake", "{{Param.Scene}}", "-o", "{{Param.Capture}}", *_flags(bake)]
+    listed = [_path("LightList", "FILE", "IN", "Directions to fit.", LIGHT_LIST)] if bake.settings.light_list is not None else []
+    return {
+        "specificationVersion": "jobtemplate-2023-09",
+        "name": f"srbf {bake.scene.stem}"[:NAME_LENGTH],
+        "parameterDefinitions": [
+            _path("Scene", "FILE", "IN", "The .blend."),
+            _path("Capture", "DIRECTORY", "INOUT", "Where the capture is written; every machine of the farm sees it.", "capture"),
+            _path("Asset", "DIRECTORY", "OUT", "Where the asset is written.", "asset"),
+            *listed,
+            {"name": "FitFlags", "type": "STRING", "default": "", "description": "Flags of srbf fit."},
+            {"name": "Python", "type": "STRING", "default": "python3", "description": "A Python that has srbf."},
+        ],
+        "steps": [
+            _step("Prepare", [*command, "--part", "prepare"]),
+            {
+                **_step("Bake", [*command, "--part", f"{{{{Task.Param.Part}}}}/{count}"], "Prepare"),
+                "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{count}"}]},
+            },
+            _step("Finish", command, "Bake"),
+            _step("Fit", ["{{Task.File.Fit}}", "{{Param.Capture}}", "{{Param.Asset}}", "{{Param.FitFlags}}"], "Finish", FIT),
+        ],
+    }
+
+
+def arguments(settings: BakeSettings) -> list[str]:
+    """The flags of `srbf bake` that give these settings, to the bit; a light list is the job's parameter."""
+    receiver, points = settings.receiver, settings.points
+    named = {
+        "uv-layer": receiver.uv_layer,
+        "unwrap": receiver.unwrap,
+        "size": f"{settings.width}x{settings.height}",
+        "lights": settings.lights,
+        "domain": settings.domain,
+        "samples": settings.samples,
+        "validation": settings.validation,
+        "holdout": settings.holdout,
+        "holdout-samples": settings.holdout_samples,
+        "quantity": settings.quantity,
+        "transport": settings.transport,
+        "seed": settings.seed,
+        "sun-angle": repr(float(settings.sun_angle)),
+        "light-set": None if points is None else f"point:{points.spacing!r}",
+        "light-box": None if points is None or points.box is None else ",".join(map(repr, points.box)),
+        "light-list": None if settings.light_list is None else "{{Param.LightList}}",
+    }
+    words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
+    flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
+    flags += [f"--no-shadow={name}" for name in settings.no_shadow]
+    flags += ["--keep-lamps"] if settings.keep_lamps else []
+    return flags + (["--denoise"] if settings.denoise else [])
+
+
+def _flags(bake: Bake) -> list[str]:
+    crew = {
+        "workers": bake.crew.workers,
+        "lights-a-worker": bake.crew.lights_a_worker,
+        "hang-after": bake.crew.hang_after,
+        "blender": bake.blender,
+    }
+    flags = [f"--{name}={value}" for name, value in crew.items() if value is not None]
+    flags += ["--keep-sums"] if bake.keep_sums else []
+    for flag in (*flags, *arguments(bake.settings), bake.scene.stem):
+        if "{{" in flag and flag != "--light-list={{Param.LightList}}":
+            raise InputError(f"expected names without {{{{, which a job template reads as its own, found {flag!r}; rename it")
+    return [*arguments(bake.settings), *flags]
+
+
+def _path(name: str, kind: str, flow: str, description: str, default: str | None = None) -> dict[str, Any]:
+    given = {} if default is None else {"default": default}
+    return {"name": name, "type": "PATH", "objectType": kind, "dataFlow": flow, "description": description, **given}
+
+
+def _step(name: str, args: list[str], after: str | None = None, file: str | None = None) -> dict[str, Any]:
+    script: dict[str, Any] = {"actions": {"onRun": {"command": "{{Param.Python}}", "args": args}}}
+    if file is not None:
+        script["embeddedFiles"] = [{"name": name, "type": "TEXT", "filename": f"{name.lower()}.py", "data": file}]
+    depends = {} if after is None else {"dependencies": [{"dependsOn": after}]}
+    return {"name": name, **depends, "script": script}
