@@ -29,6 +29,7 @@ FUNCTION_SPREADS = tuple(float(s) for s in np.geomspace(0.7, 5.0, 12))  # of the
 DENSE_LEAST = 100  # centers of light functions, where the lights are fewer
 BELOW = 3.0  # spacings: how far the centers of light functions go on below the horizon, or the cosine bends there
 FUNCTIONS_AT_A_TIME = 1024
+UNSEEN = 1e-4  # of the mean power: smaller errors are alike, or lights that leave all black would decide
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ def choose(
     """
     gram, train = sample.gram, sample.train
     validated = len(gram) > train
+    least = UNSEEN * float(np.trace(gram)) / len(gram) + 1e-30
     best: Choice | None = None
     best_score = np.inf
     for spread, weights in candidates:
@@ -107,7 +109,7 @@ def choose(
                 squares = _quadratic(path.left_out(ridge), gram)
             if noise is not None:
                 squares = squares + noise(operator, weights[train:] if validated else weights)
-            score = float(squares.mean()) if validated else float(np.exp(np.log(np.maximum(squares, 1e-30)).mean()))
+            score = float(squares.mean()) if validated else float(np.log(np.maximum(squares, least)).mean())
             if score < best_score or best is None:
                 best_score = score
                 best = Choice(spread, ridge, "validation" if validated else "leave-one-light-out", float(squares.mean()))
