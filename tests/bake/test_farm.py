@@ -232,6 +232,8 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
     assert add_pass(images, sums, first, three) is None
     np.testing.assert_array_equal(add_pass(images, sums, second, three), 2 * one.whole)
     assert (sums.passes(light), sums.samples(light)) == (2, 4)
+    with pytest.raises(BakeError, match="values of light 0"):
+        add_pass(images, sums, Task(light, 2, 7, 2), Answer(np.ones((3, 3, 3), np.float32), None, 0.1))
     assert Sums(tmp_path, [light]).refresh(light, 2) and not sums.refresh(light, 3)
 
 
@@ -265,6 +267,7 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
         "seed": 5,
         "sun_angle": 0.1 + 0.2,
         "keep_lamps": True,
+        "no_shadow": ("Roof",),
         "quantity": "radiance",
     }
     atlas = Receiver("lightmap", "A b", "UV 2", also=("C",), unwrap="lightmap-pack")
@@ -275,8 +278,11 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     for flag in ("--receiver=lightmap:A b", "--uv-layer=UV 2", "--size=8x9", f"--sun-angle={0.1 + 0.2!r}", "--keep-lamps", "--samples=3"):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points"}
-    assert not missing
+    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise"}
+    assert not missing and "--no-shadow=Roof" in flags
+    assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
+    atlas = Receiver("lightmap", "A", also=("B",))
+    assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))
     lamps = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
     flags = arguments(BakeSettings(Receiver("view"), points=lamps))
     (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
