@@ -36,6 +36,18 @@ class FirstLights:
     def looking(self) -> bool:
         return self._seen < self._count
 
+    @property
+    def lit(self) -> bool:
+        """Whether one of those looked at has any light."""
+        return not self._black
+
+    def black(self, count: int) -> BakeError:
+        """The error of `count` black images."""
+        return BakeError(
+            f"every one of {count} light images is black: does light reach {self._place} from where the lights stand? "
+            "Mend the scene, then bake with --restart"
+        )
+
     def look(self, image: np.ndarray) -> None:
         """Of the next light; BakeError at the last of the first ones, where nothing was lit or nothing changed."""
         if not self.looking:
@@ -50,10 +62,7 @@ class FirstLights:
         if self.looking:
             return
         if self._black:
-            raise BakeError(
-                f"every one of the first {self._count} light images is black: does light reach {self._place} from where the lights stand? "
-                "Mend the scene, then bake with --restart"
-            )
+            raise self.black(self._count)
         if not self._varied:
             raise BakeError(
                 f"the first {self._count} light images all hold {value:g} and nothing else: {self._place} does not answer to light. "

@@ -233,6 +233,8 @@ class _Passes:
             return
         if self._part is not None:
             return
+        if not self._first.lit and all(float(self._images.published(light, self._apart).max()) <= 0 for light in self._lights):
+            raise self._first.black(len(self._lights))  # other commands rendered it, too few lights each to tell
         if self._keep:
             (self._folder / STATE).unlink()
             return
@@ -299,7 +301,7 @@ class _Passes:
             raise BakeError(
                 f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see one folder?"
             )
-        return self._images.published(task.light, self._settings.transport == "indirect") if self._first.looking else np.empty(0)
+        return self._images.published(task.light, self._apart) if self._first.looking else np.empty(0)
 
     def _is_enough(self) -> bool:
         """`--samples auto`: measure what this many samples gave, and whether the last doubling was still worth it."""
