@@ -466,6 +466,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--row", default="", help="only rows whose function's name holds this")
     options = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # or, begun in the background of a script, all would ignore Ctrl-C
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     sys.exit(torture(60 * options.minutes, options.seed, options.row) > 0)
 
