@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from jaxtyping import install_import_hook
+# Begun in the background of a script, Python is told to ignore Ctrl-C, and so would be the processes that tests interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+from jaxtyping import install_import_hook  # noqa: E402
 
 # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process.
 # Not the commands: typer reads their annotations its own way.

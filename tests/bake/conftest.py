@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,9 +13,6 @@ import pytest
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-
-# Begun in the background of a script, Python is told to ignore Ctrl-C, and so would be the bakes that these tests interrupt.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 
 SCENES = Path(__file__).parents[2] / "data" / "scenes" / "known_answers.py"
 
