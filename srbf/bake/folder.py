@@ -21,6 +21,7 @@ from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExi
 
 STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
 LOG = "bake.log"
+LONGEST_LOG = 16 << 20  # bytes of Blender's own words
 SCRATCH = ".scratch"
 LOCK = ".lock"
 HOLDER = ".holder.json"
@@ -185,7 +186,10 @@ def is_past_parts(folder: Path, identity: dict[str, Any]) -> bool:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what a killed process left half-written."""
+    """Remove what a killed process left half-written, and all but the end of a log that has grown long."""
+    log = folder / LOG
+    if log.is_file() and log.stat().st_size > LONGEST_LOG:
+        log.write_bytes(log.read_bytes()[-LONGEST_LOG // 16 :])
     shutil.rmtree(folder / SCRATCH, ignore_errors=True)
     for place in ("", "lights/", "direct/", f"{SUMS}/"):
         for partial in folder.glob(f"{place}.*.partial*"):

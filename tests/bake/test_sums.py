@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from srbf.bake.folder import LOG, LONGEST_LOG, sweep
 from srbf.bake.settings import PlannedLight
 from srbf.bake.sums import NOTHING, Sums
 
@@ -68,3 +69,12 @@ def test_what_is_written_is_read_and_what_is_damaged_is_nothing(tmp_path: Path) 
     kept = Sums(tmp_path, [LIGHT])
     assert (kept.passes(LIGHT), kept.samples(LIGHT), kept.can_grow(LIGHT)) == (1, 2, False)
     assert kept.read(LIGHT).whole is None
+
+
+def test_a_long_log_keeps_its_end(tmp_path: Path) -> None:
+    (tmp_path / LOG).write_bytes(b"x" * LONGEST_LOG + b"last words\n")
+    sweep(tmp_path)
+    kept = (tmp_path / LOG).read_bytes()
+    assert kept.endswith(b"last words\n") and len(kept) < LONGEST_LOG / 8
+    sweep(tmp_path)
+    assert (tmp_path / LOG).read_bytes() == kept
