@@ -43,4 +43,4 @@ extension: setup
 	$(BIN)/python scripts/build_extension.py $(addprefix --platform ,$(PLATFORMS))
 
 clean:
-	rm -rf .venv .venv-* out .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv .venv-* out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
