@@ -39,10 +39,8 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
         facts: dict[str, Any] = {}
         seconds, image_bytes = [0.0] * len(probes), 0
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
-            for event in worker.events():
-                if event["event"] == "warning":
-                    say(event["message"])
-                elif event["event"] == "scene":
+            for event in worker.events(say):
+                if event["event"] == "scene":
                     facts = event
                 elif event["event"] == "image":
                     seconds[event["light"]] = event["seconds"]

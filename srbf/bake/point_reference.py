@@ -116,10 +116,8 @@ def _render(
             "lights": lights,
         }
         with Worker(job, scratch, scratch / "bake.log", blender) as worker:
-            for event in worker.events():
-                if event["event"] == "warning":
-                    say(event["message"])
-                elif event["event"] == "image":
+            for event in worker.events(say):
+                if event["event"] == "image":
                     array = np.load(scratch / event["file"])
                     if "light" in event:
                         images.append(np.maximum(array - left, 0))

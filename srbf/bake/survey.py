@@ -25,10 +25,8 @@ def survey(bake: Bake, asked: dict[str, Any], say: Callable[[str], None] = lambd
         job = {**base_job(bake.scene, bake.settings, scratch), "survey": asked}
         facts: dict[str, Any] | None = None
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
-            for event in worker.events():
-                if event["event"] == "warning":
-                    say(event["message"])
-                elif event["event"] == "survey":
+            for event in worker.events(say):
+                if event["event"] == "survey":
                     facts = event
     if facts is None:
         raise BakeError("expected a survey of the scene from Blender, found none; run again, and look at the scene if it happens twice")

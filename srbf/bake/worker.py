@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -113,10 +113,13 @@ class Worker:
             raise BakeError(event["message"])
         return None if event["event"] == "done" else event
 
-    def events(self) -> Iterator[dict[str, Any]]:
-        """Every event until it is done."""
+    def events(self, say: Callable[[str], None]) -> Iterator[dict[str, Any]]:
+        """Every event until it is done, but warnings, which are said."""
         while (event := self.event()) is not None:
-            yield event
+            if event["event"] == "warning":
+                say(event["message"])
+            else:
+                yield event
 
     def _tell(self, request: dict[str, Any]) -> None:
         assert self._process.stdin is not None

@@ -14,7 +14,9 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 
-SCENES = Path(__file__).parents[2] / "data" / "scenes" / "known_answers.py"
+ROOT = Path(__file__).parents[2]
+SCENES = ROOT / "data" / "scenes"
+sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them in
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -25,18 +27,28 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
                 item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
 
 
-@pytest.fixture(scope="session")
-def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The .blend of a named scene of data/scenes/known_answers.py."""
-    folder = tmp_path_factory.mktemp("scenes")
+def built(script: str, folder: Path) -> Callable[[str], Path]:
+    """The .blend of a named scene of a script of data/scenes, built when first asked for."""
 
     def build(name: str) -> Path:
         path = folder / f"{name}.blend"
         if not path.exists():
-            subprocess.run([sys.executable, str(SCENES), name, str(path)], check=True, capture_output=True, timeout=120)
+            subprocess.run([sys.executable, str(SCENES / script), name, str(path)], check=True, capture_output=True, timeout=120)
         return path
 
     return build
+
+
+@pytest.fixture(scope="session")
+def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The .blend of a named scene of known_answers.py."""
+    return built("known_answers.py", tmp_path_factory.mktemp("scenes"))
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The .blend of a named scene of real_scenes.py."""
+    return built("real_scenes.py", tmp_path_factory.mktemp("real"))
 
 
 class Baked:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from faults import contents
+from test_resume import wait_for_lights
 
 from srbf.asset import Asset
 from srbf.bake.crew import Answer, CrewSettings, Task
@@ -50,13 +52,6 @@ def run(*words: object) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(srbf(*words), capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every file of a capture but the log, which holds wall times, and the lock."""
-    return {
-        str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file() and p.name not in ("bake.log", ".lock")
-    }
 
 
 @pytest.fixture(scope="module")
@@ -98,13 +93,6 @@ def machines(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]
     cluster = LocalCluster(tmp_path_factory.mktemp("cluster"))
     yield cluster
     cluster.close()
-
-
-def wait_for_lights(folder: Path, count: int, process: subprocess.Popen) -> None:
-    deadline = time.monotonic() + 120
-    while len(list(folder.glob("lights/[0-9]*.exr"))) < count:
-        assert process.poll() is None and time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 @pytest.mark.blender

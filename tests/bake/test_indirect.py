@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_resume import command, contents, wait_for_lights
+from faults import contents
+from test_resume import command, wait_for_lights
 
 from srbf.capture import COVERED
 from srbf.direct.ray import RayTracer

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -32,22 +30,7 @@ pytestmark = pytest.mark.blender
 
 HALF = 2.0**-10  # of a half float, and Cycles' own rounding of a cosine
 FAR = 100.0  # metres between objects of a scene that must not shade each other
-SCENES = Path(__file__).parents[2] / "data" / "scenes" / "real_scenes.py"
 SMALL = {"width": 48, "height": 48, "lights": 6, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 4}
-
-
-@pytest.fixture(scope="session")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The .blend of a named scene of data/scenes/real_scenes.py."""
-    folder = tmp_path_factory.mktemp("real")
-
-    def build(name: str) -> Path:
-        path = folder / f"{name}.blend"
-        if not path.exists():
-            subprocess.run([sys.executable, str(SCENES), name, str(path)], check=True, capture_output=True, timeout=120)
-        return path
-
-    return build
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from faults import contents, workers_of
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
@@ -31,34 +32,12 @@ def command(scene: Path, folder: Path) -> list[str]:
     return [sys.executable, "-m", "srbf", "bake", str(scene), "-o", str(folder), "--receiver", "lightmap:Plane", *SETTINGS]
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every file of a capture but the log, which holds wall times."""
-    return {
-        str(p.relative_to(folder)): p.read_bytes()
-        for p in sorted(folder.rglob("*"))
-        if p.is_file() and p.name not in ("bake.log", ".lock", ".holder.json")
-    }
-
-
 def wait_for_lights(folder: Path, count: int, process: subprocess.Popen) -> None:
     deadline = time.monotonic() + 60
     while len(list(folder.glob("lights/[0-9]*.exr"))) < count:
         assert process.poll() is None, "the bake ended before it could be killed"
         assert time.monotonic() < deadline
         time.sleep(0.002)
-
-
-def workers_of(folder: Path) -> list[int]:
-    """Processes whose command line names this capture's job."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            line = (entry / "cmdline").read_bytes()
-        except OSError:
-            continue
-        if b"blender_bake" in line and str(folder.resolve()).encode() in line:
-            found.append(int(entry.name))
-    return found
 
 
 @pytest.fixture(scope="module")
