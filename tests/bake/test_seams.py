@@ -32,7 +32,7 @@ def handed_over(blend: Callable[[str], Path], tmp_path: Path) -> Seams:
         settings = BakeSettings(Receiver("lightmap", name), 32, 32, quantity=quantity)
         job = {**base_job(blend(scene), settings, scratch), "geometry": True, "ambient": None, "lights": [], "probes": []}
         with Worker(job, scratch, scratch / "log") as worker:
-            found = [np.load(scratch / event["file"]) for event in worker.events() if event.get("name") == "seams"]
+            found = [np.load(scratch / event["file"]) for event in worker.events(print) if event.get("name") == "seams"]
         return found[0].reshape(-1, 8) if found else None
 
     return run
