@@ -14,7 +14,7 @@ $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
 	sh scripts/debian-packages
 	sh scripts/make-venv $(PYTHON) $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,test,dev]'
+	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export,test,dev]'
 	touch $@
 
 demo: setup

@@ -24,12 +24,25 @@ ROOT = Path(__file__).parent.parent / "srbf"
 CHECKED = [f"srbf.{module.name}" for module in pkgutil.iter_modules([str(ROOT)]) if module.name not in ("cli", "__main__")]
 install_import_hook(CHECKED, "annotation_checks.check")
 
+from made_assets import build_asset, build_planes  # noqa: E402
+
 from srbf import files  # noqa: E402
+from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
 from srbf.image import write_image  # noqa: E402
 from srbf.sphere import point_set, random_directions  # noqa: E402
 
 Answer = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
+
+
+@pytest.fixture(scope="session")
+def make_planes() -> Callable[..., Asset]:
+    return build_planes
+
+
+@pytest.fixture(scope="session")
+def make_asset() -> Callable[..., Asset]:
+    return build_asset
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What the GPU tests share: one context, small asymmetric assets made in memory, and single shader functions run on a grid."""
+"""What the GPU tests share: one context, and single shader functions run on a grid."""
 
 from __future__ import annotations
 
@@ -9,114 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from srbf.asset import Asset
-from srbf.basis.gaussian import r_table, spread_of
-from srbf.basis.light_functions import LightFunctions
-from srbf.basis.octahedral_table import octahedral_table
 from srbf.gl.context import compile_program, create_context
 from srbf.gl.includes import resolve, resolve_text
-from srbf.quantization import quantize
-from srbf.sphere import point_set
-
-WIDEST = 1.0  # rad: wider tables break their own tolerance
-
-
-def build_asset(
-    k: int = 7,
-    encoding: str = "float",
-    height: int = 9,
-    width: int = 14,
-    *,
-    coefficients: np.ndarray | None = None,
-    ambient: bool = False,
-    position: bool = True,
-    spread: float | None = None,
-    seed: int = 0,
-) -> Asset:
-    """An asset of random signed maps over scattered receivers; nothing in it is symmetric."""
-    rng = np.random.default_rng([seed, k])
-    centers = point_set("fibonacci", k, "hemisphere")
-    if spread is None:
-        spread = min(spread_of(centers, "mean"), WIDEST) if k > 1 else 0.9
-    if coefficients is None:
-        coefficients = rng.normal(size=(k, height, width, 3)).astype(np.float32)
-    stored, scale, bias = quantize(coefficients, encoding)  # type: ignore[arg-type]
-    images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
-    if position:
-        images["position"] = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
-    if ambient:
-        images["ambient"] = rng.random((height, width, 3)).astype(np.float32)
-    manifest: dict[str, Any] = {
-        "method": "relighting-map",
-        "width": width,
-        "height": height,
-        "domain": "hemisphere",
-        "basis": {"kind": "gaussian", "centers": centers.tolist(), "spread": spread},
-        "maps": [{"encoding": encoding} for _ in range(k)],
-    }
-    return Asset(manifest, stored, scale, bias, {"r_table": r_table(spread)}, images)
-
-
-def build_planes(
-    scalars: int = 9,
-    clusters: int | None = None,
-    encoding: str = "float",
-    height: int = 9,
-    width: int = 14,
-    *,
-    ambient: bool = False,
-    position: bool = True,
-    patches: bool = False,
-    seed: int = 0,
-) -> Asset:
-    """An asset of random scalar planes with smooth random light functions; clusters are scattered, or in patches of 4 x 3 texels.
-
-    None clusters is an eigen map, a number of them a clustered one.
-    """
-    rng = np.random.default_rng([seed, scalars, clusters or 0])
-    count = (clusters or 1) * (scalars + 1)
-    centers = point_set("fibonacci", 24, "sphere")
-    coefficients = rng.normal(size=(count, len(centers), 3)).astype(np.float32)
-    functions = LightFunctions(centers, rng.choice([0.5, 0.8], count), coefficients)
-    table = octahedral_table(functions, "sphere", sizes=(17,))
-    layers = np.zeros((-(-scalars // 4), height, width, 4), np.float32)
-    for j in range(scalars):
-        layers[j // 4, :, :, j % 4] = rng.normal(size=(height, width))
-    stored, scale, bias = quantize(layers, encoding)  # type: ignore[arg-type]
-    scale[-1, scalars % 4 or 4 :], bias[-1, scalars % 4 or 4 :] = 0, 0
-    images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
-    if position:
-        images["position"] = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
-    if ambient:
-        images["ambient"] = rng.random((height, width, 3)).astype(np.float32)
-    manifest: dict[str, Any] = {
-        "method": "eigen-map" if clusters is None else "clustered-eigen-map",
-        "width": width,
-        "height": height,
-        "domain": "sphere",
-        "scalars": scalars,
-        "light_basis": {"kind": "gaussian", "centers": centers.tolist(), "spreads": functions.spreads.tolist()},
-        "w_table": {"size": table.size, "columns": table.columns},
-        "planes": [{"encoding": encoding} for _ in layers],
-    }
-    tables = {"light_coefficients": coefficients, "w_table": table.atlas}
-    if clusters is not None:
-        manifest["clusters"] = clusters
-        rows, columns = np.mgrid[:height, :width]
-        spots = rows // 3 * (-(-width // 4)) + columns // 4 if patches else rng.permutation(height * width).reshape(height, width)
-        tables["cluster_index"] = (spots * (clusters // 3 + 1) % clusters).astype(np.uint8)
-        tables["cluster_index"][-1, -1] = clusters - 1
-    return Asset(manifest, stored, scale, bias, tables, images)
-
-
-@pytest.fixture(scope="session")
-def make_planes() -> Callable[..., Asset]:
-    return build_planes
-
-
-@pytest.fixture(scope="session")
-def make_asset() -> Callable[..., Asset]:
-    return build_asset
 
 
 @pytest.fixture(scope="session")
