@@ -13,20 +13,56 @@ from srbf.asset import LAYERS, Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 from srbf.quantization import layer_entries
 
-FLOAT = 1e-4  # of the sum of the magnitudes of all terms; measured 3e-6
+FLOAT = 1e-4  # of the sum of the magnitudes of all terms; a few 1e-6 are usual
 HALF = 2 * 2.0**-10  # two steps of a half float
 HALF_TINY = 2.0**-24
 
 LIGHTS: dict[str, list[Light]] = {
     "directional": [DirectionalLight((0.3, -0.5, 0.7), (1.0, 0.5, 0.2))],
     "point": [PointLight((0.4, -0.3, 0.9), (0.7, 1.0, 0.4), a0=0.8)],
-    "spot": [SpotLight((-0.5, 0.6, 1.2), (1.0, 0.9, 0.3), a0=1.5, falloff="inverse-square", direction=(0.4, -0.5, -1), inner=0.3, outer=0.8)],
+    "spot": [
+        SpotLight((-0.5, 0.6, 1.2), (1.0, 0.9, 0.3), a0=1.5, falloff="inverse-square", direction=(0.4, -0.5, -1), inner=0.3, outer=0.8)
+    ],
     "environment": [EnvironmentLight(np.random.default_rng(5).random((6, 12, 3)).astype(np.float32), (0.5, 0.6, 0.7))],
 }
 LIGHTS["several"] = [light for lights in LIGHTS.values() for light in lights] + [
     DirectionalLight((-0.8, 0.1, 0.4), (0.1, 0.3, 0.9)),
     PointLight((-0.9, -0.7, 0.5), (0.3, 0.2, 0.8), falloff="inverse-square"),
 ]
+
+HALF_EXTENT = (1.4, 0.9, 0.25)  # of the rectangle that receivers of `on_a_plane` fill, and its height, metres
+
+# Lights as three.js, y up, has them, and as the library does.
+FOLLOWED: dict[str, tuple[list[dict[str, Any]], list[Light]]] = {
+    "directional": (
+        [{"type": "DirectionalLight", "color": (0.9, 0.6, 0.2), "intensity": 2.5, "position": (1, 3, -2), "target": (0.5, 0, 0.5)}],
+        [DirectionalLight((0.5, 2.5, 3.0), (2.25, 1.5, 0.5))],
+    ),
+    "point": (
+        [{"type": "PointLight", "color": (0.2, 0.6, 0.9), "intensity": 3, "position": (0.5, 1.1, -0.3)}],
+        [PointLight((0.5, 0.3, 1.1), (0.6, 1.8, 2.7), falloff="inverse-square", radius=0.1)],
+    ),
+    "spot": (
+        [
+            {
+                **{"type": "SpotLight", "color": (1, 0.8, 0.5), "intensity": 2, "position": (-0.6, 1.5, 0.4), "target": (0.3, 0, -0.1)},
+                **{"angle": 0.9, "penumbra": 0.6, "decay": 1},
+            }
+        ],
+        [SpotLight((-0.6, -0.4, 1.5), (2, 1.6, 1), radius=0.01, direction=(0.9, 0.5, -1.5), inner=0.36, outer=0.9)],
+    ),
+}
+FOLLOWED["several"] = ([light for row in FOLLOWED.values() for light in row[0]], [light for row in FOLLOWED.values() for light in row[1]])
+
+
+def on_a_plane(asset: Asset) -> Asset:
+    """`asset` with its receivers evenly over a rectangle about the origin, row 0 at +y."""
+    a, b, z = HALF_EXTENT
+    position = np.empty((asset.height, asset.width, 3), np.float32)
+    position[..., 0] = a * (2 * (np.arange(asset.width) + 0.5) / asset.width - 1)
+    position[..., 1] = b * (1 - 2 * (np.arange(asset.height) + 0.5) / asset.height)[:, None]
+    position[..., 2] = z
+    return replace(asset, images={**asset.images, "position": position})
 
 
 def complete(asset: Asset, **manifest: Any) -> Asset:
