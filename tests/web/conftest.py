@@ -78,9 +78,13 @@ class Browser:
 
     def serve(self, asset: Asset) -> str:
         """Save an asset where the page finds it; its URL."""
+        return self.place(asset.save)
+
+    def place(self, write: Callable[[Path], Any]) -> str:
+        """Have a new folder written where the page finds it; its URL."""
         self._saved += 1
         name = f"asset{self._saved:03d}"
-        asset.save(self._assets / name)
+        write(self._assets / name)
         return f"/served/{name}"
 
     def folder(self, url: str) -> Path:

@@ -3,6 +3,7 @@ import { type Light as ThreeLight, type Material, Matrix4, type Texture, type We
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
 import { type Light, moved } from "../lights";
+import type { Encoding } from "../manifest";
 import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues, needPositions, uniformVectors } from "../shader";
 import { LightmapPass, type TargetOptions } from "./lightmap_pass";
@@ -127,7 +128,10 @@ export class SrbfRelightingMap {
   update(renderer?: WebGLRenderer): void {
     const frame = frameValues(this.asset, this.currentLights());
     if (this.pass) needPositions(this.asset, frame.lamps.length);
-    if (renderer) this.checkUniforms(renderer, frame.lamps.length);
+    if (renderer) {
+      checkCompression(renderer, this.asset);
+      this.checkUniforms(renderer, frame.lamps.length);
+    }
     setFrame(this.uniforms, this.textures, frame);
     const assetFromScene = multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene));
     (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(threeMatrix(assetFromScene));
@@ -165,5 +169,15 @@ export class SrbfRelightingMap {
           (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
       );
     }
+  }
+}
+
+const EXTENSIONS: Partial<Record<Encoding, string>> = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
+
+function checkCompression(renderer: WebGLRenderer, asset: Asset): void {
+  const { encoding } = asset.layers;
+  const extension = EXTENSIONS[encoding];
+  if (extension !== undefined && !renderer.extensions.has(extension)) {
+    throw new SrbfError(`expected a GPU that reads ${encoding} (${extension}), found one without; serve it srbf export --target uint8`);
   }
 }

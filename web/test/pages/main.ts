@@ -1,8 +1,12 @@
 /** Runs jobs one after the other; every job makes what it needs and disposes of it. */
+import { host, layers, load } from "./host";
 import type { Job } from "./job";
 import { threeLightmap, threeMaterial } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
+  host,
+  layers,
+  load,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,
 };
