@@ -1,15 +1,12 @@
 /** An asset in a three.js scene: its textures, the lights that it follows, the materials that it lights. */
-import { type Light as ThreeLight, type Material, Matrix4, type Texture, type WebGLRenderer } from "three";
+import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
-import { type Light, moved } from "../lights";
 import type { Encoding } from "../manifest";
-import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
-import { type FrameValues, frameValues, needPositions, uniformVectors } from "../shader";
+import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
-import { rowsOf, threeMatrix } from "./rows";
-import { checkKind, lightOf, type SceneLight } from "./scene_lights";
+import { SceneAsset } from "./scene_asset";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 
@@ -27,25 +24,18 @@ const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
  * An asset that lights three.js materials. Add lights by `follow` (three's own, in three's world) or to `lights` (of the library, in the asset's
  * world: Blender's, z up), call `update` once a frame, `dispose` at the end.
  */
-export class SrbfRelightingMap {
-  /** Lights of the library beside the followed ones. */
-  readonly lights: Light[] = [];
-  /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
-  readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
+export class SrbfRelightingMap extends SceneAsset {
   readonly textures: SrbfTextures;
   readonly source: "maps" | "lightmap";
   private readonly uniforms: Uniforms;
   private readonly pass?: LightmapPass;
-  private readonly followed = new Set<SceneLight>();
   private readonly patched = new Map<Material, Patch>();
   private lamps = 0;
   private drawn = "";
 
   /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
-  constructor(
-    readonly asset: Asset,
-    options: RelightingMapOptions = {},
-  ) {
+  constructor(asset: Asset, options: RelightingMapOptions = {}) {
+    super(asset);
     const clustered = asset.manifest.method === "clustered-eigen-map";
     this.source = options.source ?? (clustered ? "lightmap" : "maps");
     if (clustered && this.source === "maps") {
@@ -67,20 +57,6 @@ export class SrbfRelightingMap {
   /** The lightmap that `update` draws (v downwards), for shaders of your own; only with `source: "lightmap"`. */
   get lightmap(): Texture | undefined {
     return this.pass?.target.texture;
-  }
-
-  /** Take three.js lights as they are at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
-  follow(...lights: ThreeLight[]): this {
-    for (const light of lights) {
-      checkKind(light);
-      this.followed.add(light);
-    }
-    return this;
-  }
-
-  unfollow(...lights: ThreeLight[]): this {
-    for (const light of lights) this.followed.delete(light as SceneLight);
-    return this;
   }
 
   /** Light `material` by this asset. @throws SrbfError on a material of another kind than Standard, Physical, Lambert, Basic. */
@@ -113,28 +89,20 @@ export class SrbfRelightingMap {
     return material;
   }
 
-  /** Every light as the library has it, in the asset's world. */
-  currentLights(): Light[] {
-    const worldFromScene = rowsOf(this.worldFromScene);
-    const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
-    return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
-  }
-
   /**
    * Bring uniforms, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
    *
    * @throws SrbfError on lamps where the asset has no positions for them, or more layers and lamps than the GPU's uniforms hold.
    */
   update(renderer?: WebGLRenderer): void {
-    const frame = frameValues(this.asset, this.currentLights());
+    const frame = this.frame();
     if (this.pass) needPositions(this.asset, frame.lamps.length);
     if (renderer) {
       checkCompression(renderer, this.asset);
       this.checkUniforms(renderer, frame.lamps.length);
     }
     setFrame(this.uniforms, this.textures, frame);
-    const assetFromScene = multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene));
-    (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(threeMatrix(assetFromScene));
+    (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(this.assetFromScene());
     if (frame.lamps.length !== this.lamps) this.recompile(frame.lamps.length);
     if (this.pass) this.redraw(frame, renderer);
   }

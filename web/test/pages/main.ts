@@ -1,12 +1,15 @@
 /** Runs jobs one after the other; every job makes what it needs and disposes of it. */
 import { host, layers, load } from "./host";
 import type { Job } from "./job";
+import { nodesLightmap, nodesMaterial } from "./three_nodes";
 import { threeLightmap, threeMaterial } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   host,
   layers,
   load,
+  "nodes-lightmap": nodesLightmap,
+  "nodes-material": nodesMaterial,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,
 };

@@ -1,1 +1,1 @@
-export {};
+export { type RelightingNodesOptions, SrbfRelightingNodes } from "./relighting_nodes";
