@@ -7,7 +7,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, ktx2, uint8, unity, unreal
+from srbf.export import dds, exr, gltf, ktx2, uint8, unity, unreal, web
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
@@ -23,6 +23,7 @@ TARGETS: dict[str, Target] = {
     "gltf": gltf.write,
     "unity": unity.write,
     "unreal": unreal.write,
+    "web": web.write,
 }
 
 

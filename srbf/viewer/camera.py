@@ -1,4 +1,4 @@
-"""The camera of a view, out of its position map: a picture alone says where its pixels lie, not from where they were seen."""
+"""The camera of a view, out of its position map: an asset says where its pixels lie, not from where they were seen."""
 
 from __future__ import annotations
 
@@ -40,7 +40,8 @@ def fitted_camera(asset: Asset) -> FittedCamera | None:
         return None
     rows, columns = np.nonzero(asset.covered)
     chosen = np.arange(0, len(rows), max(1, len(rows) // POINTS))
-    places = asset.images["position"][rows[chosen], columns[chosen]].astype(np.float64)
+    world_from_asset = np.linalg.inv(asset.asset_from_world)
+    places = asset.images["position"][rows[chosen], columns[chosen]] @ world_from_asset[:3, :3].T + world_from_asset[:3, 3]
     seen = np.stack([(columns[chosen] + 0.5) / asset.width, (rows[chosen] + 0.5) / asset.height], axis=1)
     if len(places) < 12:
         return None

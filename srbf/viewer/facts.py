@@ -36,6 +36,12 @@ def receiver_kind(asset: Asset) -> str:
     return str(kind) if kind else "view"
 
 
+def receiver_name(asset: Asset) -> str:
+    """The object or camera that the asset was baked for."""
+    receiver = asset.manifest.get("source", {}).get("receiver", {})
+    return str(receiver.get("object") or receiver.get("camera") or asset.method)
+
+
 def title(folder: Path) -> str:
     """What to call the asset in `folder`: the folder's name, or that of the one it lies in where it is just `asset`."""
     path = folder.resolve()

@@ -15,7 +15,7 @@ from srbf import files
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, SrbfError
-from srbf.export.gltf import model
+from srbf.export.web import shown_mesh
 from srbf.viewer import facts
 from srbf.viewer.built_page import page_files
 from srbf.viewer.references import References
@@ -74,7 +74,7 @@ def contents_of(folder: Path, capture: Path | None = None, mesh: Path | None = N
         references = References(Capture.open(capture))
         references.check(asset)
     notes: list[str] = []
-    shown = _mesh(asset, mesh, notes)
+    shown = shown_mesh(asset, mesh, notes)
     told = facts.facts(asset, ASSET, shown is not None, facts.title(folder), CAPTURE if references else None, tuple(notes))
     contents: dict[str, Content] = {"": page["index.html"], **page, facts.NAME: json.dumps(told).encode()}
     manifest = folder / MANIFEST
@@ -93,19 +93,6 @@ def contents_of(folder: Path, capture: Path | None = None, mesh: Path | None = N
 
 def _image(references: References, index: int) -> Callable[[], bytes]:
     return lambda: references.image(index)
-
-
-def _mesh(asset: Asset, mesh: Path | None, notes: list[str]) -> bytes | None:
-    """The model of a lightmap; None for a view, and, with a note, where the asset has none and none is given."""
-    if mesh is None and facts.receiver_kind(asset) == "view":
-        return None
-    try:
-        return model(asset, mesh)
-    except InputError as error:
-        if mesh is not None:
-            raise
-        notes.append(f"no mesh: {error}")
-        return None
 
 
 def _named(asset: Asset) -> list[str]:

@@ -16,7 +16,6 @@ import {
   type WebGLRenderer,
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
-import type { Triple } from "../src";
 import { fromThree, toThree } from "./frames";
 import { isLampState, type LightState, rounded, type SpotState } from "./light_state";
 import type { Bounds } from "./receivers";

@@ -6,6 +6,7 @@ import { type Environment, readEnvironment } from "./environment_file";
 import { directionalState, environmentState, isLampState, lightOf, type LightState, linearColor, rounded } from "./light_state";
 import { KEYS, listen } from "./keys";
 import { checkGpu, load, type Loaded } from "./loading";
+import { mapRange } from "./map_range";
 import { Panel } from "./panel";
 import { along } from "./path";
 import { Receivers } from "./receivers";
@@ -70,6 +71,7 @@ class Viewer {
     this.state = this.begun();
     this.readUrl(location.hash);
     const changed: Changed = (what = {}) => this.changed(what);
+    model?.applyMatrix4(this.relighting.sceneFromModel());
     const { width, height } = asset.manifest;
     this.stage = new Stage(this.renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, changed);
     const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : [];
@@ -264,14 +266,15 @@ class Viewer {
     const signed = value === "difference" || value === "map";
     const colour = signed ? "signed" : state.show === "false colour" ? "magnitude" : state.show === "negative" && !comparing ? "negative" : state.tone;
     uniforms.colour.value = COLOURS[colour];
-    uniforms.toneMappingExposure.value = 2 ** state.exposure;
+    const most = value === "map" ? mapRange(this.loaded.asset, state.map) : 1;
+    uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
     uniforms.split.value = comparing && state.compare === "slider" ? state.split * this.renderer.domElement.clientWidth : 0;
     this.chooseMap();
     this.stage.draw();
     this.sky.draw();
     this.panel.refresh();
     this.bearing();
-    this.legend(colour);
+    this.legend(colour, most);
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
@@ -305,9 +308,9 @@ class Viewer {
     place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · the capture saw no light there"}`;
   }
 
-  private legend(colour: keyof typeof COLOURS): void {
+  private legend(colour: keyof typeof COLOURS, range: number): void {
     const place = element("legend");
-    const most = 2 ** -this.state.exposure;
+    const most = range * 2 ** -this.state.exposure;
     const text = (x: number) => String(Number(x.toPrecision(3)));
     place.hidden = colour !== "magnitude" && colour !== "signed" && colour !== "negative";
     if (place.hidden) return;
@@ -324,7 +327,7 @@ class Viewer {
     const { asset, facts, references } = this.loaded;
     const parts = [
       `<b>${this.pace ? this.pace.toFixed(1) : "–"}</b> ms a frame`,
-      `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB on the GPU`,
+      `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU`,
     ];
     if (this.compared >= 0 && references) {
       const error = element("status").dataset.rmse;

@@ -1,4 +1,5 @@
 /** The asset relit, with what the page asks of it beyond a game: environments that are folded once, and what the clamp cuts off. */
+import type { Matrix4 } from "three";
 import { type EnvironmentLight, type FrameValues, frameValues, type Light, type Triple } from "../src";
 import { SrbfRelightingMap } from "../src/three";
 
@@ -11,6 +12,11 @@ export class ViewerRelighting extends SrbfRelightingMap {
     const frame = frameValues(this.asset, lights.filter((light) => light.kind !== "environment"));
     for (const light of lights) if (light.kind === "environment") add(frame.weights, this.sky(light), light.color);
     return frame;
+  }
+
+  /** From a model in the asset's frame, y up as glTF is, to three's world. */
+  sceneFromModel(): Matrix4 {
+    return this.assetFromScene().invert().multiply(this.worldFromScene);
   }
 
   set(lights: readonly Light[]): void {
