@@ -19,7 +19,7 @@ import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State } from "./state";
 
 const FRAMES_A_SECOND = 24;
-const URL_EVERY = 250; // milliseconds
+const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const TOAST = 8000;
 const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
 
@@ -151,11 +151,13 @@ class Viewer {
     document.body.dataset.state = "busy";
     if (what.lights) this.lightsChanged = true;
     if (what.panel) this.panel.rebuild();
+    document.body.dataset.address = "old";
     if (!this.urlTimer) {
       this.urlTimer = window.setTimeout(() => {
         this.urlTimer = 0;
         this.written = encodeState(this.state);
         history.replaceState(undefined, "", this.written);
+        document.body.dataset.address = "written";
       }, URL_EVERY);
     }
   }
@@ -167,7 +169,7 @@ class Viewer {
     if (this.state.playing) this.play(since / 1000);
     else this.base = undefined;
     if (!this.drawNeeded) {
-      if (document.body.dataset.state === "busy" && !this.waiting && !this.urlTimer) document.body.dataset.state = "idle";
+      if (document.body.dataset.state === "busy" && !this.waiting) document.body.dataset.state = "idle";
       return;
     }
     if (since < 1000) this.pace = this.pace ? 0.9 * this.pace + 0.1 * since : since;
@@ -490,15 +492,16 @@ async function main(): Promise<void> {
   document.body.dataset.state = "busy";
   try {
     const loaded = await load((done, name) => {
+      if (document.body.dataset.state === "failed") return;
       bar.value = done;
       what.textContent = name ? `Loading ${name.split("/").pop()}` : "Loading";
     });
     new Viewer(loaded);
     loading.remove();
   } catch (error) {
+    document.body.dataset.state = "failed";
     loading.classList.add("failed");
     what.textContent = lineOf(error);
-    document.body.dataset.state = "failed";
   }
 }
 

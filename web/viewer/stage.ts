@@ -23,6 +23,7 @@ import { screenMaterial, type ScreenUniforms } from "./screen";
 import type { Changed, State } from "./state";
 
 const BACKGROUND = new Color(0x0f1114);
+const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes what it clears a canvas to, not a target
 const MOST_PIXEL_RATIO = 2;
 
 export class Stage {
@@ -122,7 +123,7 @@ export class Stage {
       this.uniforms.nearest.value = true;
     }
     this.renderer.autoClear = true;
-    this.renderer.setClearColor(BACKGROUND);
+    this.renderer.setClearColor(BACKGROUND_BYTES);
     this.renderer.setRenderTarget(target);
     this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
     const upward = new Uint8Array(4 * width * height);
