@@ -74,18 +74,20 @@ def orbit_pixel(place: np.ndarray, eye: np.ndarray, target: np.ndarray) -> np.nd
 def test_a_lightmap_is_shown_on_its_mesh(chromium: Any, lightmap: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
     """Pixel by pixel through the camera that the address names; then the camera is turned, and a lamp put above what is clicked."""
     lightmap.save(tmp_path / "asset")
-    eye, target = np.array([0.8, -2.2, 2.4]), np.array([0.1, 0.0, 0.2])
-    where = f"#{{'eye':[{eye.tolist()},{target.tolist()}],'selected':-1}}"
+    eye, target = np.array([0.8, -3.6, 3.8]), np.array([0.1, 0.0, 0.2])
+    where = f"#{{'eye':[{eye.tolist()},{target.tolist()}],'selected':-1,'exposure':-1.5}}"
     chromium("open", url=serve(tmp_path / "asset") + where, width=WIDTH, height=HEIGHT)
     (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
     shown = read_image(tmp_path / "saved.png", 3) * 255  # as the canvas has it, without the sun's marker
     assert shown.shape[:2] == CANVAS[::-1]
     bare = (np.abs(chromium.canvas().astype(float) - shown) <= 1).all(axis=2)
     assert bare.mean() > 0.95
-    expected = shown_as(relight(lightmap, [DirectionalLight((-0.45, -0.5, 0.74))]))
+    expected = shown_as(relight(lightmap, [DirectionalLight((-0.45, -0.5, 0.74))]), -1.5)
     places = [(5, 7), (20, 50), (33, 12), (34, 52), (8, 44)]
     for row, column in places:
         x, y = orbit_pixel(lightmap.images["position"][row, column], eye, target)
+        assert 0 < x < CANVAS[0]
+        assert 0 < y < CANVAS[1]
         assert np.abs(shown[int(y), int(x)] - expected[row, column]).max() <= 3, (row, column)
     x, y = orbit_pixel(lightmap.images["position"][33, 12], eye, target)
     chromium("click", at=[x, y], count=2)
