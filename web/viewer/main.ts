@@ -21,6 +21,7 @@ import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type Sta
 const FRAMES_A_SECOND = 24;
 const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const TOAST = 8000;
+const PACES = 15; // frames whose median is told
 const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
 
 const element = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;
@@ -54,7 +55,7 @@ class Viewer {
   private wanted = -1;
   private error = "";
   private last = 0;
-  private pace = 0;
+  private readonly paces: number[] = [];
   private urlTimer = 0;
   private written = "";
 
@@ -74,7 +75,7 @@ class Viewer {
     model?.applyMatrix4(this.relighting.sceneFromModel());
     const { width, height } = asset.manifest;
     this.stage = new Stage(this.renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, changed);
-    const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : [];
+    const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : asset.basis.functions.centers;
     const points: readonly SkyPoint[] = references?.lights ?? centers.map((direction): SkyPoint => ({ direction, role: "center" }));
     this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, points, changed);
     this.panel = new Panel(
@@ -172,7 +173,8 @@ class Viewer {
       if (document.body.dataset.state === "busy" && !this.waiting) document.body.dataset.state = "idle";
       return;
     }
-    if (since < 1000) this.pace = this.pace ? 0.9 * this.pace + 0.1 * since : since;
+    this.paces.push(since);
+    if (this.paces.length > PACES) this.paces.shift();
     this.drawNeeded = false;
     try {
       if (this.lightsChanged) this.relight();
@@ -327,8 +329,9 @@ class Viewer {
 
   private status(): void {
     const { asset, facts, references } = this.loaded;
+    const pace = [...this.paces].sort((a, b) => a - b)[this.paces.length >> 1] ?? 0;
     const parts = [
-      `<b>${this.pace ? this.pace.toFixed(1) : "–"}</b> ms a frame`,
+      `<b>${pace.toFixed(1)}</b> ms a frame`,
       `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU`,
     ];
     if (this.compared >= 0 && references) {
@@ -365,6 +368,7 @@ class Viewer {
     });
     const help = element<HTMLDialogElement>("help");
     help.addEventListener("click", () => help.close());
+    element("keys").addEventListener("click", () => help.showModal());
     const next = <T>(list: readonly T[], now: T) => list[(list.indexOf(now) + 1) % list.length];
     listen(this.state, changed, {
       reset: () => this.stage.resetCamera(),
