@@ -3,6 +3,7 @@ import { Matrix4, Vector4 } from "three";
 import { int, ivec2, texture, textureLoad, uniform, uniformArray } from "three/tsl";
 import type { Asset } from "../../asset";
 import { SrbfError } from "../../errors";
+import { packedLamps } from "../../lamp";
 import { type FrameValues, paddedCenters } from "../../shader";
 import type { Filter, SrbfTextures } from "../textures";
 import { LAMP_ROWS, type N, texelAt } from "./nodes";
@@ -66,14 +67,8 @@ export class NodeInputs {
       (weights.image.data as Float32Array).set(frame.weights);
       weights.needsUpdate = true;
     }
-    frame.lamps.forEach((lamp, i) => {
-      const rows = this.lampVectors.slice(LAMP_ROWS * i, LAMP_ROWS * (i + 1));
-      rows[0].set(...lamp.position, lamp.a0);
-      rows[1].set(...lamp.positionLow, lamp.radius);
-      rows[2].set(...lamp.color, lamp.falloff);
-      rows[3].set(...lamp.axis, lamp.versineInner);
-      rows[4].set(lamp.versineOuter, 0, 0, 0);
-    });
+    const packed = packedLamps(frame.lamps, this.maxLamps);
+    this.lampVectors.forEach((vector, i) => vector.fromArray(packed, 4 * i));
     this.lampCount.value = frame.lamps.length;
   }
 }

@@ -63,18 +63,18 @@ function lookup(table: N, size: number, columns: number, index: N, place: N): N 
   return mix(mix(fetch(0, 0), fetch(1, 0), fraction.x), mix(fetch(0, 1), fetch(1, 1), fraction.x), fraction.y);
 }
 
-/** Where lamps lie in their uniform array: five vec4 each. */
-export const LAMP_ROWS = 5;
+/** Where lamps lie in their uniform array: four vec4 each, as `packedLamps` writes them. */
+export const LAMP_ROWS = 4;
 
 /** A lamp's strength times its colour, and the unit direction to it, at a receiver (metres, the asset's frame). */
 export function lampAt(lamps: N, lamp: N, receiver: N): { light: N; direction: N } {
   const row = (i: number) => lamps.element(lamp.mul(LAMP_ROWS).add(i));
-  const [place, low, color, axis, cone] = [0, 1, 2, 3, 4].map(row);
+  const [place, low, color, axis] = [0, 1, 2, 3].map(row);
   const lightVector = place.xyz.sub(receiver).add(low.xyz).toVar();
   const direction = lightDirection(lightVector).toVar();
-  const ratio = place.w.div(max(length(lightVector), low.w)).toVar();
-  const attenuation = select(color.w.greaterThan(0.5), ratio.mul(ratio), ratio);
-  const t = clamp(cone.x.sub(versine(direction.negate(), axis.xyz)).div(max(cone.x.sub(axis.w), 1e-6)), 0, 1).toVar();
+  const inverse = max(length(lightVector), place.w).reciprocal().toVar();
+  const attenuation = select(low.w.greaterThan(0.5), inverse.mul(inverse), inverse);
+  const t = clamp(axis.w.sub(versine(direction.negate(), axis.xyz)).div(max(axis.w.sub(color.w), 1e-6)), 0, 1).toVar();
   const smooth = t.mul(t).mul(float(3).sub(t.mul(2)));
   return { light: color.xyz.mul(attenuation.mul(smooth)), direction };
 }
