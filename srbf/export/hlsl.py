@@ -6,9 +6,12 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
+from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, rows_of
+from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     SAMPLERS,
     VECTORS,
@@ -64,9 +67,9 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
     What the pack asks for by `#define` (`SRBF_K`, `SRBF_SCALARS`) the including shader defines first.
     Raises ShaderError on GLSL that HLSL has no word for.
     """
-    files = pack_files(paths, root)
-    writer = HlslWriter(files)
-    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in files)])
+    pack = pack_files(paths, root)
+    writer = HlslWriter(pack)
+    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in pack)])
 
 
 def asset_include(asset: Asset) -> str:
@@ -86,11 +89,19 @@ def asset_include(asset: Asset) -> str:
     return "\n".join([HEADING, defines + "\n", PRELUDE, *pack, arrays + "\n", writer.file(shader.own).strip() + "\n"])
 
 
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and `srbf.hlsl`, which relights it. Raises what `asset_include` raises."""
+    asset_include(asset)  # refuses before anything is written
+    written = exr.write(asset, folder, settings)
+    files.write_text(folder / "srbf.hlsl", asset_include(Asset.open(folder)))
+    return written
+
+
 class HlslWriter(Writer):
     """HLSL of parsed files."""
 
-    def __init__(self, files: list[PackFile]) -> None:
-        super().__init__(files, TYPES, WORDS, RESERVED)
+    def __init__(self, pack: list[PackFile]) -> None:
+        super().__init__(pack, TYPES, WORDS, RESERVED)
 
     def constant(self, item: Constant) -> str:
         return f"static const {self.type(item.type)} {item.name} = {self.expression(item.value)};"

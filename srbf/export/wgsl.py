@@ -6,9 +6,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
+from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     ASSIGNMENTS,
     SAMPLERS,
@@ -57,8 +60,8 @@ def module(paths: Iterable[str], defines: Mapping[str, object], root: Path | Non
     Raises ShaderError where a define is missing or WGSL has no word for something.
     """
     known = set(defines)
-    files = pack_files(paths, root, lambda text, path: preprocess(text, path, known))
-    return "\n".join([HEADING + constants(defines), *_texts(WgslWriter(files))])
+    pack = pack_files(paths, root, lambda text, path: preprocess(text, path, known))
+    return "\n".join([HEADING + constants(defines), *_texts(WgslWriter(pack))])
 
 
 def asset_module(asset: Asset) -> str:
@@ -73,6 +76,14 @@ def asset_module(asset: Asset) -> str:
     )
     *pack, own = _texts(WgslWriter(shader.files))
     return "\n".join([HEADING + constants(shader.defines), *pack, arrays + "\n", own.removeprefix("// from glsl/asset\n")])
+
+
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and `srbf.wgsl`, which relights it. Raises what `asset_module` raises."""
+    asset_module(asset)  # refuses before anything is written
+    written = exr.write(asset, folder, settings)
+    files.write_text(folder / "srbf.wgsl", asset_module(Asset.open(folder)))
+    return written
 
 
 def constants(defines: Mapping[str, object]) -> str:
@@ -113,8 +124,8 @@ def preprocess(text: str, path: str, known: set[str]) -> str:
 class WgslWriter(Writer):
     """WGSL of files without directives."""
 
-    def __init__(self, files: list[PackFile]) -> None:
-        super().__init__(files, TYPES, WORDS, RESERVED)
+    def __init__(self, pack: list[PackFile]) -> None:
+        super().__init__(pack, TYPES, WORDS, RESERVED)
         self.pointers: frozenset[str] = frozenset()  # the `out` parameters of the function at hand
 
     def constant(self, item: Constant) -> str:
