@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -15,6 +15,9 @@ from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, vectors_free
 from srbf.lights import PointLight
+
+if TYPE_CHECKING:
+    import moderngl
 
 VECTORS_A_LAYER = 2  # scale, bias
 VECTORS_FOLDED = 3  # the weights of four scalars, a colour each
@@ -29,6 +32,7 @@ class PlanePasses:
         self._clustered = "cluster_index" in asset.tables
         self._free = vectors_free(limits)
         self._lamps = lamps_a_pass(self._free, VECTORS_A_LAYER)
+        self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
 
     def check_lamps(self) -> None:
         """Scalar planes have light functions for every direction."""
@@ -51,6 +55,11 @@ class PlanePasses:
             offset = rows[0, 0, :3] if first == 0 else np.zeros(3)
             values = {"firstLayer": first, "weights": rows[0, 1 + 3 * first :][: 3 * count], "offset": tuple(offset.tolist())}
             self._run_far(first, count, units, values)
+
+    def weighted(self, weights: moderngl.Texture) -> None:
+        """All directional and environment lights, by weights that are on the GPU."""
+        weights.use(2)
+        self._over_layers("directional.frag", {}, {"weights": 2}, self.layers_a_pass(1))
 
     def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` layers of four scalars a pass."""
@@ -95,7 +104,7 @@ class PlanePasses:
         for first, count in ranges(len(scale), size):
             own = {"firstLayer": first, "scale": scale[first : first + count], "bias": bias[first : first + count]}
             counts = {"SRBF_SCALARS": self._asset.scalars, "SRBF_LAYERS": count}
-            self._programs.run(f"{self._method}_{lights}", counts | defines, values | own)
+            self._programs.run(f"{self._method}_{lights}", counts | defines | self._defines, values | own)
 
 
 def folded_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[ndarray, "C n 4"]:

@@ -23,14 +23,17 @@ FOLDED: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 288)]  # 
 # 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
 LAMPS: list[dict[str, object]] = [{"SRBF_LAMPS": 1}, {"SRBF_LAMPS": 16}, {"SRBF_LAMPS": 16, "SRBF_DEPTH": 1}]
 LIT_MAPS = [{"SRBF_K": k} | lamps for k in (1, 25, 32) for lamps in LAMPS] + [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_FORMULA": 1}]
-LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS]
+LIT_MAPS += [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
+LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS] + [{"SRBF_SCALARS": 9, "SRBF_LAMPS": 4, "SRBF_PLAIN": 1}]
 UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range(1, 9))]
 METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
-    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1})],
+    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1}, {"SRBF_PAIRS": 1, "SRBF_PLAIN": 1})],
     "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
+    "weighted.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
+    "environment_rows.frag": [{}, {"SRBF_FORMULA": 1}],
     **{f"{method}folded.frag": FOLDED for method in METHODS[1:]},
     **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
     **{f"{method}accumulate.frag": UNITS for method in METHODS},
@@ -44,7 +47,8 @@ def test_every_method_has_the_same_stages() -> None:
     kinds = ["accumulate", "directional", "folded", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
     shadows = ["direct.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
-    assert sorted([*methods, *shadows, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    skies = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
+    assert sorted([*methods, *shadows, *skies, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
