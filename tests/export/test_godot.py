@@ -138,5 +138,5 @@ def as_glsl(text: str, folder: Path) -> str:
     text = re.sub(r"^(uniform [\w ]+(?:\[\w+\])?) : [\w, ]+(;| =)", r"\1\2", text, flags=re.M)
     text = re.sub(r"^varying ", "in ", text, flags=re.M)
     text = re.sub(r"^void vertex\(\) \{.*?^\}$", "", text, flags=re.M | re.S)
-    built_in = "in vec2 UV; in vec2 UV2; out vec4 COLOR; vec3 ALBEDO; const float PI = 3.14159265;\n"
-    return f"#version 330 core\n{built_in}{text}\nvoid main() {{ fragment(); COLOR.rgb += ALBEDO; }}\n"
+    built_in = "in vec2 UV; in vec2 UV2; out vec4 COLOR; vec3 ALBEDO; vec4 IRRADIANCE, RADIANCE; float SPECULAR, ROUGHNESS; const float PI = 3.14159265;\n"
+    return f"#version 330 core\n{built_in}{text}\nvoid main() {{ fragment(); COLOR.rgb += ALBEDO * IRRADIANCE.rgb; }}\n"
