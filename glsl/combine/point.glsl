@@ -3,12 +3,11 @@
    use:    vec3 srbfCombinePoint(sampler2DArray maps, vec2 uv, int firstMap, sampler2D rTable, vec3 lightDirection,
                                  vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
    domain: layers firstMap ... firstMap + SRBF_K - 1 of maps; lightDirection of length 1, or 0 where the receiver lies in the lamp;
-           centers.xyz unit, of the same maps; result signed, for unit irradiance
+           centers as srbfCenterWeight takes them, of the same maps; result signed, for unit irradiance
    twin:   srbf.methods.relighting_map.receiver_weights
    cite:   Wong2005, fig. 8 and "Point-Source Shader" */
-#include "basis/weight.glsl"
+#include "combine/center_weight.glsl"
 #include "combine/decode.glsl"
-#include "lights/versine.glsl"
 
 #ifndef SRBF_K
 #error define SRBF_K: how many maps this pass combines
@@ -18,7 +17,7 @@ vec3 srbfCombinePoint(highp sampler2DArray maps, vec2 uv, int firstMap, highp sa
                       vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K]) {
     vec3 sum = vec3(0.0);
     for (int i = 0; i < SRBF_K; ++i) {
-        float weight = srbfWeight(rTable, 1.0 - srbfVersine(lightDirection, centers[i].xyz));
+        float weight = srbfCenterWeight(rTable, lightDirection, centers[i]);
         vec3 stored = textureLod(maps, vec3(uv, float(firstMap + i)), 0.0).rgb;
         sum += weight * srbfDecode(stored, scale[i].rgb, bias[i].rgb);
     }

@@ -12,6 +12,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 from srbf.asset import Asset
+from srbf.depth import DepthView
 from srbf.errors import InputError
 from srbf.gl.context import Limits, create_context
 from srbf.gl.programs import Programs
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import moderngl
 
 Target = Literal["float", "half"]
+Functions = Literal["table", "formula"]
 
 UNITS = 5  # maps, or images of four planes, a pass of the multi-pass variant
 MAX_UNITS = 8  # as many terms as stages/accumulate.frag spells out
@@ -51,16 +53,27 @@ class Relighter:
     """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
 
     Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
-    it makes a headless one of its own.
+    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. With a `view` receivers stand
+    where its depth buffer says, not where the position map does.
     Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
     """
 
-    def __init__(self, asset: Asset, *, target: Target = "float", context: moderngl.Context | None = None) -> None:
+    def __init__(
+        self,
+        asset: Asset,
+        *,
+        target: Target = "float",
+        context: moderngl.Context | None = None,
+        functions: Functions = "table",
+        view: DepthView | None = None,
+    ) -> None:
         if asset.method not in PASSES:
             raise InputError(f"expected an asset of {', '.join(PASSES)}, found {asset.method}: no shader relights it")
         if target not in get_args(Target):
             raise InputError(f"expected a target of float, half, found {target!r}")
-        self._asset = asset
+        if functions not in get_args(Functions):
+            raise InputError(f"expected functions by table, formula, found {functions!r}")
+        self._asset, self._located = asset, view is not None or "position" in asset.images
         self._context = create_context() if context is None else context
         self._resources = ExitStack()
         self._owned, self._open = context is None, True
@@ -68,14 +81,14 @@ class Relighter:
         try:
             with self._context:
                 self._limits = Limits.of(self._context)
-                self._textures = AssetTextures(self._context, asset, self._limits, self._resources)
+                self._textures = AssetTextures(self._context, asset, self._limits, self._resources, view)
                 self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
                 _, self._relit_buffer = self._target(self._type)
                 self._programs = Programs(self._context, self._resources)
         except BaseException:
             self.close()
             raise
-        self._passes = PASSES[asset.method](asset, self._programs, self._textures, self._limits)
+        self._passes = PASSES[asset.method](asset, self._programs, self._textures, self._limits, functions == "formula")
 
     def __enter__(self) -> Relighter:
         return self
@@ -114,7 +127,7 @@ class Relighter:
             raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
         inside = [moved(light, self._asset.asset_from_world) for light in lights]
         lamps = [light for light in inside if isinstance(light, PointLight)]
-        if lamps and "position" not in self._asset.images:
+        if lamps and not self._located:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if lamps:
             self._passes.check_lamps()
@@ -123,10 +136,12 @@ class Relighter:
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)
-            if weights.any():
-                self._passes.far(weights, units if multipass else None)
-            for lamp in lamps:
-                self._passes.lamp(lamp, units if multipass else None)
+            at_once = units if multipass else None
+            if weights.any() and (multipass or not lamps):
+                self._passes.far(weights, at_once)
+                weights = 0 * weights
+            if lamps:
+                self._passes.lamps(lamps, weights, at_once)
             if direct is not None:
                 with self._textures.passing(direct) as texture:
                     texture.use(0)

@@ -1,7 +1,8 @@
-"""Passes that relight relighting maps: all far lights in one, or the article's few maps a pass, and one for each lamp."""
+"""Passes that relight relighting maps: all lights in one, far lights by folded weights, or the article's few maps a pass."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,19 +14,21 @@ from srbf.errors import InputError
 from srbf.gl.context import Limits
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
-from srbf.gl.uniforms import VECTORS_KEPT_FREE, lamp_uniforms, padded
+from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, padded, vectors_free
 from srbf.lights import PointLight
 
-VECTORS_A_MAP = 3  # weight or center, scale, bias
+VECTORS_A_MAP = 4  # weight, center, scale, bias
 
 
 class MapPasses:
     """Passes over an asset of relighting maps; each adds to the target in use."""
 
-    def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits) -> None:
+    def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
         self._asset, self._programs, self._textures = asset, programs, textures
         self._scale, self._bias = padded(asset.scale), padded(asset.bias)
-        self.layers_a_pass = max(1, (limits.fragment_vectors - VECTORS_KEPT_FREE) // VECTORS_A_MAP)
+        self._free = vectors_free(limits)
+        self._lamps = lamps_a_pass(self._free, VECTORS_A_MAP)
+        self._formula = formula
 
     def check_lamps(self) -> None:
         """InputError where the shaders know no formula for the functions of a lamp's direction."""
@@ -33,27 +36,48 @@ class MapPasses:
         if kind != "gaussian":
             raise InputError(f"expected Gaussians for point and spot lights on the GPU, found {kind}; relight them by numpy")
 
+    def layers_a_pass(self, lamps: int) -> int:
+        """Maps that a pass of so many lamps holds the uniforms of."""
+        vectors = VECTORS_A_MAP if lamps else 1
+        return max(1, (self._free - VECTORS_A_LAMP * lamps) // vectors)
+
     def far(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
         """All directional and environment lights; `units` maps a pass as plain textures, or all that uniforms hold from an array."""
         if units is not None:
             self._accumulate(weights, units)
             return
         self._textures.layers().use(0)
-        for first, count in ranges(self._asset.k, self.layers_a_pass):
-            values = {"firstMap": first, "maps": 0, "weights": padded(weights[first : first + count])}
-            self._programs.run("directional.frag", {"SRBF_K": count}, values | self._decoding(first, count))
+        folded, offset = padded(weights * self._asset.scale), (weights * self._asset.bias).sum(axis=0)
+        for first, count in ranges(self._asset.k, self.layers_a_pass(0)):
+            values = {"firstMap": first, "maps": 0, "weights": folded[first : first + count]}
+            values["offset"] = tuple((offset if first == 0 else 0 * offset).tolist())
+            self._programs.run("folded.frag", {"SRBF_K": count}, values)
 
-    def lamp(self, light: PointLight, units: int | None) -> None:
-        """One point or spot light."""
+    def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "K 3"], units: int | None) -> None:
+        """Point and spot lights, and the far lights' `weights` with the first of them; `units` maps a pass."""
         self._textures.layers().use(0)
-        self._textures.positions().use(1)
+        where, values = self._textures.receivers(1)
         self._textures.r_table().use(2)
         centers = padded(self._asset.basis.centers)
-        values: dict[str, Any] = {"maps": 0, "positions": 1, "rTable": 2}
-        values |= {f"lamp.{name}": value for name, value in lamp_uniforms(light).items()}
-        for first, count in ranges(self._asset.k, units or self.layers_a_pass):
-            values |= {"firstMap": first, "centers": centers[first : first + count]}
-            self._programs.run("point.frag", {"SRBF_K": count}, values | self._decoding(first, count))
+        if self._formula:
+            centers[:, 3] = 0.5 / self._asset.basis.spread**2
+        values |= {"maps": 0, "rTable": 2}
+        if len(lights) == 1 and not weights.any() and not where:
+            values |= {f"lamp.{name}": value for name, value in lamp_uniforms(lights[0]).items()}
+            self._over_maps("point.frag", {}, values, {"centers": centers}, units or self.layers_a_pass(1))
+            return
+        far = padded(weights)
+        for group, places in lamp_groups(lights, self._lamps):
+            values |= {"lamps": packed_lamps(group, places), "lampCount": len(group)}
+            arrays = {"centers": centers, "weights": far}
+            self._over_maps("lights.frag", {"SRBF_LAMPS": places} | where, values, arrays, units or self.layers_a_pass(places))
+            far = np.zeros_like(far)
+
+    def _over_maps(self, stage: str, defines: dict[str, int], values: dict[str, Any], arrays: dict[str, ndarray], size: int) -> None:
+        defines = defines | ({"SRBF_FORMULA": 1} if self._formula else {})
+        for first, count in ranges(self._asset.k, size):
+            own = {name: array[first : first + count] for name, array in arrays.items()} | self._decoding(first, count)
+            self._programs.run(stage, {"SRBF_K": count} | defines, values | {"firstMap": first} | own)
 
     def _accumulate(self, weights: Float64[ndarray, "K 3"], units: int) -> None:
         for first, count in ranges(self._asset.k, units):

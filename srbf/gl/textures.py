@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.asset import Asset
-from srbf.errors import ShaderError
+from srbf.depth import DepthView
+from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
+from srbf.gl.uniforms import camera_uniforms
 
 if TYPE_CHECKING:
     import moderngl
@@ -22,12 +24,18 @@ _DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is 
 class AssetTextures:
     """Textures of one asset, each made when first asked for; released with `resources`."""
 
-    def __init__(self, context: moderngl.Context, asset: Asset, limits: Limits, resources: ExitStack) -> None:
+    def __init__(
+        self, context: moderngl.Context, asset: Asset, limits: Limits, resources: ExitStack, view: DepthView | None = None
+    ) -> None:
+        if view is not None and view.samples.shape != (asset.height, asset.width):
+            raise InputError(
+                f"expected {asset.height} x {asset.width} depth samples, found {view.samples.shape}; render the asset's picture"
+            )
         looked_up = [table.shape[:2] for name, table in asset.tables.items() if name != "light_coefficients"]  # these stay on the host
         side = max(asset.width, asset.height, asset.manifest.get("scalars", 0) + 1, *map(max, looked_up))
         if side > limits.texture_size:
             raise ShaderError(f"expected at most {limits.texture_size} texels a side on this GPU, found {side}; shrink the asset")
-        self._context, self._asset, self._limits, self._resources = context, asset, limits, resources
+        self._context, self._asset, self._limits, self._resources, self._view = context, asset, limits, resources, view
         self._made: dict[str, moderngl.Texture] = {}
         self._layers: moderngl.TextureArray | None = None
 
@@ -64,10 +72,16 @@ class AssetTextures:
         """The cluster of every texel, R8."""
         return self._plain("cluster_index", self._asset.tables["cluster_index"][..., None])
 
-    def positions(self) -> moderngl.Texture:
-        """The position map, RGBA32F."""
+    def receivers(self, unit: int) -> tuple[dict[str, int], dict[str, Any]]:
+        """Where the receivers are, bound to a texture unit, as (defines, uniforms): the position map, or what a camera's depths say."""
+        if self._view is not None:
+            self._plain("depth", self._view.samples[..., None]).use(unit)
+            camera = {f"camera.{name}": value for name, value in camera_uniforms(self._view.camera).items()}
+            return {"SRBF_DEPTH": 1}, {"depths": unit, **camera}
         position = self._asset.images["position"]
-        return self._plain("position", np.concatenate([position, np.ones_like(position[..., :1])], axis=2, dtype=np.float32))
+        padded = np.concatenate([position, np.ones_like(position[..., :1])], axis=2, dtype=np.float32)
+        self._plain("position", padded).use(unit)
+        return {}, {"positions": unit}
 
     def ambient(self) -> moderngl.Texture:
         """The ambient image, or one black texel."""

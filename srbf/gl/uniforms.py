@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32
+from srbf.depth import DepthCamera
+from srbf.gl.context import Limits
 from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE
 VECTORS_KEPT_FREE = 32  # vec4 for the lamp and what drivers take for themselves
+VECTORS_A_LAMP = 4
+MOST_LAMPS = 16  # a pass
 NO_CONE = (3.0, 4.0)  # versines past every angle: the cone of a point light is 1 everywhere
 
 
@@ -42,6 +47,53 @@ def lamp_uniforms(light: PointLight) -> dict[str, Any]:
         "versineInner": inner,
         "versineOuter": outer,
         "falloff": FALLOFF[light.falloff],
+    }
+
+
+def vectors_free(limits: Limits) -> int:
+    """vec4 uniforms that a pass may fill with arrays."""
+    return limits.fragment_vectors - VECTORS_KEPT_FREE
+
+
+def lamps_a_pass(free: int, vectors_a_layer: int) -> int:
+    """How many lamps a pass takes: a power of two that leaves half of the `free` uniforms to layers, where that many are needed."""
+    lamps = MOST_LAMPS
+    while lamps > 1 and VECTORS_A_LAMP * lamps > max(free // 2, free - 32 * vectors_a_layer):
+        lamps //= 2
+    return lamps
+
+
+def lamp_groups(lamps: Sequence[PointLight], most: int) -> Iterator[tuple[Sequence[PointLight], int]]:
+    """(lamps of a pass, places in its array) of at most `most`; places are powers of two, so that few programs serve any number."""
+    for first in range(0, len(lamps), most):
+        group = lamps[first : first + most]
+        yield group, 1 << (len(group) - 1).bit_length()
+
+
+def packed_lamps(lamps: Sequence[PointLight], count: int) -> Float32[ndarray, "rows 4"]:
+    """Point and spot lights, already in the asset's frame, four vec4 each; zeros up to `count` lamps (4 count rows).
+
+    They hold (position, radius), (positionLow, falloff), (colour, versineInner), (axis, versineOuter); the colour is the irradiance
+    at 1 m, so that a0 needs no place of its own.
+    """
+    rows = np.zeros((count, 4, 4), np.float32)
+    for row, light in zip(rows, lamps, strict=False):
+        u = lamp_uniforms(light)
+        at_one = light.a0 if light.falloff == "linear" else light.a0**2
+        row[0] = *u["position"], u["radius"]
+        row[1] = *u["positionLow"], u["falloff"]
+        row[2] = *(at_one * component for component in light.color), u["versineInner"]
+        row[3] = *u["axis"], u["versineOuter"]
+    return rows.reshape(-1, 4)
+
+
+def camera_uniforms(camera: DepthCamera) -> dict[str, Any]:
+    """Members of the shader's SrbfCamera."""
+    vectors = {name: getattr(camera, name) for name in ("eye", "forward", "centre", "across", "up")}
+    return {
+        **{name: tuple(vector.tolist()) for name, vector in vectors.items()},
+        "depthTerms": tuple(camera.depth_terms.tolist()),
+        "orthographic": float(camera.orthographic),
     }
 
 

@@ -16,6 +16,7 @@ from srbf.gl.context import Limits
 from srbf.gl.relighter import Relighter, relight
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
 from srbf.methods.relighting_map import folded_weights, receiver_weights
+from srbf.receivers import light_vectors
 
 FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times colour and attenuation)
 HALF = 2 * 2.0**-10  # the contract: two steps of a half float
@@ -115,6 +116,48 @@ def test_half_target_is_within_two_half_steps(relighter_of: Callable[..., Any], 
     assert (np.abs(found - methods.relight(asset, lights)) <= tolerance(asset, lights, "half")).all()
 
 
+def lamps(count: int) -> list[Light]:
+    """Points and spots of every kind, all over the receivers."""
+    rng = np.random.default_rng(9)
+    made: list[Light] = []
+    for i in range(count):
+        position, color = rng.uniform(-1, 1, 3) * [1.5, 1.5, 1] + [0, 0, 1.2], rng.random(3) / count
+        falloff = ("linear", "inverse-square")[i % 2]
+        if i % 3 == 2:
+            made.append(SpotLight(tuple(position), tuple(color), 1.5, falloff, direction=tuple(-position), inner=0.2, outer=0.9))  # type: ignore[arg-type]
+        else:
+            made.append(PointLight(tuple(position), tuple(color), 0.8, falloff))  # type: ignore[arg-type]
+    return made
+
+
+@pytest.mark.parametrize("far", [False, True], ids=["lamps", "with-far"])
+@pytest.mark.parametrize("count", [2, 5, 16, 19])
+def test_many_lamps_at_once_equal_numpy(relighter_of: Callable[..., Any], count: int, far: bool) -> None:
+    asset, relighter = relighter_of(25, "half", "float")
+    lights = lamps(count) + (LIGHTS["directional"] + LIGHTS["environment"] if far else [])
+    found = relighter.relight(lights)
+    assert (np.abs(found - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
+    assert (np.abs(relighter.relight(lights, multipass=True) - found) <= 2 * tolerance(asset, lights)).all()
+
+
+def test_lamps_by_formula_are_as_near_as_the_table_is(context: Any, make_asset: Callable[..., Asset]) -> None:
+    """numpy reads the table, which is within 2^-12 of the formula; a sharper truth is R itself."""
+    asset = make_asset(25, "float")
+    lights = lamps(3)
+    exact = np.zeros((asset.height, asset.width, 3))
+    for light in lights:
+        assert isinstance(light, PointLight)
+        unit, strength = light_vectors(light, asset.images["position"])
+        weights = asset.basis.evaluate(unit.reshape(-1, 3)).reshape(*unit.shape[:2], -1)
+        exact += np.einsum("khwc,hwk->hwc", asset.coefficients(), weights) * strength[..., None] * light.color
+    with Relighter(asset, context=context, functions="formula") as relighter:
+        assert (np.abs(relighter.relight(lights) - np.maximum(exact, 0)) <= tolerance(asset, lights)).all()
+        alone = relighter.relight(lights[:1])
+    with Relighter(asset, context=context) as relighter:
+        by_table = relighter.relight(lights[:1])
+    assert 0 < np.abs(alone - by_table).max() < 2.0**-12 * np.abs(asset.coefficients()).sum(axis=0).max()
+
+
 @pytest.mark.parametrize("units", [1, 3, 8])
 def test_any_number_of_units_gives_the_same_image(relighter_of: Callable[..., Any], units: int) -> None:
     asset, relighter = relighter_of(25, "half", "float")
@@ -132,12 +175,12 @@ def test_two_hundred_maps(context: Any, make_asset: Callable[..., Asset], spread
 
 
 def test_more_maps_than_uniforms_hold_take_several_passes(context: Any, make_asset: Callable[..., Asset], monkeypatch: Any) -> None:
-    limits = replace(Limits.of(context), fragment_vectors=62)  # 10 maps a pass
+    limits = replace(Limits.of(context), fragment_vectors=62)  # 30 to fill
     monkeypatch.setattr(Limits, "of", staticmethod(lambda _: limits))
     asset = make_asset(25, "uint8")
     with Relighter(asset, context=context) as relighter:
         lights = LIGHTS["several"]
-        assert relighter._passes.layers_a_pass == 10
+        assert [relighter._passes.layers_a_pass(lamps) for lamps in (0, 1, 2)] == [30, 6, 5]
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 

@@ -43,6 +43,7 @@ LIGHTS: dict[str, list[Light]] = {
     "hundred": [DirectionalLight((x, 0.2, 0.9), (0.01, 0.02, 0.03)) for x in np.linspace(-1, 1, 100).tolist()],
     "point": [PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "spot": [SPOT],
+    "two lamps": [SPOT, PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "several": [
         DirectionalLight((0.3, -0.5, 0.4), (0.2, 0.8, 0.3)),
         PointLight((-0.4, 0.6, -0.9), (1.0, 0.5, 2.0), falloff="inverse-square"),
@@ -118,6 +119,20 @@ def test_equals_numpy(relighter_of: Get, scalars: int, clusters: int | None, enc
     assert (np.abs(found - expected) <= tolerance(asset, lights)).all()
 
 
+@pytest.mark.parametrize("far", [False, True], ids=["lamps", "with-far"])
+@pytest.mark.parametrize("count", [5, 19])
+@pytest.mark.parametrize("clusters", [None, 5])
+def test_many_lamps_at_once_equal_numpy(relighter_of: Get, clusters: int | None, count: int, far: bool) -> None:
+    asset, relighter = relighter_of(9, clusters, "half", "float")
+    places = np.linspace(-1, 1, count).tolist()
+    lights: list[Light] = [PointLight((x, -x, 0.9 + x), (0.1, 0.2, 0.15 + x / 9), a0=0.9) for x in places]
+    lights[1] = SPOT
+    lights += LIGHTS["hundred"] if far else []
+    found = relighter.relight(lights)
+    assert (np.abs(found - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
+    assert (np.abs(relighter.relight(lights, multipass=True) - found) <= 2 * tolerance(asset, lights)).all()
+
+
 @pytest.mark.parametrize("units", [1, 3])
 @pytest.mark.parametrize("clusters", [None, 5])
 def test_several_passes_give_the_same_image(relighter_of: Get, clusters: int | None, units: int) -> None:
@@ -139,12 +154,12 @@ def test_half_target_is_within_two_half_steps(relighter_of: Get, clusters: int |
 def test_more_layers_than_uniforms_hold_take_several_passes(
     context: Any, make_planes: Callable[..., Asset], monkeypatch: Any, clusters: int | None
 ) -> None:
-    limits = replace(Limits.of(context), fragment_vectors=36)  # 2 layers a pass
+    limits = replace(Limits.of(context), fragment_vectors=36)  # 4 to fill
     monkeypatch.setattr(Limits, "of", staticmethod(lambda _: limits))
     asset = make_planes(18, clusters, "uint8")
     with Relighter(asset, context=context) as relighter:
         lights = LIGHTS["several"]
-        assert relighter._passes.layers_a_pass == 2
+        assert [relighter._passes.layers_a_pass(lamps) for lamps in (0, 1)] == [1, 1]
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 

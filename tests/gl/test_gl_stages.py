@@ -19,22 +19,32 @@ STAGES = sorted(path.name for path in (ROOT / "stages").iterdir())
 FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if path.suffix in (".glsl", ".vert", ".frag"))
 # 384 scalars are 96 layers, 192 of the 224 vec4 that ES 3.00 promises; more take passes of some layers
 PLANES: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 384)] + [{"SRBF_SCALARS": 1024, "SRBF_LAYERS": 64}]
+FOLDED: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 288)]  # three vec4 a layer
+# 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
+LAMPS: list[dict[str, object]] = [{"SRBF_LAMPS": 1}, {"SRBF_LAMPS": 16}, {"SRBF_LAMPS": 16, "SRBF_DEPTH": 1}]
+LIT_MAPS = [{"SRBF_K": k} | lamps for k in (1, 25, 32) for lamps in LAMPS] + [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_FORMULA": 1}]
+LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS]
+UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range(1, 9))]
+METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
-    "point.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
+    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1})],
+    "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
-    "accumulate.frag": [{}, *({"SRBF_UNITS": units} for units in range(1, 9))],
+    **{f"{method}folded.frag": FOLDED for method in METHODS[1:]},
+    **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
+    **{f"{method}accumulate.frag": UNITS for method in METHODS},
 }
 CASES = [(name, defines) for name in STAGES for defines in DEFINES.get(name, [{}])]
 IDS = [f"{name}-{'-'.join(map(str, defines.values()))}" for name, defines in CASES]
 VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]}  # -R gathers loose uniforms into a block
 
 
-def test_there_are_the_stages_of_every_method_and_of_shadows() -> None:
-    maps = ["accumulate.frag", "directional.frag", "point.frag"]
-    planes = [f"{method}_{lights}.frag" for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")]
+def test_every_method_has_the_same_stages() -> None:
+    kinds = ["accumulate", "directional", "folded", "lightmap", "lights", "point"]
+    methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
     shadows = ["direct.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
-    assert sorted([*maps, *planes, *shadows, "add.frag", "finish.frag", "fullscreen.vert"]) == STAGES
+    assert sorted([*methods, *shadows, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
@@ -43,21 +53,32 @@ def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[
     if version == "300 es" and "GL_ARB_ES3_compatibility" not in context.extensions:
         pytest.skip("this driver compiles no ES 3.00 on a desktop context")
     fragment = {"fullscreen.vert": "finish.frag", "shadow.vert": "shadow_height.frag"}.get(name, name)
-    vertex = resolve("stages/shadow.vert" if "shadow" in name else "stages/fullscreen.vert", version=version)
+    if name == "lightmap.vert":
+        fragment, defines = "lightmap.frag", DEFINES["lightmap.frag"][0]
+    vertex = resolve(f"stages/{vertex_of(fragment)}", version=version)
     with context:
         compile_program(context, vertex, resolve(f"stages/{fragment}", version=version, defines=defines)).release()
+
+
+def vertex_of(fragment: str) -> str:
+    """The vertex stage that goes with a fragment stage."""
+    return "shadow.vert" if "shadow" in fragment else "lightmap.vert" if "lightmap" in fragment else "fullscreen.vert"
 
 
 @pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)")
 @pytest.mark.parametrize("version", VALIDATOR)
 @pytest.mark.parametrize("name", STAGES)
 def test_the_reference_compiler_accepts_every_stage(name: str, version: str, tmp_path: Path) -> None:
+    """And what it makes of it for Vulkan is valid SPIR-V, where spirv-val (Debian: spirv-tools) is there to say so."""
     source = resolve(f"stages/{name}", version=version, defines=DEFINES.get(name, [{}])[-1])
-    path = tmp_path / name
+    path, binary = tmp_path / name, tmp_path / "out.spv"
     path.write_text(source.text)
-    output = ["-o", str(tmp_path / "out.spv")] if "-V" in VALIDATOR[version] else []
+    output = ["-o", str(binary)] if "-V" in VALIDATOR[version] else []
     done = subprocess.run(["glslangValidator", *VALIDATOR[version], *output, str(path)], capture_output=True, text=True)
     assert done.returncode == 0, source.locate(done.stdout)
+    if output and shutil.which("spirv-val"):
+        done = subprocess.run(["spirv-val", "--target-env", "vulkan1.0", str(binary)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -75,6 +96,8 @@ def test_every_file_states_its_licence_and_only_stages_have_a_main(file: str) ->
     [
         ("directional", r"combine/directional\.glsl:\d+.*SRBF_K"),
         ("eigen_map_point", r"combine/planes_directional\.glsl:\d+.*SRBF_SCALARS"),
+        ("lights", r"combine/lamps\.glsl:\d+.*SRBF_K"),
+        ("eigen_map_lights", r"combine/planes_lamps\.glsl:\d+.*SRBF_SCALARS"),
     ],
 )
 def test_a_pass_without_its_count_says_which_define_is_missing(context: Any, stage: str, complaint: str) -> None:

@@ -9,8 +9,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import lights_and_depth_twins  # noqa: F401  registers its twins
 import numpy as np
 import pytest
+from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, lamp_expression, twin, units, vec4
 
 from srbf import scalar_planes
 from srbf.asset import Asset
@@ -18,8 +20,8 @@ from srbf.basis import octahedral_table
 from srbf.basis.gaussian import lookup, r_table
 from srbf.direct import shadow
 from srbf.gl.includes import shader_root
-from srbf.gl.uniforms import lamp_uniforms, padded
-from srbf.lights import DirectionalLight, PointLight, SpotLight, attenuation, spot_cone
+from srbf.gl.uniforms import padded
+from srbf.lights import DirectionalLight, PointLight, attenuation, spot_cone
 from srbf.methods.relighting_map import linear_response, receiver_weights, relight
 from srbf.receivers import light_vectors
 from srbf.scalar_planes import first_function
@@ -32,48 +34,6 @@ HEADER = re.compile(
     r"^   use:    (?P<use>.+?)^   domain: (?P<domain>.+?)^   twin:   (?P<twin>[\w.]+)\n   cite:   (?P<cite>.+?) \*/\n",
     re.DOTALL | re.MULTILINE,
 )
-
-EPS = 2.0**-23  # one step of a float32 near 1
-UNIT = 4 * EPS  # a few roundings of numbers near 1
-SUM = 1e-5  # the contract, of sum |c_i R_i|
-
-N = 97
-M = 64  # texels a row of planes: their centres are exact in float32
-K = 5
-SPOT = SpotLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.7, falloff="inverse-square")
-POINT = PointLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, radius=0.7)
-
-Evaluate = Callable[..., np.ndarray]
-Twin = Callable[..., None]
-TWINS: dict[str, Twin] = {}
-
-
-def twin(file: str) -> Callable[[Twin], Twin]:
-    def register(test: Twin) -> Twin:
-        TWINS[file] = test
-        return test
-
-    return register
-
-
-def vec4(*columns: Any) -> np.ndarray:
-    """(N, 4) float32 from columns of one or three, zero at the end."""
-    out = np.column_stack(columns).astype(np.float32)
-    return np.pad(out, ((0, 0), (0, 4 - out.shape[1])))
-
-
-def units(n: int, seed: int) -> np.ndarray:
-    """Unit vectors, (n, 3), rounded to float32 as the shader sees them."""
-    return normalize(np.random.default_rng(seed).normal(size=(n, 3))).astype(np.float32)
-
-
-def lamp_expression(light: PointLight) -> str:
-    """SrbfLamp(...) with the members in the struct's order."""
-    u = lamp_uniforms(light)
-    names = ("position", "positionLow", "color", "axis", "a0", "radius", "versineInner", "versineOuter", "falloff")
-    members = [f"vec3({', '.join(map(repr, map(float, u[name])))})" for name in names[:4]]
-    members += [repr(float(u[name])) for name in names[4:8]] + [str(u["falloff"])]
-    return f"SrbfLamp({', '.join(members)})"
 
 
 @twin("basis/weight.glsl")
@@ -443,7 +403,7 @@ def test_the_header_names_its_function_and_an_importable_twin(file: str) -> None
     assert header is not None, f"{file}: expected a header with use, domain, twin, cite in this order"
     names = header["names"].split(", ")
     body = text[header.end() :]
-    defined = re.findall(r"^(?:float|vec\d|int|void|mat\d)\s+(\w+)\(", body, re.MULTILINE)
+    defined = re.findall(r"^(?:float|vec\d|int|void|mat\d|Srbf\w+)\s+(\w+)\(", body, re.MULTILINE)
     assert defined == names
     for name in names:
         assert f" {name}(" in header["use"]

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// All directional and environment lights in one pass over a texture array, decoding folded into the weights. Blend ONE, ONE into a float
+// target.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+
+#include "combine/folded.glsl"
+
+uniform sampler2DArray maps;
+uniform int firstMap;
+uniform vec4 weights[SRBF_K];
+uniform vec3 offset;
+
+layout(location = 0) out vec4 answer;
+
+void main() {
+    vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
+    answer = vec4(srbfCombineFolded(maps, uv, 0.0, firstMap, weights, offset), 1.0);
+}

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// All lights in one pass over relighting maps: directional, environments and up to SRBF_LAMPS points and spots. Receivers'
+// positions are read from a map or, with SRBF_DEPTH, rebuilt from a camera's depth buffer. Blend ONE, ONE into a float target.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+
+#ifdef SRBF_DEPTH
+#include "depth/receiver_from_depth.glsl"
+#endif
+#include "methods/relighting_map_lights.glsl"
+
+uniform sampler2DArray maps;
+uniform sampler2D rTable;
+uniform int firstMap;
+uniform vec4 weights[SRBF_K];
+uniform vec4 centers[SRBF_K];
+uniform vec4 scale[SRBF_K];
+uniform vec4 bias[SRBF_K];
+#ifdef SRBF_DEPTH
+uniform sampler2D depths;  // row 0 at the top, as in every file
+uniform SrbfCamera camera;
+#else
+uniform sampler2D positions;
+#endif
+uniform vec4 lamps[4 * SRBF_LAMPS];
+uniform int lampCount;
+
+layout(location = 0) out vec4 answer;
+
+void main() {
+    ivec2 texel = ivec2(gl_FragCoord.xy);
+    vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
+#ifdef SRBF_DEPTH
+    vec2 place = vec2(2.0, -2.0) * uv + vec2(-1.0, 1.0);
+    vec3 receiver = srbfReceiverFromDepth(texelFetch(depths, texel, 0).r, place, camera);
+#else
+    vec3 receiver = texelFetch(positions, texel, 0).xyz;
+#endif
+    vec3 sum = srbfRelightLights(maps, uv, 0.0, firstMap, weights, rTable, centers, scale, bias, receiver,
+                                 lamps, lampCount);
+    answer = vec4(sum, 1.0);
+}

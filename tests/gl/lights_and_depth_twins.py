@@ -1,0 +1,446 @@
+"""Twins of the functions for many lights in one pass, folded weights, R by formula, and receivers out of depth buffers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from twins import EPS, POINT, SPOT, SUM, UNIT, Evaluate, K, M, N, twin, units, vec4
+
+from srbf import depth, scalar_planes
+from srbf.asset import Asset
+from srbf.basis import gaussian, octahedral_table
+from srbf.depth import DepthCamera, depth_terms
+from srbf.gl.scalar_planes import folded_rows
+from srbf.gl.uniforms import lamp_uniforms, packed_lamps, padded
+from srbf.lights import DirectionalLight, Light, PointLight, attenuation
+from srbf.methods.relighting_map import basis_weights, folded_weights, linear_response
+from srbf.receivers import light_vectors
+from srbf.sphere import octahedral_encode
+
+SUNS: list[Light] = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
+LAMPS = [
+    replace(POINT, position=(0.3, 0.2, -0.9)),
+    SPOT,
+    replace(SPOT, position=(0.0, 0.0, 50.0), inner=0.0, outer=1e-4),  # passes every receiver by
+    replace(SPOT, falloff="linear", inner=0.2, outer=1.2),
+]
+PLACES = 8  # more than there are lamps
+MANY = "lamps, lampCount"
+COUNT = {"lampCount": len(LAMPS)}
+
+
+@twin("basis/weight_formula.glsl")
+def _(evaluate: Evaluate) -> None:
+    ends = np.geomspace(1e-12, 1e-2, 60)
+    versine = np.concatenate([np.linspace(-0.1, 2.1, 500), ends, 2 - ends, [0, 1, 2]]).astype(np.float32)
+    for spread in (0.12, 0.45, 1.0):
+        found = evaluate("basis/weight_formula.glsl", f"vec4(srbfWeightFormula(a.x, {0.5 / spread**2!r}))", vec4(versine))[:, 0]
+        # theta^2 is off by a few of its roundings; x exp(-x) of x = theta^2 / (2 spread^2) is at most 1 / e
+        np.testing.assert_allclose(found, gaussian.weight(1 - np.clip(versine.astype(float), 0, 2), spread), atol=4 * UNIT)
+        near = np.abs(versine) < 1e-7
+        assert near.sum() > 20 and (np.abs(found[near] - 1) <= 1.1e-7 / spread**2 + UNIT).all()
+
+
+@twin("basis/octahedral_node.glsl")
+def _(evaluate: Evaluate) -> None:
+    """A table that holds its own coordinates reads them back."""
+    size = 17
+    ramp = np.zeros((size, size, 3), np.float32)
+    ramp[..., 0], ramp[..., 1] = np.meshgrid(np.arange(size), np.arange(size))
+    directions = np.concatenate([units(N, 30), np.eye(3), -np.eye(3)]).astype(np.float32)
+    place = np.stack(octahedral_encode(directions), axis=1).astype(np.float32)
+    node = evaluate("basis/octahedral_node.glsl", f"srbfOctahedralNode({size}, a.xy)", vec4(place[:, :1], place[:, 1:]))
+    expected = octahedral_table.lookup(ramp, size, 1, np.zeros(len(place), int), directions)[:, :2]
+    np.testing.assert_allclose(node[:, :2] + node[:, 2:], expected, atol=UNIT * size)
+    assert (node[:, :2] == np.round(node[:, :2])).all() and node[:, :2].min() >= 0 and node[:, :2].max() == size - 2
+    assert node[:, 2:].min() >= 0 and node[:, 2:].max() <= 1
+
+
+@twin("basis/octahedral_mix.glsl")
+def _(evaluate: Evaluate) -> None:
+    size, columns, count = 9, 3, 7
+    atlas = np.random.default_rng(31).uniform(-1, 1, (3 * size, columns * size, 3)).astype(np.float16)
+    directions = units(N, 32)
+    index = np.arange(N) % count
+    x, y = ((t + 1) * (0.5 * (size - 1)) for t in octahedral_encode(directions))
+    node = np.minimum(np.stack([x, y]).astype(int), size - 2)
+    found = evaluate(
+        "basis/octahedral_mix.glsl",
+        f"vec4(srbfOctahedralMix(wTable, {size}, int(b.x), a), 0.0)",
+        vec4(*node, x - node[0], y - node[1]),
+        vec4(index),
+        images={"wTable": atlas.astype(np.float32)},
+    )[:, :3]
+    np.testing.assert_allclose(found, octahedral_table.lookup(atlas, size, columns, index, directions), atol=2 * UNIT)
+
+
+@twin("combine/center_weight.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(25)
+    directions = np.concatenate([units(N, 33), np.zeros((1, 3), np.float32)])  # the last receiver lies in the lamp
+    exact = {"table": basis_weights(asset, directions.astype(float)), "formula": asset.basis.evaluate(directions.astype(float))}
+    centers = padded(asset.basis.centers)
+    centers[:, 3] = 0.5 / asset.basis.spread**2
+    for by, expected in exact.items():
+        for i in (0, 7, 24):
+            found = evaluate(
+                "combine/center_weight.glsl",
+                "vec4(srbfCenterWeight(rTable, a.xyz, b))",
+                vec4(directions),
+                np.broadcast_to(centers[i], (N + 1, 4)),
+                images={"rTable": asset.table[None, :, None]},
+                defines={"SRBF_FORMULA": 1} if by == "formula" else {},
+            )[:, 0]
+            np.testing.assert_allclose(found, expected[:, i], atol=SUM)
+    assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that each is told from the other
+
+
+@twin("lights/unpack_lamp.glsl")
+def _(evaluate: Evaluate) -> None:
+    for light in (POINT, SPOT, *LAMPS):
+        rows = packed_lamps([light], 1)
+        u = lamp_uniforms(light)
+        at_one = light.a0 if light.falloff == "linear" else light.a0**2
+        expected = {
+            "vec4(lamp.position, lamp.radius)": (*u["position"], u["radius"]),
+            "vec4(lamp.positionLow, float(lamp.falloff))": (*u["positionLow"], u["falloff"]),
+            "vec4(lamp.color, lamp.a0)": (*(at_one * c for c in light.color), 1),
+            "vec4(lamp.axis, 0.0)": (*u["axis"], 0),
+            "vec4(lamp.versineInner, lamp.versineOuter, 0.0, 0.0)": (u["versineInner"], u["versineOuter"], 0, 0),
+        }
+        for members, numbers in expected.items():
+            unpack = f"vec4 members(vec4 a, vec4 b, vec4 c, vec4 d) {{ SrbfLamp lamp = srbfUnpackLamp(a, b, c, d); return {members}; }}"
+            inputs = [np.broadcast_to(row, (2, 4)) for row in rows]
+            found = evaluate("lights/unpack_lamp.glsl", "members(a, b, c, d)", *inputs, declarations=unpack)[0]
+            np.testing.assert_allclose(found, np.float32(numbers), rtol=EPS)
+
+
+@twin("lights/lamps_at.glsl")
+def _(evaluate: Evaluate) -> None:
+    positions = np.random.default_rng(34).uniform(-1, 1, (N, 3)).astype(np.float32)
+    pick = """
+        uniform vec4 lamps[4 * SRBF_LAMPS];
+        uniform int lampCount;
+        vec4 pick(vec3 receiver, int j, int what) {
+            vec4 directions[SRBF_LAMPS];
+            vec4 colors[SRBF_LAMPS];
+            int shining = srbfLampsAt(lamps, lampCount, receiver, directions, colors);
+            return what == 0 ? vec4(float(shining)) : (what == 1 ? directions[j] : colors[j]);
+        }"""
+
+    def run(j: int, what: int, count: int) -> np.ndarray:
+        return evaluate(
+            "lights/lamps_at.glsl",
+            f"pick(a.xyz, {j}, {what})",
+            vec4(positions),
+            declarations=pick,
+            arrays={"lamps": packed_lamps(LAMPS, PLACES)},
+            uniforms={"lampCount": count},
+            defines={"SRBF_LAMPS": PLACES},
+        )
+
+    vectors = [light_vectors(light, positions) for light in LAMPS]
+    strengths = np.stack([strength for _, strength in vectors])  # (lamps, N)
+    shines = strengths > 0
+    edge = (shines & (strengths < 1e-5)).any(axis=0)  # a cone's edge: single precision may say otherwise
+    assert edge.sum() < N / 10 and len({*shines.sum(axis=0)}) > 1
+    assert (run(0, 0, len(LAMPS))[~edge, 0] == shines.sum(axis=0)[~edge]).all()
+    assert (run(0, 0, 0) == 0).all() and (run(0, 0, 1)[:, 0] == 1).all()
+    for j in range(len(LAMPS)):
+        which = np.argsort(~shines, axis=0, kind="stable")[j]  # the j-th that shines on each receiver
+        lit = (shines.sum(axis=0) > j) & ~edge
+        unit = np.stack([unit for unit, _ in vectors])[which, np.arange(N)]
+        color = np.array([light.color for light in LAMPS])[which] * strengths[which, np.arange(N)][:, None]
+        np.testing.assert_allclose(run(j, 1, len(LAMPS))[lit, :3], unit[lit], atol=2 * UNIT)
+        np.testing.assert_allclose(run(j, 2, len(LAMPS))[lit, :3], color[lit], rtol=1e-5, atol=1e-5)
+        assert (run(j, 1, len(LAMPS))[(shines.sum(axis=0) <= j) & ~edge] == 0).all()
+
+
+def _far_and_lamps(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
+    """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and LAMPS."""
+    weights = folded_weights(asset, SUNS)
+    positions = asset.images["position"][0]
+    bias = np.abs(asset.bias[:, None])
+    sizes = np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + bias  # what decoding may round
+    bound = np.einsum("knc,kc->nc", sizes, weights)
+    for light in LAMPS:
+        unit, _ = light_vectors(light, positions)
+        strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)  # without the cone
+        bound += np.einsum("knc,nk->nc", sizes, basis_weights(asset, unit) * strength[:, None]) * light.color
+    arrays = {"scale": padded(asset.scale), "bias": padded(asset.bias), "centers": padded(asset.basis.centers)}
+    declared = [f"uniform vec4 {name}[SRBF_K];" for name in ("weights", *arrays)]
+    return {
+        "images": {"maps": asset.stored.astype(np.float32) / 255, "rTable": asset.table[None, :, None]},
+        "arrays": arrays | {"weights": padded(weights), "lamps": packed_lamps(LAMPS, PLACES)},
+        "defines": {"SRBF_K": asset.k, "SRBF_LAMPS": PLACES},
+        "declarations": " ".join([*declared, "uniform vec4 lamps[4 * SRBF_LAMPS]; uniform int lampCount;"]),
+        "uniforms": COUNT,
+    }, SUM * bound
+
+
+LIT = """
+    vec3 lit(vec3 receiver, vec2 uv, int cluster) {
+        vec4 directions[SRBF_LAMPS];
+        vec4 colors[SRBF_LAMPS];
+        int shining = srbfLampsAt(%s, receiver, directions, colors);
+        return %s;
+    }"""
+
+
+@twin("combine/lamps.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    uploads, bound = _far_and_lamps(asset)
+    call = "srbfCombineLamps(maps, uv, 0.0, 0, weights, rTable, centers, scale, bias, directions, colors, shining)"
+    uploads["declarations"] = '#include "lights/lamps_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
+    found = evaluate("combine/lamps.glsl", "vec4(lit(a.xyz, uv, 0), 0.0)", vec4(asset.images["position"][0]), **uploads)[:, :3]
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *LAMPS])[0]), bound)
+
+
+@twin("methods/relighting_map_lights.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    uploads, bound = _far_and_lamps(asset)
+    call = f"srbfRelightLights(maps, uv, 0.0, 0, weights, rTable, centers, scale, bias, a.xyz, {MANY})"
+    found = evaluate("methods/relighting_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)[:, :3]
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *LAMPS])[0]), bound)
+
+
+@twin("combine/folded.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    weights = folded_weights(asset, SUNS)
+    offset = ", ".join(map(repr, (weights * asset.bias).sum(axis=0).tolist()))
+    found = evaluate(
+        "combine/folded.glsl",
+        f"vec4(srbfCombineFolded(maps, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
+        vec4(np.zeros(N)),
+        images={"maps": asset.stored.astype(np.float32) / 255},
+        arrays={"weights": padded(weights * asset.scale)},
+        defines={"SRBF_K": K},
+        declarations="uniform vec4 weights[SRBF_K];",
+    )[:, :3]
+    sizes = np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + np.abs(asset.bias[:, None])
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, SUNS)[0]), SUM * np.einsum("knc,kc->nc", sizes, weights))
+
+
+def _planes(asset: Asset, lamps: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
+    """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `lamps`."""
+    weights = scalar_planes.folded_weights(asset, SUNS)
+    bias = scalar_planes.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
+    planes = np.abs(scalar_planes.planes_of(asset.coefficients(), asset.scalars)[:, 0]) + 2 * bias
+    terms = np.concatenate([np.ones((1, M)), planes])  # (S + 1, M)
+    function = scalar_planes.first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
+    bound = np.einsum("fn,nfc->nc", terms, np.abs(weights[function]))
+    positions = asset.images["position"][0]
+    for light in lamps:
+        unit, _ = light_vectors(light, positions)
+        strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)  # without the cone
+        places = np.broadcast_to(unit[:, None], (*function.shape, 3))
+        table = octahedral_table.lookup(asset.tables["w_table"], 17, asset.manifest["w_table"]["columns"], function, places)
+        bound += np.einsum("fn,nfc->nc", terms, np.abs(table)) * strength[:, None] * light.color
+    rows = weights.reshape(asset.clusters, -1, 3)
+    uploads: dict[str, Any] = {
+        "images": {
+            "planes": asset.stored.astype(np.float32) / 255,
+            "weights": np.pad(rows, ((0, 0), (0, 0), (0, 1))),
+            "wTable": asset.tables["w_table"].astype(np.float32),
+            "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
+        },
+        "arrays": {"scale": asset.scale, "bias": asset.bias, "lamps": packed_lamps(lamps, PLACES)},
+        "defines": {"SRBF_SCALARS": asset.scalars, "SRBF_LAMPS": PLACES},
+        "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS]; uniform vec4 lamps[4 * SRBF_LAMPS]; "
+        "uniform int lampCount;",
+        "uniforms": COUNT,
+    }
+    return uploads, SUM * bound
+
+
+def _equals_planes(found: np.ndarray, asset: Asset, lights: list[Any], bound: np.ndarray) -> None:
+    assert (np.abs(found[:, :3] - scalar_planes.linear_response(asset, lights)[0]) <= bound).all()
+    assert (np.abs(found[:, :3]) > bound).any()
+
+
+@twin("combine/planes_lamps.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, 7, "uint8", 1, M)
+    uploads, bound = _planes(asset, LAMPS)
+    call = "srbfCombinePlanesLamps(planes, uv, 0.0, 0, weights, cluster, wTable, 17, scale, bias, directions, colors, shining)"
+    uploads["declarations"] = '#include "lights/lamps_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
+    rows = vec4(asset.images["position"][0], asset.tables["cluster_index"][0])
+    found = evaluate("combine/planes_lamps.glsl", "vec4(lit(a.xyz, uv, int(a.w)), 0.0)", rows, **uploads)
+    _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+
+
+@twin("methods/eigen_map_lights.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, None, "uint8", 1, M)
+    uploads, bound = _planes(asset, LAMPS)
+    call = f"srbfEigenMapLights(planes, uv, 0.0, 0, weights, wTable, 17, scale, bias, a.xyz, {MANY})"
+    found = evaluate("methods/eigen_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)
+    _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+
+
+@twin("methods/clustered_eigen_map_lights.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    """By texel, and by the place of a texel's centre."""
+    asset = make_planes(K, 7, "uint8", 1, M)
+    uploads, bound = _planes(asset, LAMPS)
+    for name, place in (("", "at"), ("Filtered", "uv")):
+        call = f"srbfClusteredLights{name}(planes, clusters, {place}, 0, weights, wTable, 17, scale, bias, a.xyz, {MANY})"
+        found = evaluate("methods/clustered_eigen_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)
+        _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+
+
+@twin("combine/planes_folded.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, None, "uint8", 1, M)
+    uploads, bound = _planes(asset, [])
+    rows = folded_rows(asset, scalar_planes.folded_weights(asset, SUNS))[0]
+    offset = ", ".join(map(repr, rows[0, :3].tolist()))
+    found = evaluate(
+        "combine/planes_folded.glsl",
+        f"vec4(srbfCombinePlanesFolded(planes, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
+        vec4(np.zeros(M)),
+        images={"planes": uploads["images"]["planes"]},
+        arrays={"weights": rows[1:]},
+        defines={"SRBF_SCALARS": K},
+        declarations="uniform vec4 weights[3 * SRBF_LAYERS];",
+    )
+    _equals_planes(found, asset, SUNS, bound)
+
+
+@twin("combine/planes_folded_cluster.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, 7, "uint8", 1, M)
+    uploads, bound = _planes(asset, [])
+    found = evaluate(
+        "combine/planes_folded_cluster.glsl",
+        "vec4(srbfCombinePlanesFoldedCluster(planes, uv, 0, weights, int(a.x)), 0.0)",
+        vec4(asset.tables["cluster_index"][0]),
+        images={
+            "planes": uploads["images"]["planes"],
+            "weights": folded_rows(asset, scalar_planes.folded_weights(asset, SUNS)),
+        },
+        defines={"SRBF_SCALARS": K},
+    )
+    _equals_planes(found, asset, SUNS, bound)
+
+
+@twin("combine/mip_level.glsl")
+def _(evaluate: Evaluate) -> None:
+    steps = np.random.default_rng(35).uniform(-1, 1, (N, 4)) * np.geomspace(0.1, 100, N)[:, None]
+    found = evaluate("combine/mip_level.glsl", "vec4(srbfMipLevel(a.xy, a.zw))", steps.astype(np.float32))[:, 0]
+    longest = np.maximum(np.linalg.norm(steps[:, :2], axis=1), np.linalg.norm(steps[:, 2:], axis=1))
+    np.testing.assert_allclose(found, np.maximum(np.log2(longest), 0), atol=8 * UNIT)  # logarithms up to 7
+    assert (found == 0).any() and (found > 3).any()
+
+
+def projection(kind: str, near: float = 0.25, far: float = 64.0) -> tuple[np.ndarray, bool]:
+    """(matrix, whether its clip z starts from 0) of a wide and slightly shifted view, as graphics interfaces have it."""
+    matrix = np.zeros((4, 4))
+    matrix[0, 0], matrix[1, 1] = 0.5, 0.75  # half a picture is 2 wide and 1.33 high, 1 m ahead
+    if kind == "orthographic":
+        matrix[0, 3], matrix[1, 3], matrix[3, 3] = 0.125, -0.25, 1
+        matrix[2, 2:] = -2 / (far - near), -(far + near) / (far - near)
+        return matrix, False
+    matrix[0, 2], matrix[1, 2], matrix[3, 2] = 0.125, -0.25, -1
+    rows = {
+        "opengl": (-(far + near) / (far - near), -2 * far * near / (far - near)),
+        "direct3d": (-far / (far - near), -far * near / (far - near)),
+        "reversed": (near / (far - near), far * near / (far - near)),
+        "reversed, infinite": (0.0, near),
+        "opengl, infinite": (-1.0, -2 * near),
+    }
+    matrix[2, 2:] = rows[kind]
+    return matrix, not kind.startswith("opengl")
+
+
+PROJECTIONS = ("opengl", "direct3d", "reversed", "reversed, infinite", "opengl, infinite", "orthographic")
+
+
+def stored_depth(view: np.ndarray, matrix: np.ndarray, from_zero: bool) -> np.ndarray:
+    """What a depth buffer holds of points (n, 3) of the camera's frame."""
+    clip = np.pad(view, ((0, 0), (0, 1)), constant_values=1) @ matrix.T
+    z = clip[:, 2] / clip[:, 3]
+    return z if from_zero else 0.5 * z + 0.5
+
+
+@twin("depth/eye_depth.glsl")
+def _(evaluate: Evaluate) -> None:
+    ahead = np.geomspace(0.25, 60, N)
+    view = np.stack([0 * ahead, 0 * ahead, -ahead], axis=1)
+    for kind in PROJECTIONS:
+        matrix, from_zero = projection(kind)
+        terms = depth_terms(matrix, from_zero=from_zero)
+        stored = stored_depth(view, matrix, from_zero).astype(np.float32)
+        numbers = ", ".join(map(repr, terms.tolist()))
+        found = evaluate("depth/eye_depth.glsl", f"vec4(srbfEyeDepth(a.x, vec4({numbers})))", vec4(stored))[:, 0]
+        exact = depth.eye_depth(stored.astype(float), terms)
+        # near the far plane of an unreversed buffer a rounding of 1 weighs depth / near as much
+        np.testing.assert_allclose(found, exact, rtol=UNIT * (1 if kind.startswith("reversed") else 60 / 0.25))
+        np.testing.assert_allclose(exact, ahead, rtol=1e-4 if kind.startswith("reversed") or kind == "orthographic" else 1e-3)
+    assert (
+        evaluate("depth/eye_depth.glsl", "vec4(srbfEyeDepth(a.x, vec4(-0.25, 0.0, 0.0, 1.0)))", vec4([0.0, 0.0])) == np.float32(1e9)
+    ).all()
+    assert depth.eye_depth(np.zeros(1), np.array([-0.25, 0, 0, 1.0]))[0] == depth.FARTHEST
+
+
+def _rays(seed: int) -> np.ndarray:
+    """V from points in front of a camera that looks along +y, any length, up to 80 degrees off its axis."""
+    rays = np.random.default_rng(seed).uniform(-1, 1, (N, 3)) * [5, 0, 5]
+    return (-(rays + [0, 1, 0]) * np.geomspace(0.01, 100, N)[:, None]).astype(np.float32)
+
+
+@twin("depth/ray_length.glsl")
+def _(evaluate: Evaluate) -> None:
+    to_eye, ahead = _rays(36), np.geomspace(0.1, 100, N).astype(np.float32)
+    found = evaluate("depth/ray_length.glsl", "vec4(srbfRayLength(b.x, a.xyz, vec3(0.0, 1.0, 0.0)))", vec4(to_eye), vec4(ahead))[:, 0]
+    expected = depth.ray_length(ahead, to_eye, np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(found, expected, rtol=UNIT)
+    assert (expected > 3 * ahead).any()
+
+
+@twin("depth/point_on_ray.glsl")
+def _(evaluate: Evaluate) -> None:
+    to_eye, length = _rays(37), np.geomspace(0.1, 100, N).astype(np.float32)
+    eye = np.float32([0.5, -2, 1])
+    found = evaluate("depth/point_on_ray.glsl", "vec4(srbfPointOnRay(vec3(0.5, -2.0, 1.0), a.xyz, b.x), 0.0)", vec4(to_eye), vec4(length))
+    expected = depth.point_on_ray(np.broadcast_to(eye, to_eye.shape), to_eye, length)
+    np.testing.assert_allclose(found[:, :3], expected, atol=UNIT * 100)
+    np.testing.assert_allclose(np.linalg.norm(expected - eye, axis=1), length, rtol=1e-6)
+
+
+@twin("depth/receiver_from_depth.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Points all over a turned camera's picture, its corners included, come back; closed form of the projection, not of its inverse."""
+    rng = np.random.default_rng(38)
+    place = np.concatenate([rng.uniform(-1, 1, (N - 4, 2)), [[-1, -1], [1, -1], [-1, 1], [1, 1]]]).astype(np.float32)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn[:, 0] *= np.linalg.det(turn)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, [0.5, -1, 2]
+    ahead = rng.uniform(0.5, 8, N)
+    for kind in PROJECTIONS:
+        matrix, from_zero = projection(kind)
+        camera = DepthCamera.of(pose, matrix, from_zero=from_zero)
+        shift = matrix[:2, 3] if camera.orthographic else -matrix[:2, 2]
+        sideways = (place - shift) / np.diag(matrix)[:2] * (1 if camera.orthographic else ahead[:, None])
+        view = np.column_stack([sideways, -ahead])
+        clip = np.pad(view, ((0, 0), (0, 1)), constant_values=1) @ matrix.T
+        np.testing.assert_allclose(clip[:, :2] / clip[:, 3:], place, atol=1e-6)
+        world = view @ turn.T + pose[:3, 3]
+        stored = stored_depth(view, matrix, from_zero)
+        np.testing.assert_allclose(depth.receivers(stored, place, camera), world, atol=1e-9)
+        vectors = (camera.eye, camera.forward, camera.centre, camera.across, camera.up)
+        members = [f"vec3({', '.join(map(repr, vector.tolist()))})" for vector in vectors]
+        members += [f"vec4({', '.join(map(repr, camera.depth_terms.tolist()))})", repr(float(camera.orthographic))]
+        expression = f"vec4(srbfReceiverFromDepth(b.x, a.xy, SrbfCamera({', '.join(members)})), 0.0)"
+        rows = vec4(place[:, :1], place[:, 1:]), vec4(stored)
+        found = evaluate("depth/receiver_from_depth.glsl", expression, *rows)[:, :3]
+        rounding = EPS * (8**2 / 0.25 if not kind.startswith("reversed") else 8)  # of a sample near 1, as depth
+        reach = 1 if camera.orthographic else np.linalg.norm(view, axis=1, keepdims=True) / ahead[:, None]
+        assert (np.abs(found - world) <= 4 * (rounding if kind != "orthographic" else 64 * EPS) * reach + 16 * UNIT).all()
