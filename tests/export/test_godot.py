@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from finished_assets import finished
 
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.export.godot import METHODS, method_include, translated, write
+from srbf.export.settings import Settings
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods import relight
 
@@ -26,9 +26,9 @@ Made = Callable[..., Asset]
 def assets(make_asset: Made, make_planes: Made) -> dict[str, Asset]:
     """One of each method, with ambient light."""
     return {
-        "relighting-map": finished(make_asset(7, "half", ambient=True)),
-        "eigen-map": finished(make_planes(9, None, "uint8", ambient=True)),
-        "clustered-eigen-map": finished(make_planes(6, 5, "half", ambient=True)),
+        "relighting-map": make_asset(7, "half", ambient=True),
+        "eigen-map": make_planes(9, None, "uint8", ambient=True),
+        "clustered-eigen-map": make_planes(6, 5, "half", ambient=True),
     }
 
 
@@ -95,6 +95,13 @@ def test_a_stage_is_refused(stage: str) -> None:
         translated(stage)
 
 
+def test_blocks_stay_blocks(make_asset: Made, tmp_path: Path) -> None:
+    write(make_asset(5, "float", 8, 12), tmp_path, Settings("bc7"))
+    asset = Asset.open(tmp_path)
+    assert asset.encoding == "bc7"
+    assert {entry["file"] for entry in asset.layers} == {"asset/maps.dds"}
+
+
 def test_harmonics_are_refused(make_asset: Made, tmp_path: Path) -> None:
     asset = make_asset(4)
     asset.manifest["basis"] = {"kind": "spherical-harmonics"}
@@ -123,7 +130,7 @@ def test_the_shaders_are_sound(method: str, stage: str, projects: dict[str, Path
         "eigen-map": "#define SRBF_EIGEN_MAP\n#define SRBF_SCALARS 9\n#define SRBF_LAYERS 3\n",
         "clustered-eigen-map": "#define SRBF_CLUSTERED_EIGEN_MAP\n#define SRBF_SCALARS 6\n#define SRBF_LAYERS 2\n",
     }[method]
-    text = f'{defines}#define SRBF_MOST_LAMPS 4\n#define SRBF_IRRADIANCE\n#include "res://addons/srbf/shaders/{stage}.gdshaderinc"\n'
+    text = f'{defines}#define SRBF_LAMPS 4\n#define SRBF_IRRADIANCE\n#include "res://addons/srbf/shaders/{stage}.gdshaderinc"\n'
     path = tmp_path / "shader.frag"
     path.write_text(as_glsl(text, projects[method]))
     result = subprocess.run(["glslangValidator", str(path)], capture_output=True, text=True)
@@ -135,8 +142,10 @@ def as_glsl(text: str, folder: Path) -> str:
     while match := re.search(r'#include "res://([^"]+)"', text):
         text = text.replace(match[0], (folder / match[1]).read_text(), 1)
     text = re.sub(r"^render_mode .*$", "", text, flags=re.M)
-    text = re.sub(r"^(uniform [\w ]+(?:\[\w+\])?) : [\w, ]+(;| =)", r"\1\2", text, flags=re.M)
+    text = re.sub(r"^(uniform [\w ]+(?:\[[^\]]+\])?) : [\w, ]+(;| =)", r"\1\2", text, flags=re.M)
     text = re.sub(r"^varying ", "in ", text, flags=re.M)
     text = re.sub(r"^void vertex\(\) \{.*?^\}$", "", text, flags=re.M | re.S)
-    built_in = "in vec2 UV; in vec2 UV2; out vec4 COLOR; vec3 ALBEDO; vec4 IRRADIANCE, RADIANCE; float SPECULAR, ROUGHNESS; const float PI = 3.14159265;\n"
+    built_in = (
+        "in vec2 UV, UV2; out vec4 COLOR; vec3 ALBEDO; vec4 IRRADIANCE, RADIANCE; float SPECULAR, ROUGHNESS; const float PI = 3.1415927;\n"
+    )
     return f"#version 330 core\n{built_in}{text}\nvoid main() {{ fragment(); COLOR.rgb += ALBEDO * IRRADIANCE.rgb; }}\n"

@@ -15,6 +15,8 @@ extends Resource
 ## World to the frame that the asset was captured in, both z up.
 @export var asset_from_world: Transform3D
 @export var layer_images: Array[Image]
+## Mip levels of the layers, the full size included.
+@export var levels := 1
 @export var scale: PackedVector4Array
 @export var bias: PackedVector4Array
 @export var position: Image
@@ -52,8 +54,15 @@ static func read(manifest_path: String) -> SrbfAsset:
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
 	var layers: Array = manifest.maps if asset.method == "relighting-map" else manifest.planes
+	asset.levels = int(layers[0].get("levels", 1))
+	var arrays := {}  # layers in one file, by its name
 	for layer in layers:
-		asset.layer_images.append(_image(folder, layer.file))
+		if layer.has("layer"):
+			if not arrays.has(layer.file):
+				arrays[layer.file] = SrbfDds.read(folder.path_join(layer.file))
+			asset.layer_images.append(arrays[layer.file][layer.layer] if layer.layer < arrays[layer.file].size() else null)
+		else:
+			asset.layer_images.append(_image(folder, layer.file))
 		asset.scale.append(_vector4(layer.scale))
 		asset.bias.append(_vector4(layer.bias))
 	for name in ["position", "normal", "coverage", "ambient"]:

@@ -8,7 +8,7 @@ extends Node3D
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
 const RADIUS := 1e-4  # metres: no receiver is nearer to a lamp, as in Godot
-const NO_CONE := Vector4(3.0, 4.0, 0.0, 0.0)  # past every 1 - cos: a point light
+const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 
 @export var asset: SrbfAsset
 ## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children where none are named.
@@ -96,32 +96,26 @@ func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 
 
 func _set_lamps(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
-	var positions := PackedVector4Array()
-	var colors := PackedVector4Array()
-	var axes := PackedVector4Array()
-	var cones := PackedVector4Array()
+	var lamps := PackedVector4Array()
 	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # of the asset's metres a metre of Godot's
 	for light in found:
-		if light is DirectionalLight3D:
+		if light is DirectionalLight3D or not asset.position:
 			continue
-		if positions.size() == most_lamps:
+		if lamps.size() == 4 * most_lamps:
 			push_warning("expected at most %d omni and spot lights, found more; raise most_lamps" % most_lamps)
 			break
+		var squared := _decay(light) >= 1.5
 		var place := asset_from_godot * light.global_position
-		var color := irradiance(light)
+		var color := irradiance(light) * (unit * unit if squared else unit)
 		var axis := -(asset_from_godot.basis * light.global_basis.z).normalized()
-		positions.append(Vector4(place.x, place.y, place.z, unit))
-		colors.append(Vector4(color.x, color.y, color.z, RADIUS * unit))
-		axes.append(Vector4(axis.x, axis.y, axis.z, 1.0 if _decay(light) >= 1.5 else 0.0))
-		cones.append(_cone_of(light))
-	var count := positions.size()
-	for list in [positions, colors, axes, cones]:
-		list.resize(most_lamps)
-	_give("srbf_lamps", count if asset.position else 0)
-	_give("srbf_lamp_position", positions)
-	_give("srbf_lamp_color", colors)
-	_give("srbf_lamp_axis", axes)
-	_give("srbf_lamp_cone", cones)
+		var cone := _cone_of(light)
+		lamps.append(Vector4(place.x, place.y, place.z, RADIUS * unit))
+		lamps.append(Vector4(0.0, 0.0, 0.0, 1.0 if squared else 0.0))
+		lamps.append(Vector4(color.x, color.y, color.z, cone.x))
+		lamps.append(Vector4(axis.x, axis.y, axis.z, cone.y))
+	_give("srbf_lamp_count", lamps.size() / 4)
+	lamps.resize(4 * most_lamps)
+	_give("srbf_lamps", lamps)
 
 
 ## What a light gives a surface that faces it, of an omni or spot light at 1 m: linear, in Godot's unit times π.
@@ -132,13 +126,13 @@ static func irradiance(light: Light3D) -> Vector3:
 
 
 ## 1 - cos of a spot's inner and outer half-angles. Godot's 1 - t^a, t = (1 - cos) / (1 - cos outer), and the smooth step are ½ at one angle.
-static func _cone_of(light: Light3D) -> Vector4:
+static func _cone_of(light: Light3D) -> Vector2:
 	if not light is SpotLight3D:
 		return NO_CONE
 	var half_sine := sin(deg_to_rad(light.spot_angle) / 2.0)
 	var outer := 2.0 * half_sine * half_sine
 	var inner := outer * maxf(0.0, 2.0 * pow(0.5, 1.0 / maxf(light.spot_angle_attenuation, 1e-3)) - 1.0)
-	return Vector4(inner, outer, 0.0, 0.0)
+	return Vector2(inner, outer)
 
 
 static func _decay(light: Light3D) -> float:
@@ -147,7 +141,7 @@ static func _decay(light: Light3D) -> float:
 
 func _material(type: String, file: String) -> ShaderMaterial:
 	var shader := Shader.new()
-	shader.code = "shader_type %s;\n%s%s#define SRBF_MOST_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+	shader.code = "shader_type %s;\n%s%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
 		type, asset.defines(), "#define SRBF_IRRADIANCE\n" if asset.quantity == "irradiance" else "", most_lamps, file
 	]
 	var material := ShaderMaterial.new()
@@ -157,6 +151,7 @@ func _material(type: String, file: String) -> ShaderMaterial:
 		"srbf_layers": asset.layers(),
 		"srbf_scale": asset.scale,
 		"srbf_bias": asset.bias,
+		"srbf_last_level": float(asset.levels - 1),
 		"srbf_positions": asset.texture("position"),
 		"srbf_ambient": asset.texture("ambient"),
 	}
