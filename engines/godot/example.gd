@@ -2,7 +2,7 @@
 extends Node3D
 ## A lamp to drag over the asset: on a mesh through its texels, or in its picture laid flat.
 
-const HELP := "drag: move the lamp    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun"
+const HELP := "drag: move the lamp    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
 const TURN := 0.03  # radians a key press
 
 var _dragged := false
@@ -16,15 +16,18 @@ var _size := 1.0
 func _ready() -> void:
 	if _asset.position:
 		$Surface.mesh = _asset.texel_mesh()
-		var box: AABB = $Surface.mesh.get_aabb()
+		var box := _asset.bounds()
 		_middle = box.get_center()
 		_size = maxf(box.get_longest_axis_size(), 1e-3)
 	else:
 		$Lamp.visible = false
-	$Camera.look_at_from_position(_middle + Vector3(0.0, 0.75, 0.95) * _size, _middle)
+	$Camera.look_at_from_position(_middle + Vector3(0.0, 0.65, 0.8) * _size, _middle)
 	$Camera.far = maxf(1000.0, 10.0 * _size)
 	$Lamp.position = _middle + Vector3(-0.2, 0.3, 0.1) * _size
 	$Lamp.light_energy *= 0.4 * _size  # its answer falls with the distance
+	if _asset.is_view:
+		$Sun.light_energy = 1.0
+		$Relight.exposure = 0.5
 	$Lamp/Bulb.scale = Vector3.ONE * 0.03 * _size
 	get_viewport().size_changed.connect(_fit_picture)
 	_fit_picture()
@@ -47,6 +50,10 @@ func _unhandled_input(event: InputEvent) -> void:
 				_show_picture(not _picture.visible)
 			KEY_S:
 				$Sun.visible = not $Sun.visible
+			KEY_PLUS, KEY_EQUAL, KEY_KP_ADD:
+				$Relight.exposure += 0.5
+			KEY_MINUS, KEY_KP_SUBTRACT:
+				$Relight.exposure -= 0.5
 			KEY_LEFT:
 				$Sun.rotate_y(-TURN)
 			KEY_RIGHT:

@@ -163,6 +163,25 @@ func point(texel: Vector2i) -> Vector3:
 	return _to_godot(position.get_pixel(texel.x, texel.y))
 
 
+## Where nine in ten of the covered texels are, by each axis, in Godot's frame: what a view sees far away is no part of it.
+func bounds() -> AABB:
+	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
+	for row in height:
+		for column in width:
+			if not coverage or coverage.get_pixel(column, row).r >= 0.5:
+				var place := point(Vector2i(column, row))
+				for axis in 3:
+					sides[axis].append(place[axis])
+	var low := Vector3.ZERO
+	var high := Vector3.ZERO
+	for axis in 3:
+		sides[axis].sort()
+		var count := sides[axis].size()
+		low[axis] = sides[axis][count / 20] if count else 0.0
+		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
+	return AABB(low, high - low)
+
+
 ## A mesh through the position map's covered texels: second UV layer, normals, triangles; Godot's frame, y up. What is longer than
 ## `longest` times the middle length of an edge spans two charts, and is left out.
 func texel_mesh(longest := 4.0) -> ArrayMesh:
