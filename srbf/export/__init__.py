@@ -7,7 +7,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, ktx2, uint8
+from srbf.export import dds, exr, gltf, ktx2, uint8, unity, unreal
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
@@ -20,6 +20,9 @@ TARGETS: dict[str, Target] = {
     "uint8": uint8.write,
     "dds": dds.write,
     "ktx2": ktx2.write,
+    "gltf": gltf.write,
+    "unity": unity.write,
+    "unreal": unreal.write,
 }
 
 

@@ -15,11 +15,12 @@ from srbf.asset import Asset
 from srbf.depth import DepthView
 from srbf.errors import InputError
 from srbf.gl.context import Limits, create_context
+from srbf.gl.environment import Sky
 from srbf.gl.programs import Programs
 from srbf.gl.relighting_map import MapPasses
 from srbf.gl.scalar_planes import PlanePasses
 from srbf.gl.textures import AssetTextures
-from srbf.lights import Light, PointLight, moved
+from srbf.lights import EnvironmentLight, Light, PointLight, moved
 from srbf.methods import folded_weights
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 Target = Literal["float", "half"]
 Functions = Literal["table", "formula"]
+Place = Literal["host", "gpu"]
 
 UNITS = 5  # maps, or images of four planes, a pass of the multi-pass variant
 MAX_UNITS = 8  # as many terms as stages/accumulate.frag spells out
@@ -53,8 +55,9 @@ class Relighter:
     """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
 
     Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
-    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. With a `view` receivers stand
-    where its depth buffer says, not where the position map does.
+    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. `environments`: where their weights
+    are integrated; by shaders a sky may change from frame to frame. With a `view` receivers stand where its depth buffer says, not where
+    the position map does.
     Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
     """
 
@@ -65,6 +68,7 @@ class Relighter:
         target: Target = "float",
         context: moderngl.Context | None = None,
         functions: Functions = "table",
+        environments: Place = "host",
         view: DepthView | None = None,
     ) -> None:
         if asset.method not in PASSES:
@@ -73,6 +77,8 @@ class Relighter:
             raise InputError(f"expected a target of float, half, found {target!r}")
         if functions not in get_args(Functions):
             raise InputError(f"expected functions by table, formula, found {functions!r}")
+        if environments not in get_args(Place):
+            raise InputError(f"expected environments on host, gpu, found {environments!r}")
         self._asset, self._located = asset, view is not None or "position" in asset.images
         self._context = create_context() if context is None else context
         self._resources = ExitStack()
@@ -85,6 +91,9 @@ class Relighter:
                 self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
                 _, self._relit_buffer = self._target(self._type)
                 self._programs = Programs(self._context, self._resources)
+                self._sky = None
+                if environments == "gpu":
+                    self._sky = Sky(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise
@@ -131,12 +140,17 @@ class Relighter:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if lamps:
             self._passes.check_lamps()
-        weights = folded_weights(self._asset, lights)
+        skies = [light for light in lights if isinstance(light, EnvironmentLight)] if self._sky is not None else []
+        weights = folded_weights(self._asset, [light for light in lights if light not in skies])
         with self._context:
+            by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)
             at_once = units if multipass else None
+            if by_shader is not None:
+                self._passes.weighted(by_shader)
+                weights = 0 * weights
             if weights.any() and (multipass or not lamps):
                 self._passes.far(weights, at_once)
                 weights = 0 * weights

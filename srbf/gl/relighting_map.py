@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -16,6 +16,9 @@ from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, padded, vectors_free
 from srbf.lights import PointLight
+
+if TYPE_CHECKING:
+    import moderngl
 
 VECTORS_A_MAP = 4  # weight, center, scale, bias
 
@@ -52,6 +55,13 @@ class MapPasses:
             values = {"firstMap": first, "maps": 0, "weights": folded[first : first + count]}
             values["offset"] = tuple((offset if first == 0 else 0 * offset).tolist())
             self._programs.run("folded.frag", {"SRBF_K": count}, values)
+
+    def weighted(self, weights: moderngl.Texture) -> None:
+        """All directional and environment lights, by weights that are on the GPU."""
+        weights.use(1)
+        self._textures.layers().use(0)
+        values = {"maps": 0, "weights": 1}
+        self._over_maps("weighted.frag", {}, values, {}, self.layers_a_pass(1))
 
     def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "K 3"], units: int | None) -> None:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` maps a pass."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -15,6 +15,9 @@ from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, vectors_free
 from srbf.lights import PointLight
+
+if TYPE_CHECKING:
+    import moderngl
 
 VECTORS_A_LAYER = 2  # scale, bias
 VECTORS_FOLDED = 3  # the weights of four scalars, a colour each
@@ -51,6 +54,11 @@ class PlanePasses:
             offset = rows[0, 0, :3] if first == 0 else np.zeros(3)
             values = {"firstLayer": first, "weights": rows[0, 1 + 3 * first :][: 3 * count], "offset": tuple(offset.tolist())}
             self._run_far(first, count, units, values)
+
+    def weighted(self, weights: moderngl.Texture) -> None:
+        """All directional and environment lights, by weights that are on the GPU."""
+        weights.use(2)
+        self._over_layers("directional.frag", {}, {"weights": 2}, self.layers_a_pass(1))
 
     def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` layers of four scalars a pass."""

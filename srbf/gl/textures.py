@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
+from srbf.arrays import Float32
 from srbf.asset import Asset
 from srbf.depth import DepthView
 from srbf.errors import InputError, ShaderError
@@ -86,6 +87,10 @@ class AssetTextures:
     def ambient(self) -> moderngl.Texture:
         """The ambient image, or one black texel."""
         return self._plain("ambient", self._asset.images.get("ambient", np.zeros((1, 1, 3), np.float32)))
+
+    def kept(self, pixels: Float32[ndarray, "H W C"]) -> moderngl.Texture:
+        """Numbers as a texture of their own, kept as long as the asset's."""
+        return self._plain(f"kept {len(self._made)}", pixels)
 
     @contextmanager
     def passing(self, pixels: ndarray) -> Iterator[moderngl.Texture]:

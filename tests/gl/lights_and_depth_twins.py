@@ -15,7 +15,7 @@ from srbf.basis import gaussian, octahedral_table
 from srbf.depth import DepthCamera, depth_terms
 from srbf.gl.scalar_planes import folded_rows
 from srbf.gl.uniforms import lamp_uniforms, packed_lamps, padded
-from srbf.lights import DirectionalLight, Light, PointLight, attenuation
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
 from srbf.methods.relighting_map import basis_weights, folded_weights, linear_response
 from srbf.receivers import light_vectors
 from srbf.sphere import octahedral_encode
@@ -225,6 +225,84 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     )[:, :3]
     sizes = np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + np.abs(asset.bias[:, None])
     np.testing.assert_array_less(np.abs(found - linear_response(asset, SUNS)[0]), SUM * np.einsum("knc,kc->nc", sizes, weights))
+
+
+@twin("combine/weighted.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    asset = make_asset(K, "uint8", 1, N)
+    weights = folded_weights(asset, SUNS)
+    found = evaluate(
+        "combine/weighted.glsl",
+        "vec4(srbfCombineWeighted(maps, uv, 0.0, 0, weights, scale, bias), 0.0)",
+        vec4(np.zeros(N)),
+        images={"maps": asset.stored.astype(np.float32) / 255, "weights": np.pad(weights, ((0, 0), (0, 1)))[None]},
+        arrays={"scale": padded(asset.scale), "bias": padded(asset.bias)},
+        defines={"SRBF_K": K},
+        declarations="uniform vec4 scale[SRBF_K]; uniform vec4 bias[SRBF_K];",
+    )[:, :3]
+    sizes = np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + np.abs(asset.bias[:, None])
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, SUNS)[0]), SUM * np.einsum("knc,kc->nc", sizes, weights))
+
+
+ENVIRONMENT = EnvironmentLight(np.random.default_rng(39).random((7, 12, 3)).astype(np.float32))  # its middle row straddles the horizon
+
+
+@twin("lights/environment_texel.glsl")
+def _(evaluate: Evaluate) -> None:
+    rows, columns = np.mgrid[:7, :12]
+    texels = vec4(columns.ravel(), rows.ravel())
+    for cut in (False, True):
+        expression = f"srbfEnvironmentTexel(ivec2(a.xy), ivec2(12, 7), {str(cut).lower()})"
+        found = evaluate("lights/environment_texel.glsl", expression, texels)
+        directions, solid_angle = environment_samples(ENVIRONMENT.image, "hemisphere" if cut else "sphere", np.eye(3))
+        np.testing.assert_allclose(found[:, :3], directions.reshape(-1, 3), atol=UNIT)
+        np.testing.assert_allclose(found[:, 3], solid_angle.ravel(), atol=UNIT)
+        np.testing.assert_allclose(found[:, 3].sum(), 2 * np.pi * (2 - cut), rtol=UNIT * 10)
+
+
+@twin("combine/environment_row.glsl")
+def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
+    turns = [np.eye(3), np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])]
+    asset = make_asset(K)
+    rows = np.arange(7)
+    for domain in ("sphere", "hemisphere"):
+        for turn in turns:
+            asset.manifest["domain"] = domain
+            asset.manifest["asset_from_world"] = [[*row, 0.0] for row in turn.tolist()] + [[0, 0, 0, 1.0]]
+            kind = 0 if domain == "sphere" else 1 if turn[2, 2] == 1 else 2
+            matrix = ", ".join(map(repr, turn.T.ravel().tolist()))
+            for i in range(K):
+                center = ", ".join(map(repr, asset.basis.centers[i].tolist()))
+                row = f"environment, int(a.x), rTable, vec4({center}, 0.0), mat3({matrix}), {kind}"
+                found = evaluate(
+                    "combine/environment_row.glsl",
+                    f"vec4(srbfCombineEnvironmentRow({row}), 0.0)",
+                    vec4(rows),
+                    images={"environment": ENVIRONMENT.image, "rTable": asset.table[None, :, None]},
+                )[:, :3]
+                expected = folded_weights(asset, [ENVIRONMENT])[i]
+                np.testing.assert_allclose(found.sum(axis=0), expected, atol=SUM * (expected.max() + 1))
+
+
+@twin("combine/environment_function.glsl")
+def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
+    asset = make_planes(K, 3)
+    functions = asset.light_functions
+    spreads, which = np.unique(functions.spreads, return_inverse=True)
+    assert len(spreads) == 2
+    directions, solid_angle = environment_samples(ENVIRONMENT.image, "sphere", np.eye(3))
+    light = (ENVIRONMENT.image * solid_angle[..., None]).reshape(-1, 3)
+    cosines = functions.centers @ directions.reshape(-1, 3).T
+    gaussians = np.concatenate([gaussian.weight(cosines, float(spread)) @ light for spread in spreads])
+    rows = np.concatenate([functions.coefficients, np.broadcast_to(which[:, None, None], (*functions.coefficients.shape[:2], 1))], axis=2)
+    found = evaluate(
+        "combine/environment_function.glsl",
+        "vec4(srbfCombineEnvironmentFunction(gaussians, coefficients, int(a.x)), 0.0)",
+        vec4(np.arange(len(rows))),
+        images={"gaussians": np.pad(gaussians, ((0, 0), (0, 1)))[None], "coefficients": rows},
+    )[:, :3]
+    sizes = np.abs(functions.coefficients).sum(axis=1) * gaussians.max()
+    assert (np.abs(found - scalar_planes.folded_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
 
 
 def _planes(asset: Asset, lamps: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:

@@ -31,6 +31,8 @@ DEFINES: dict[str, list[dict[str, object]]] = {
     "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1})],
     "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
+    "weighted.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
+    "environment_rows.frag": [{}, {"SRBF_FORMULA": 1}],
     **{f"{method}folded.frag": FOLDED for method in METHODS[1:]},
     **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
     **{f"{method}accumulate.frag": UNITS for method in METHODS},
@@ -44,7 +46,8 @@ def test_every_method_has_the_same_stages() -> None:
     kinds = ["accumulate", "directional", "folded", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
     shadows = ["direct.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
-    assert sorted([*methods, *shadows, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    skies = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
+    assert sorted([*methods, *shadows, *skies, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
