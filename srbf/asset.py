@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy import ndarray
@@ -15,9 +15,14 @@ from srbf.basis.gaussian import GaussianBasis, weight
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
+from srbf.containers import TextureArray, read_texture_array
+from srbf.containers.texture_array import level_bytes, level_size
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.image import Encoding, read_image, require_finite, write_images
+from srbf.quantization import layer_entries
 from srbf.sphere import Domain
+
+LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
 MANIFEST = "asset.json"
 LAYERS = {"relighting-map": "maps", "eigen-map": "planes", "clustered-eigen-map": "planes"}  # the key of a method's images
@@ -31,8 +36,9 @@ TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest'
 class Asset:
     """Stored layers with the rule value = stored * scale + bias, the functions that they weigh, and the receivers' geometry.
 
-    `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255); `scale`, `bias` (N, C). Relighting maps
-    are N = K layers of C = 3, one a Gaussian; scalar planes are four to a layer, C = 4.
+    `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255; BC7 and BC1 are decoded to bytes, of mip
+    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; scalar planes
+    are four to a layer, C = 4.
     `tables` holds what the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32,
     `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
     `images` holds position, normal (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
@@ -84,12 +90,22 @@ class Asset:
 
     @property
     def layers(self) -> list[dict[str, Any]]:
-        """The manifest's entry of every stored layer: file, encoding, scale, bias."""
+        """The manifest's entry of every stored layer: file, encoding, scale, bias; in a texture array also layer and levels."""
         return self.manifest[LAYERS[self.method]]
 
     @property
-    def encoding(self) -> Encoding:
+    def encoding(self) -> LayerEncoding:
         return self.layers[0]["encoding"]
+
+    @property
+    def held(self) -> Encoding:
+        """What `stored` is in memory: blocks are bytes there."""
+        return _ENCODING[self.stored.dtype.name]
+
+    @property
+    def levels(self) -> int:
+        """Mip levels of the layers on disk, the full size included."""
+        return self.layers[0].get("levels", 1)
 
     @property
     def table(self) -> Float32[ndarray, " n"]:
@@ -135,7 +151,7 @@ class Asset:
     def coefficients(self, rows: slice = slice(None)) -> Float32[ndarray, "N h W C"]:
         """The decoded layers, c_i of relighting maps, or some of their rows."""
         stored = self.stored[:, rows].astype(np.float32)
-        if self.encoding == "uint8":
+        if self.held == "uint8":
             stored /= 255
         if (self.scale == 1).all() and (self.bias == 0).all():
             return stored
@@ -148,41 +164,52 @@ class Asset:
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
         return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images={})
 
-    def bytes_per_texel(self) -> dict[str, int]:
+    def bytes_per_texel(self) -> dict[str, int | float]:
         """What a shader reads of a texel's own data, by kind of light: its layers, three channels counting as four since no GPU
-        keeps three, and its cluster's index; the position that point and spot lights need is left out.
+        keeps three, blocks by their sixteenth, and its cluster's index; the position that point and spot lights need is left out.
         """
-        channel = {"half": 2, "float": 4, "uint8": 1}[self.encoding]
-        own = 4 * channel * len(self.stored) + (1 if "cluster_index" in self.tables else 0)
+        bits = TEXEL_BITS[self.encoding] * len(self.stored) + (8 if "cluster_index" in self.tables else 0)
+        own = bits / 8 if bits % 8 else bits // 8
         return {"directional": own, "point": own, "spot": own, "environment": own}
+
+    def layer_bytes(self) -> int:
+        """The layers as GPU memory, with the mip levels they have, and the clusters' index."""
+        sizes = [level_size(self.width, self.height, level) for level in range(self.levels)]
+        form = self.encoding
+        a_layer = sum(2 * level_bytes("half", *size) if form == "float" else level_bytes(form, *size) for size in sizes)
+        return len(self.stored) * a_layer + (self.width * self.height if "cluster_index" in self.tables else 0)
 
     def resident_bytes(self) -> int:
         """Everything the folder holds, as GPU memory: layers, position, normal, albedo, ambient (RGBA float), coverage, the tables and the
         scene."""
         texels = self.width * self.height
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
-        own = self.bytes_per_texel()["directional"] - (1 if "cluster_index" in self.tables else 0)
-        tables = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in self.tables.values())
-        return texels * (own + 4 * channels) + tables + len(self.scene or b"")
+        tables = {name: table for name, table in self.tables.items() if name != "cluster_index"}
+        looked_up = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in tables.values())
+        return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
-        """Write the folder whole or not at all; fills in `sha256`."""
+        """Write the folder whole or not at all, an image a layer; fills in `sha256`."""
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
-            layers = zip(self.layers, self.stored, strict=True)
-            images: list[tuple[Path, ndarray, Encoding]] = [
-                (temporary / entry["file"], stored, entry["encoding"]) for entry, stored in layers
-            ]
-            for name, table in self.tables.items():
-                pixels = table[None] if table.ndim == 1 else table
-                images.append((temporary / self.manifest[name]["file"], np.atleast_3d(pixels), _ENCODING[table.dtype.name]))
-            images += [(temporary / self.manifest[name], image, "float") for name, image in self.images.items()]
-            write_images(images)
-            if self.scene is not None:
-                (temporary / self.manifest["scene"]).write_bytes(self.scene)
-            written = sorted(p.name for p in temporary.iterdir())
-            self.manifest["sha256"] = {name: files.sha256_of(temporary / name) for name in written}
-            schemas.check(self.manifest, "asset", MANIFEST)
-            files.write_json(temporary / MANIFEST, self.manifest)
+            if "layer" in self.layers[0]:  # read from a texture array: saved as what it decoded to
+                self.manifest[LAYERS[self.method]] = layer_entries(LAYERS[self.method][:-1], self.held, self.scale, self.bias)
+            self.write(temporary)
+
+    def write(self, folder: Path, layers: bool = True) -> None:
+        """Fill an existing folder; fills in `sha256` of all that lies there. Without `layers`, they lie there already."""
+        images: list[tuple[Path, ndarray, Encoding]] = []
+        if layers:
+            images += [(folder / entry["file"], stored, self.held) for entry, stored in zip(self.layers, self.stored, strict=True)]
+        for name, table in self.tables.items():
+            pixels = table[None] if table.ndim == 1 else table
+            images.append((folder / self.manifest[name]["file"], np.atleast_3d(pixels), _ENCODING[table.dtype.name]))
+        images += [(folder / self.manifest[name], image, "float") for name, image in self.images.items()]
+        write_images(images)
+        if self.scene is not None:
+            (folder / self.manifest["scene"]).write_bytes(self.scene)
+        self.manifest["sha256"] = files.checksums(folder, MANIFEST)
+        schemas.check(self.manifest, "asset", MANIFEST)
+        files.write_json(folder / MANIFEST, self.manifest)
 
     @staticmethod
     def open(folder: Path | str) -> Asset:
@@ -200,13 +227,16 @@ class Asset:
         layers = manifest[LAYERS[manifest["method"]]]
         if len({entry["encoding"] for entry in layers}) != 1:
             raise ManifestError(f"expected one encoding for all layers in {path}, found several")
-        encoding: Encoding = layers[0]["encoding"]
+        encoding: LayerEncoding = layers[0]["encoding"]
         channels = len(layers[0]["scale"])
         tables = _read_maps(reader, path) if manifest["method"] == "relighting-map" else _read_planes(reader, path)
-        stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), _DTYPE[encoding])
-        for target, entry in zip(stored, layers, strict=True):
-            pixels = reader.image(entry["file"], channels)
-            target[...] = np.round(pixels * 255) if encoding == "uint8" else pixels
+        if any("layer" in entry for entry in layers) or encoding in ("bc7", "bc1"):
+            stored = _read_layers(reader, layers, channels, path)
+        else:
+            stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), _DTYPE[encoding])
+            for target, entry in zip(stored, layers, strict=True):
+                pixels = reader.image(entry["file"], channels)
+                target[...] = np.round(pixels * 255) if encoding == "uint8" else pixels
         images = {name: reader.image(manifest[name], 1 if name == "coverage" else 3) for name in GEOMETRY if name in manifest}
         if "coverage" in images:
             images["coverage"] = images["coverage"][:, :, 0]
@@ -216,6 +246,7 @@ class Asset:
         return Asset(manifest, stored, scale, bias, tables, images, scene)
 
 
+TEXEL_BITS: dict[LayerEncoding, int] = {"half": 64, "float": 128, "uint8": 32, "bc7": 8, "bc1": 4}  # of a layer
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
 _ENCODING: dict[str, Encoding] = {"float16": "half", "float32": "float", "uint8": "uint8"}
 
@@ -244,6 +275,14 @@ class _Reader:
             raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
         return pixels
 
+    def texture(self, name: str) -> TextureArray:
+        texture = read_texture_array(self._checked(name))
+        expected = (self.manifest["width"], self.manifest["height"])
+        if (texture.width, texture.height) != expected:
+            size = f"{texture.width}x{texture.height}"
+            raise ImageError(f"expected {expected[0]}x{expected[1]} texels in {self.folder / name}, found {size}")
+        return texture
+
     def bytes(self, name: str) -> bytes:
         path = self._checked(name)
         if not path.is_file():
@@ -262,6 +301,30 @@ class _Reader:
         pixels = read_image(path, channels)
         require_finite(pixels, path)
         return pixels
+
+
+def _read_layers(reader: _Reader, layers: list[dict[str, Any]], channels: int, path: Path) -> ndarray:
+    """The full size of layers in texture arrays, (N, H, W, C); refuses arrays that are not what the entries say."""
+    textures: dict[str, TextureArray] = {}
+    decoded: dict[str, ndarray] = {}
+    stored = []
+    for entry in layers:
+        name = entry["file"]
+        if "layer" not in entry:
+            raise ManifestError(f"expected the layer of {name} in {path}, found none")
+        if name not in textures:
+            textures[name] = reader.texture(name)
+            decoded[name] = textures[name].pixels()
+        texture = textures[name]
+        told = (entry["encoding"], entry.get("levels", 1))
+        if (texture.form, len(texture.levels)) != told or entry["layer"] >= texture.layers:
+            found = f"{texture.layers} layers of {len(texture.levels)} levels of {texture.form}"
+            raise ManifestError(f"expected layer {entry['layer']} of {told[1]} levels of {told[0]} in {name}, found {found}")
+        stored.append(decoded[name][entry["layer"], ..., :channels])
+    pixels = np.stack(stored)
+    if pixels.dtype == np.float16:
+        require_finite(pixels.reshape(1, -1, channels), reader.folder / layers[0]["file"])
+    return pixels
 
 
 def _read_maps(reader: _Reader, path: Path) -> dict[str, ndarray]:

@@ -75,6 +75,7 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         **_model(asset),
         "domain": asset.domain,
         "encoding": asset.encoding,
+        **({"levels": asset.levels} if asset.levels > 1 else {}),
         "bytes_per_texel": asset.bytes_per_texel(),
         "resident_bytes": asset.resident_bytes(),
         "disk_bytes": folder_bytes(folder),

@@ -140,7 +140,7 @@ def scalars_of(asset: Asset) -> int:
     return 3 * asset.k if asset.method == "relighting-map" else asset.scalars
 
 
-def texel_bytes(asset: Asset) -> int:
+def texel_bytes(asset: Asset) -> int | float:
     """Bytes that a shader reads of a texel's own data under a directional light."""
     return asset.bytes_per_texel()["directional"]
 
@@ -154,7 +154,7 @@ def family_of(asset: Asset) -> str:
 
 def name_of(asset: Asset) -> str:
     """What tells an asset from its siblings: how many numbers a texel, and its encoding where it is not half floats."""
-    encoding = {"half": "", "float": ", float", "uint8": ", bytes"}[asset.encoding]
+    encoding = {"half": "", "float": ", float", "uint8": ", bytes", "bc7": ", BC7", "bc1": ", BC1"}[asset.encoding]
     if asset.method == "relighting-map":
         return f"{asset.k} maps{encoding}"
     return f"{asset.scalars} scalars" + (f", {asset.clusters} clusters" if asset.clusters > 1 else "") + encoding

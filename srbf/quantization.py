@@ -53,13 +53,19 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
         return stored, scale, bias
     bias = low
     scale = np.where(high > low, high - low, 1).astype(np.float32)
+    return round_alone(values, scale, bias), scale, bias
+
+
+def round_alone(values: Float32[ndarray, "N H W C"], scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]) -> ndarray:
+    """The nearest bytes, (N, H, W, C), in ranges that are given; 0 where a scale is 0."""
     stored = np.empty(values.shape, np.uint8)
 
     def bytes_of(i: int) -> None:
-        stored[i] = np.round(np.clip((values[i] - bias[i]) / scale[i], 0, 1) * 255)
+        used = np.where(scale[i] != 0, scale[i], 1)
+        stored[i] = np.round(np.clip((values[i] - bias[i]) / used, 0, 1) * 255)
 
-    each(bytes_of, n)
-    return stored, scale, bias
+    each(bytes_of, len(values))
+    return stored
 
 
 def quantize_together(
@@ -71,10 +77,29 @@ def quantize_together(
     functions' own metric [Babai1986]. With functions = Q R, layer k then errs by at most half a step times |R_kk|, not times its whole
     length, which for overlapping Gaussians is many times more. Work: K^2 / 2 multiplications a value.
     """
-    k, channels = len(values), values.shape[3]
+    scale, bias = ranges_together(values, functions)
+    return round_together(values, functions, scale, bias), scale, bias
+
+
+def ranges_together(
+    values: Float32[ndarray, "K H W C"], functions: Float64[ndarray, "M K"]
+) -> tuple[Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
+    """(scale, bias) of every layer and channel that lose least where layers are rounded together."""
     upper = metric(functions)
     low, high = _ranges(values, np.diag(upper) ** 2, (upper**2).sum(axis=0))
-    step = np.where(high > low, (high - low) / 255, 1).astype(np.float32)
+    return np.where(high > low, (high - low) / 255, 1).astype(np.float32) * np.float32(255), low
+
+
+def round_together(
+    values: Float32[ndarray, "K H W C"],
+    functions: Float64[ndarray, "M K"],
+    scale: Float32[ndarray, "K C"],
+    bias: Float32[ndarray, "K C"],
+) -> ndarray:
+    """Bytes of layers in ranges that are given, each making up for what those after it have lost."""
+    k, channels = len(values), values.shape[3]
+    upper = metric(functions)
+    low, step = bias, scale / np.float32(255)
     passed_on = np.triu(upper / np.diag(upper)[:, None], 1).astype(np.float32)  # (K, K): error of layer j seen in layer k < j
     flat = values.reshape(k, -1, channels)
     stored = np.empty(flat.shape, np.uint8)
@@ -88,7 +113,7 @@ def quantize_together(
             errors[i] = flat[i, part] - (stored[i, part] * step[i] + low[i])
 
     each(work, -(-flat.shape[1] // VALUES_AT_A_TIME))
-    return stored.reshape(values.shape), step * 255, low
+    return stored.reshape(values.shape)
 
 
 def _ranges(

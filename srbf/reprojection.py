@@ -36,7 +36,7 @@ def keep(asset: Asset, count: int, encoding: Encoding | None = None) -> Asset:
         raise InputError(f"expected to keep 1 to {have} of the asset's {have}, found --keep {count}")
     manifest = {key: value for key, value in asset.manifest.items() if key not in ("error", "sha256")}
     manifest["source"] = {**manifest.get("source", {}), "kept": {"of": have}}
-    return (_fewer_maps if asset.method == "relighting-map" else _fewer_planes)(asset, manifest, count, encoding or asset.encoding)
+    return (_fewer_maps if asset.method == "relighting-map" else _fewer_planes)(asset, manifest, count, encoding or asset.held)
 
 
 def _fewer_maps(asset: Asset, manifest: dict[str, Any], count: int, encoding: Encoding) -> Asset:

@@ -60,3 +60,12 @@ def parse_duration(text: str) -> float:
     if seconds <= 0:
         raise InputError(f"expected --time as 90s, 30m or 8h, found {text!r}")
     return seconds
+
+
+def parse_levels(text: str) -> Literal["auto"] | int:
+    """`auto` or a number of mip levels."""
+    if text == "auto":
+        return "auto"
+    if not (text.isascii() and text.isdecimal()):
+        raise InputError(f"expected --levels auto or a whole number, found {text!r}")
+    return int(text)

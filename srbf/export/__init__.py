@@ -1,1 +1,94 @@
-"""An asset in the form that an engine loads: one target a file."""
+"""An asset in the form that an engine loads: one target a file, each a function write(asset, folder, settings)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from srbf.asset import MANIFEST, Asset
+from srbf.errors import InputError
+from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, wgsl
+from srbf.export.loss import relit_psnr
+from srbf.export.settings import PLAIN, Settings, Target, Written
+from srbf.facts import folder_bytes
+from srbf.files import atomic_folder, check_replaceable, checksums, write_json
+
+__all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
+
+TARGETS: dict[str, Target] = {
+    "exr": exr.write,
+    "uint8": uint8.write,
+    "dds": dds.write,
+    "ktx2": ktx2.write,
+    "gltf": gltf.write,
+    "godot": godot.write,
+    "unity": unity.write,
+    "unreal": unreal.write,
+    "hlsl": hlsl.write,
+    "metal": metal.write,
+    "wgsl": wgsl.write,
+}
+
+
+@dataclass(frozen=True)
+class Report:
+    """What an export keeps and costs.
+
+    `psnr` (dB) of its relit pictures against the asset's, as `loss.relit_psnr` has it. `bytes_per_texel` is what a shader reads of a
+    texel's own layers, `bytes_per_texel_resident` what the layers take of GPU memory for each, mip levels included; `layer_bytes` that
+    of all texels, `resident_bytes` everything, tables and geometry included.
+    """
+
+    target: str
+    encoding: str
+    levels: int
+    psnr: float
+    bytes_per_texel: int | float
+    bytes_per_texel_resident: float
+    layer_bytes: int
+    resident_bytes: int
+    disk_bytes: int
+    notes: tuple[str, ...]
+
+
+def check_target(target: str) -> None:
+    """InputError on a target that is not known."""
+    if target not in TARGETS:
+        raise InputError(f"expected a target of {', '.join(TARGETS)}, found {target!r}")
+
+
+def export(
+    asset: Asset, target: str, folder: Path, settings: Settings = PLAIN, force: bool = False, min_psnr: float | None = None
+) -> Report:
+    """Write `folder` whole or not at all; the loss is measured on the files as they are read back, and stands in `source.export`.
+
+    InputError on an unknown target, on settings that the target cannot have, and where the loss leaves less than `min_psnr` (dB).
+    """
+    check_target(target)
+    check_replaceable(folder, force, MANIFEST)
+    with atomic_folder(folder, force, MANIFEST) as temporary:
+        written = TARGETS[target](asset, temporary, settings)
+        exported = Asset.open(temporary)
+        psnr = relit_psnr(asset, exported)
+        if min_psnr is not None and not psnr >= min_psnr:
+            raise InputError(
+                f"expected at least {min_psnr:g} dB of {target} as {exported.encoding}, found {psnr:.2f}; "
+                "nothing was written: take a larger --encoding, or lower --min-psnr"
+            )
+        source = exported.manifest.setdefault("source", {})
+        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3)}
+        exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # what a target has put beside the asset included
+        write_json(temporary / MANIFEST, exported.manifest)
+        disk = folder_bytes(temporary)
+    return Report(
+        target=target,
+        encoding=exported.encoding,
+        levels=exported.levels,
+        psnr=psnr,
+        bytes_per_texel=exported.bytes_per_texel()["directional"],
+        bytes_per_texel_resident=exported.layer_bytes() / (exported.width * exported.height),
+        layer_bytes=exported.layer_bytes(),
+        resident_bytes=exported.resident_bytes(),
+        disk_bytes=disk,
+        notes=written.notes,
+    )

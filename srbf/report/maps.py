@@ -86,7 +86,7 @@ def decoded(subject: Subject, i: int) -> np.ndarray:
     """Map c_i, (H, W, 3), alone."""
     asset = subject.asset
     stored = asset.stored[i].astype(np.float32)
-    return (stored / 255 if asset.encoding == "uint8" else stored) * asset.scale[i] + asset.bias[i]
+    return (stored / 255 if asset.held == "uint8" else stored) * asset.scale[i] + asset.bias[i]
 
 
 def unclamped(subject: Subject, direction: np.ndarray) -> np.ndarray:

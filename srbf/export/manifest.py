@@ -1,0 +1,53 @@
+"""The asset.json of an export: that of the asset, with layers stored another way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from numpy import ndarray
+
+from srbf.arrays import Float32
+from srbf.asset import LAYERS, SCENE_FILE, Asset
+
+TABLE_FILES = {
+    "r_table": "r_table.exr",
+    "light_coefficients": "light_coefficients.exr",
+    "w_table": "w_table.exr",
+    "cluster_index": "cluster_index.png",
+}
+
+
+def with_layers(
+    asset: Asset,
+    target: str,
+    stored: ndarray,
+    scale: Float32[ndarray, "N C"],
+    bias: Float32[ndarray, "N C"],
+    entries: list[dict[str, Any]],
+) -> Asset:
+    """`asset` with other layers and `entries`, every key that a file needs there, whether it was read from one or made in memory.
+
+    Errors by role were measured on the layers as they were; they go, `source.export` says what was done.
+    """
+    manifest: dict[str, Any] = {
+        "format": "srbf-asset",
+        "version": 1,
+        "quantity": "irradiance",
+        "row_origin": "top",
+        "axes": "z-up-right-handed",
+        **{key: value for key, value in asset.manifest.items() if key not in ("error", "sha256")},
+        **{name: f"{name}.exr" for name in asset.images},
+        **({"scene": SCENE_FILE} if asset.scene is not None else {}),
+    }
+    for name, table in asset.tables.items():
+        told = {"size": table.size} if name == "r_table" else {"mapping": "octahedral"} if name == "w_table" else {}
+        manifest[name] = {**told, **manifest.get(name, {}), "file": TABLE_FILES[name]}
+    manifest[LAYERS[asset.method]] = entries
+    manifest["source"] = {**manifest.get("source", {}), "export": {"target": target}}
+    return replace(asset, manifest=manifest, stored=stored, scale=scale, bias=bias)
+
+
+def stem(asset: Asset) -> str:
+    """What the files of its layers are called: `map` or `plane`."""
+    return LAYERS[asset.method][:-1]

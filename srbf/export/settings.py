@@ -1,0 +1,42 @@
+"""What a target is told, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from srbf.asset import Asset, LayerEncoding
+from srbf.errors import InputError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`encoding` of the layers, the target's own unless given; mip `levels`, the full size included, `auto`: as many as charts allow.
+
+    `mesh`: a .glb whose lightmap UV set an engine is to use, for targets that write a mesh.
+    """
+
+    encoding: LayerEncoding | None = None
+    levels: Literal["auto"] | int = "auto"
+    mesh: Path | None = None
+
+
+PLAIN = Settings()
+
+
+@dataclass(frozen=True)
+class Written:
+    """What is worth saying of a folder that a target has filled, a line each."""
+
+    notes: tuple[str, ...] = ()
+
+
+Target = Callable[[Asset, Path, Settings], Written]  # fills an existing empty folder
+
+
+def no_levels(settings: Settings, where: str) -> None:
+    """InputError where mip levels are asked of files that hold none."""
+    if settings.levels not in ("auto", 0, 1):
+        raise InputError(f"expected no mip levels in {where}, found --levels {settings.levels}; export dds or ktx2")
