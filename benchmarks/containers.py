@@ -38,7 +38,7 @@ MIPS = 4 / 3
 METHODS = {
     "25 maps": RelightingMap(k=25, encoding="float"),
     "eigen map, 28 scalars": EigenMap(scalars=28, encoding="float"),
-    "64 clusters of 12 scalars": ClusteredEigenMap(clusters=64, scalars=12, encoding="float"),
+    "64 clusters of 8 scalars": ClusteredEigenMap(encoding="float"),
     "256 clusters of 12 scalars": ClusteredEigenMap(clusters=256, scalars=12, encoding="float"),
 }
 CONTAINERS = (("exr", "half"), ("uint8", "uint8"), ("dds", "bc7"), ("dds", "bc1"))
@@ -168,7 +168,7 @@ def run(path: Path, scratch: Path, timed: bool) -> list[str]:
             print(f"  25 maps of 1024² as KTX2 of BC7, {report.levels} levels, {report.layer_bytes / MIB:.1f} MiB: ", end="")
             print(f"{time.perf_counter() - began:.1f} s, {time.process_time() - cpu:.1f} s of CPU, {report.psnr:.2f} dB", flush=True)
     maps, half = rows["25 maps", "bc7"], rows["25 maps", "half"]
-    clustered = rows["64 clusters of 12 scalars", "bc7"]
+    clustered = rows["64 clusters of 8 scalars", "bc7"]
     missed = []
     if maps.gpu > BAR_MIB or maps.psnr < BAR_PSNR:
         missed.append(f"{path}: 25 maps as BC7: {maps.gpu:.1f} MiB, {maps.psnr:.1f} dB; the bar is {BAR_MIB:g} MiB, {BAR_PSNR:g} dB")
