@@ -10,7 +10,7 @@ from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
-from srbf.export.asset_shader import asset_shader, rows_of
+from srbf.export.asset_shader import asset_shader, counts, rows_of
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     SAMPLERS,
@@ -25,6 +25,7 @@ from srbf.export.translation import (
     Writer,
     guarded,
     pack_files,
+    preprocess,
     render_plain,
     significant,
     split,
@@ -74,11 +75,12 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
 
 def asset_include(asset: Asset) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`. One such include a shader.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader.
 
     Raises InputError on an asset that no shader relights.
     """
-    shader = asset_shader(asset)
+    known = set(counts(asset))
+    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
     writer = HlslWriter(shader.files)
     defines = "\n".join(f"#define {name} {value}" for name, value in shader.defines.items())
     arrays = "\n".join(

@@ -48,8 +48,8 @@ CALLS = {
     ("clustered-eigen-map", False): "srbfAssetDirectional(layers, layersSampler, clusters, uv, weightRows)",
     ("relighting-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
     ("eigen-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
-    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, weights, table, receiver, lamps, 3)",
-    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, weightRows, table, receiver, lamps, 3)",
+    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weights, table, receiver, lamps, 3)",
+    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weightRows, table, receiver, lamps, 3)",
     ("clustered-eigen-map", None): "srbfAssetLights(layers, layersSampler, clusters, uv, weightRows, table, receiver, lamps, 3)",
     ("clustered-eigen-map", True): "srbfAssetPoint(layers, layersSampler, clusters, uv, table, receiver, lamp)",
 }
