@@ -26,6 +26,7 @@ PRECISIONS = frozenset({"highp", "mediump", "lowp"})
 SAMPLERS = frozenset({"sampler2D", "sampler2DArray"})
 SCALARS = frozenset({"void", "float", "int", "uint", "bool"})
 VECTORS = frozenset(f"{kind}vec{n}" for kind in ("", "i", "u", "b") for n in (2, 3, 4))
+MATRICES = frozenset({"mat2", "mat3", "mat4"})
 ASSIGNMENTS = frozenset({"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="})
 WIDTH = 140  # of a line of the pack
 SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
@@ -33,7 +34,6 @@ SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
 UNTRANSLATABLE = frozenset(
     {"mod", "texture", "textureGather", "textureOffset", "dFdx", "dFdy", "discard", "while", "do", "switch", "uniform", "varying"}
     | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "inout"}
-    | {f"mat{n}" for n in ("2", "3", "4")}
 )
 
 

@@ -38,6 +38,7 @@ from srbf.export.translation import (
 )
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
+TYPES |= {f"mat{n}": f"mat{n}x{n}f" for n in (2, 3, 4)}
 TYPES |= {"float": "f32", "int": "i32", "uint": "u32", "bool": "bool"}
 TEXTURES = {"sampler2D": "texture_2d<f32>", "sampler2DArray": "texture_2d_array<f32>"}
 WORDS = {"inversesqrt": "inverseSqrt"}
