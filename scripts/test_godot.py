@@ -124,6 +124,7 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
         "relighting map, uint8": lambda: build_asset(7, "uint8"),
         "relighting map, bc7": lambda: build_asset(7, "float", 12, 16),
         "eigen map, half": lambda: build_planes(9, None, "half", ambient=True),
+        "eigen map, indirect": lambda: build_planes(9, None, "half"),
         "eigen map, bc7, mips": lambda: build_planes(9, None, "float", 12, 16),
         "clustered eigen map, half": lambda: build_planes(9, 5, "half", ambient=True),
         "clustered eigen map, uint8": lambda: build_planes(6, 4, "uint8"),
@@ -135,6 +136,8 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
             asset.manifest["asset_from_world"] = [[0, 1.5, 0, 0.2], [-1.5, 0, 0, 0.1], [0, 0, 1.5, -0.3], [0, 0, 0, 1]]
         else:
             asset = affine(asset)
+        if name.endswith("indirect"):
+            asset.manifest["transport"] = "indirect"
         yield name, asset, Settings("bc7", 3 if name.endswith("mips") else 1) if "bc7" in name else PLAIN
 
 
@@ -148,7 +151,7 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
     if asset.method != "relighting-map":
         yield {"name": "by table", "mode": "canvas", "hdr": True, "placed": STRAIGHT, "by_table": True}
     if np.array_equal(asset.asset_from_world, np.eye(4)):
-        for name in every:
+        for name in every if asset.transport == "combined" else ("directional", "point", "squared"):
             yield {"name": name, "mode": "spatial", "hdr": True, "placed": STRAIGHT}
             yield {"name": name, "mode": "spatial", "hdr": False, "placed": STRAIGHT}
         for name in ("directional", "point", "squared"):
@@ -156,14 +159,16 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
 
 
 def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
-    """What srbf.methods.relight says; of a white mesh what it sends out."""
+    """What srbf.methods.relight says; of irradiance what white sends out."""
     world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
     moved = asset.asset_from_world @ np.linalg.inv(world_from_asset)
     instance = replace(asset, manifest={**asset.manifest, "asset_from_world": moved.tolist()})
     lights = [lit.light() for lit in LIGHTS[job["name"]]]
     picture = far_lamp(instance, SUN) if job.get("by_table") else relight(instance, lights)
-    if job["mode"] == "spatial" and asset.quantity == "irradiance":
+    if asset.quantity == "irradiance":
         picture = picture / np.pi
+    if asset.transport == "indirect" and job["mode"] == "spatial":
+        picture = picture + white(asset, *LIGHTS[job["name"]])  # Godot's own direct light
     return picture
 
 

@@ -8,6 +8,8 @@ extends Resource
 
 @export var method: String
 @export var quantity: String
+## Whether direct light is left out, to be added by the engine.
+@export var is_indirect: bool
 ## Whether the texels are the pixels of a fixed camera.
 @export var is_view: bool
 @export var width: int
@@ -50,6 +52,7 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var asset := SrbfAsset.new()
 	asset.method = manifest.method
 	asset.quantity = manifest.quantity
+	asset.is_indirect = manifest.get("transport") == "indirect"
 	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
@@ -112,10 +115,11 @@ func texture(name: StringName) -> ImageTexture:
 
 ## The first lines of a shader for this asset.
 func defines() -> String:
+	var kind := ("#define SRBF_IRRADIANCE\n" if quantity == "irradiance" else "") + ("#define SRBF_INDIRECT\n" if is_indirect and quantity == "irradiance" else "")
 	if method == "relighting-map":
-		return "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
+		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
 	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
-	return "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+	return kind + "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
 ## Relighting maps: one weight a map for all far lights together, the sum of color R_i(direction).

@@ -143,8 +143,8 @@ static func _decay(light: Light3D) -> float:
 
 func _material(type: String, file: String) -> ShaderMaterial:
 	var shader := Shader.new()
-	shader.code = "shader_type %s;\n%s%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
-		type, asset.defines(), "#define SRBF_IRRADIANCE\n" if asset.quantity == "irradiance" else "", most_lamps, file
+	shader.code = "shader_type %s;\n%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+		type, asset.defines(), most_lamps, file
 	]
 	var material := ShaderMaterial.new()
 	material.shader = shader
