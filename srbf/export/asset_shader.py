@@ -1,7 +1,7 @@
 """What an engine's shader calls for one asset: the pack's functions with the asset's own numbers, in any dialect.
 
-`srbfAssetDirectional` and `srbfAssetPoint` are written once, in the pack's GLSL, and translated with it. Counts, centers, scale and bias
-are constants of the shader: a fixed scale of 1 costs nothing, and an engine passes weights and lamps alone.
+`srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
+centers, scale and bias are constants of the shader: a fixed scale of 1 costs nothing, and an engine passes weights and lamps alone.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from srbf.errors import InputError
 from srbf.export.translation import PackFile, pack_files, parse
 from srbf.gl.uniforms import padded
 
+MOST_LAMPS = 8  # that srbfAssetLights takes at once
 _MAPS = """
 /* All directional and environment lights of this asset: weights of srbf.methods.folded_weights. */
 vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, vec4 weights[SRBF_K]) {
@@ -26,6 +27,12 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, vec4 weights[SRB
 /* One point or spot light of this asset; table is r_table.exr. */
 vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
     return srbfRelightPoint(layers, uv, 0, table, srbfCenters, srbfScale, srbfBias, receiver, lamp);
+}
+
+/* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
+                     vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
+    return srbfRelightLights(layers, uv, 0.0, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
 }
 """
 _PLANES = """
@@ -38,6 +45,12 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, highp sampler2D 
 vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
     return srbfEigenMapPoint(layers, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamp);
 }
+
+/* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, highp sampler2D weights, highp sampler2D table, vec3 receiver,
+                     vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
+    return srbfEigenMapLights(layers, uv, 0.0, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
+}
 """
 _CLUSTERED = """
 /* All directional and environment lights of this asset: a row of weights a cluster, bilinear between texels. */
@@ -48,6 +61,13 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, highp sampler2D clusters,
 /* One point or spot light of this asset, bilinear between texels; table is w_table.exr. */
 vec3 srbfAssetPoint(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
     return srbfClusteredPointFiltered(layers, clusters, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamp);
+}
+
+/* All lights of this asset at once, bilinear between texels: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+vec3 srbfAssetLights(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D weights, highp sampler2D table,
+                     vec3 receiver, vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
+    return srbfClusteredLightsFiltered(layers, clusters, uv, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps,
+                                       lampCount);
 }
 """
 _FUNCTIONS = {"relighting-map": _MAPS, "eigen-map": _PLANES, "clustered-eigen-map": _CLUSTERED}
@@ -70,16 +90,24 @@ class AssetShader:
         return self.files[-1]
 
 
-def asset_shader(asset: Asset) -> AssetShader:
-    """The shader of one asset; InputError on functions that no shader knows."""
+def counts(asset: Asset) -> dict[str, int]:
+    """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights."""
+    if asset.method == "relighting-map":
+        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS}
     if asset.method not in _FUNCTIONS:
         raise InputError(f"expected an asset of {', '.join(_FUNCTIONS)}, found {asset.method}: no shader relights it")
-    path = f"methods/{asset.method.replace('-', '_')}.glsl"
-    files = [*pack_files([path]), parse(_FUNCTIONS[asset.method], "asset")]
+    size = asset.manifest["w_table"]["size"]
+    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS}
+
+
+def asset_shader(asset: Asset, prepare: Callable[[str, str], str] = lambda text, path: text) -> AssetShader:
+    """The shader of one asset, its files by `pack_files`; InputError on functions that no shader knows."""
+    defines = counts(asset)
+    stem = asset.method.replace("-", "_")
+    files = [*pack_files([f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl"], None, prepare), parse(_FUNCTIONS[asset.method], "asset")]
     if asset.method == "relighting-map":
         arrays = {"srbfCenters": padded(asset.basis.centers), "srbfScale": padded(asset.scale), "srbfBias": padded(asset.bias)}
-        return AssetShader({"SRBF_K": asset.k}, {name: ("SRBF_K", rows) for name, rows in arrays.items()}, files)
-    defines = {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": asset.manifest["w_table"]["size"]}
+        return AssetShader(defines, {name: ("SRBF_K", rows) for name, rows in arrays.items()}, files)
     return AssetShader(defines, {"srbfScale": ("SRBF_LAYERS", asset.scale), "srbfBias": ("SRBF_LAYERS", asset.bias)}, files)
 
 

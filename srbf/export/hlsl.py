@@ -3,13 +3,32 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
+from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, rows_of
-from srbf.export.translation import SAMPLERS, VECTORS, Constant, Function, PackFile, Parameter, Writer, guarded, pack_files
+from srbf.export.settings import PLAIN, Settings, Written
+from srbf.export.translation import (
+    SAMPLERS,
+    VECTORS,
+    Constant,
+    Function,
+    Node,
+    PackFile,
+    Parameter,
+    Struct,
+    Token,
+    Writer,
+    guarded,
+    pack_files,
+    render_plain,
+    significant,
+    split,
+)
 
 TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "int"), ("u", "uint"), ("b", "bool")) for n in (2, 3, 4)}
 TEXTURES = {"sampler2D": "Texture2D", "sampler2DArray": "Texture2DArray"}
@@ -48,9 +67,9 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
     What the pack asks for by `#define` (`SRBF_K`, `SRBF_SCALARS`) the including shader defines first.
     Raises ShaderError on GLSL that HLSL has no word for.
     """
-    files = pack_files(paths, root)
-    writer = HlslWriter(files)
-    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in files)])
+    pack = pack_files(paths, root)
+    writer = HlslWriter(pack)
+    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in pack)])
 
 
 def asset_include(asset: Asset) -> str:
@@ -70,11 +89,19 @@ def asset_include(asset: Asset) -> str:
     return "\n".join([HEADING, defines + "\n", PRELUDE, *pack, arrays + "\n", writer.file(shader.own).strip() + "\n"])
 
 
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and `srbf.hlsl`, which relights it. Raises what `asset_include` raises."""
+    asset_include(asset)  # refuses before anything is written
+    written = exr.write(asset, folder, settings)
+    files.write_text(folder / "srbf.hlsl", asset_include(Asset.open(folder)))
+    return written
+
+
 class HlslWriter(Writer):
     """HLSL of parsed files."""
 
-    def __init__(self, files: list[PackFile]) -> None:
-        super().__init__(files, TYPES, WORDS, RESERVED)
+    def __init__(self, pack: list[PackFile]) -> None:
+        super().__init__(pack, TYPES, WORDS, RESERVED)
 
     def constant(self, item: Constant) -> str:
         return f"static const {self.type(item.type)} {item.name} = {self.expression(item.value)};"
@@ -84,7 +111,15 @@ class HlslWriter(Writer):
         if parameter.type in SAMPLERS:
             sampler = [f"SamplerState {name}Sampler"] if (function.name, parameter.name) in self.sampled else []
             return [f"{TEXTURES[parameter.type]} {name}", *sampler]
-        return [f"{self.type(parameter.type)} {name}" + (f"[{parameter.size}]" if parameter.size is not None else "")]
+        text = f"{self.type(parameter.type)} {name}" + (f"[{parameter.size}]" if parameter.size is not None else "")
+        return ["out " + text if parameter.out else text]
+
+    def struct(self, item: Struct) -> str:
+        """The struct, and a function that makes one: HLSL has no constructors of structs."""
+        members = [_declared(part) for part in split(item.body.inside, ";") if significant(part)]
+        parameters = ", ".join(f"{self.type(kind)} {self.name(name)}" for kind, name in members)
+        lines = [f"    {item.name} made;", *(f"    made.{self.name(name)} = {self.name(name)};" for _, name in members), "    return made;"]
+        return super().struct(item) + f"\n\n{item.name} {_maker(item.name)}({parameters}) {{\n" + "\n".join(lines) + "\n}"
 
     def call(self, name: str, arguments: list[str]) -> str:
         arguments = [_bare(argument) for argument in arguments]
@@ -106,6 +141,8 @@ class HlslWriter(Writer):
             return f"{trimmed[0]}.SampleGrad({trimmed[0]}Sampler, {', '.join(trimmed[1:])})"
         if name == "atan" and len(arguments) == 2:
             name = "atan2"
+        if name in self.structs:
+            name = _maker(name)
         return super().call(name, arguments)
 
     @staticmethod
@@ -113,6 +150,18 @@ class HlslWriter(Writer):
         """The place and level of a Load; the pack fetches from plain textures alone."""
         parts = re.fullmatch(r"int2\((.+)\)", place)
         return f"int3({parts[1]}, {level})" if parts and _balanced(parts[1]) else f"int3({place}, {level})"
+
+
+def _maker(struct: str) -> str:
+    return f"srbfMake{struct.removeprefix('Srbf')}"
+
+
+def _declared(nodes: Sequence[Node]) -> tuple[str, str]:
+    """Type and name of a struct's member; ShaderError on an array."""
+    words = significant(nodes)
+    if not (len(words) == 2 and isinstance(words[0], Token) and isinstance(words[1], Token)):
+        raise ShaderError(f"expected a struct's member as type and name, found {render_plain(nodes).strip()!r}")
+    return words[0].text, words[1].text
 
 
 def _bare(argument: str) -> str:

@@ -7,7 +7,7 @@ pack holds is translated, and GLSL that a dialect has no word for is refused by 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +32,7 @@ SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
 # What no dialect has a word for, or another meaning: the pack does without.
 UNTRANSLATABLE = frozenset(
     {"mod", "texture", "textureGather", "textureOffset", "dFdx", "dFdy", "discard", "while", "do", "switch", "uniform", "varying"}
-    | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "out", "inout"}
+    | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "inout"}
     | {f"mat{n}" for n in ("2", "3", "4")}
 )
 
@@ -58,11 +58,12 @@ Node = Token | Group
 
 @dataclass(frozen=True)
 class Parameter:
-    """A function's parameter; `size` is the text between an array's brackets."""
+    """A function's parameter; `size` is the text between an array's brackets, `out` whether the function writes it."""
 
     type: str
     name: str
     size: str | None = None
+    out: bool = False
 
 
 @dataclass(frozen=True)
@@ -113,8 +114,13 @@ def library_paths(root: Path | None = None) -> list[str]:
     return sorted(path.relative_to(base).as_posix() for path in base.rglob("*.glsl"))
 
 
-def pack_files(paths: Iterable[str], root: Path | None = None) -> list[PackFile]:
-    """The files and all that they include, each once, after what it includes. ShaderError on a missing file or GLSL past the subset."""
+def pack_files(
+    paths: Iterable[str], root: Path | None = None, prepare: Callable[[str, str], str] = lambda text, path: text
+) -> list[PackFile]:
+    """The files and all that they include, each once, after what it includes; `prepare` (text, path) is asked in that order.
+
+    ShaderError on a missing file or GLSL past the subset.
+    """
     base = shader_root() if root is None else root
     found: dict[str, PackFile | None] = {}
 
@@ -129,7 +135,7 @@ def pack_files(paths: Iterable[str], root: Path | None = None) -> list[PackFile]
         for match in re.finditer(r'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE):
             visit(match[1], path)
         del found[path]
-        found[path] = parse(text, path)  # last, so that the order is that of dependence
+        found[path] = parse(prepare(text, path), path)  # last, so that the order is that of dependence
 
     for path in paths:
         visit(path, "translation")
@@ -231,10 +237,12 @@ def _item(nodes: Sequence[Node], path: str) -> Item:
 
 def _parameter(nodes: Sequence[Node], path: str) -> Parameter:
     words = [node for node in significant(nodes) if not (isinstance(node, Token) and node.text in (*PRECISIONS, "in", "const"))]
+    out = isinstance(words[0], Token) and words[0].text == "out"
+    words = words[out:]
     if not (len(words) in (2, 3) and isinstance(words[0], Token) and isinstance(words[1], Token)):
         raise ShaderError(f"{path}: expected a parameter as type and name, found {render_plain(nodes).strip()!r}")
     size = render_plain(words[2].inside) if len(words) == 3 and isinstance(words[2], Group) else None
-    return Parameter(words[0].text, words[1].text, size)
+    return Parameter(words[0].text, words[1].text, size, out)
 
 
 @dataclass

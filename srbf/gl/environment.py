@@ -76,10 +76,10 @@ class Sky:
             passing.enter_context(self._textures.passing(light.image)).use(0)
             self._centers.use(1)
             if self._maps:
-                self._textures.r_table().use(2)
+                self._textures.r_pairs().use(2)
                 uniforms["rTable"] = 2
             self._onto(buffer, blend=False)
-            self._programs.run("environment_rows.frag", {} if self._maps else {"SRBF_FORMULA": 1}, uniforms)
+            self._programs.run("environment_rows.frag", {"SRBF_PAIRS" if self._maps else "SRBF_FORMULA": 1}, uniforms)
             rows.use(0)
             self._onto(self._weights_buffer if self._maps else self._gaussians_buffer, blend=self._maps)
             self._programs.run("environment_weights.frag", {}, {"rows": 0, "color": light.color})

@@ -26,6 +26,8 @@ LIGHTS: dict[str, Light] = {
     "spot": SpotLight((0.4, -0.3, 1.1), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.6),
 }
 
+ALL = list(LIGHTS.values())
+
 
 def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
     """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of scalar planes, float32."""

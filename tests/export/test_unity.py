@@ -17,10 +17,11 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 from srbf import methods
 from srbf.asset import Asset
 from srbf.export import spirv, unity
+from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
-from srbf.gl.uniforms import lamp_uniforms
-from srbf.lights import DirectionalLight, PointLight
+from srbf.gl.uniforms import packed_lamps
+from srbf.lights import DirectionalLight, PointLight, SpotLight
 
 needs_spirv = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono")), reason="needs mono-mcs and mono-runtime (Debian)")
@@ -114,15 +115,9 @@ def test_the_custom_function_gives_numpys_pixels(assets: dict[str, Asset], folde
 
 def uniforms_of(lights: list[Any], weights: np.ndarray, matrix: np.ndarray) -> dict[str, Any]:
     """What SrbfRelitRenderer sets, by its own layout; the matrix by rows, as spirv-cross hands HLSL's to GLSL."""
-    lamps = [lamp_uniforms(light) for light in lights if isinstance(light, PointLight)]
-    rows = {name: np.zeros((8, 4), np.float32) for name in ("Position", "Color", "Axis", "Cone")}
-    for i, lamp in enumerate(lamps):
-        rows["Position"][i] = [*lamp["position"], lamp["a0"]]
-        rows["Color"][i] = [*lamp["color"], lamp["radius"]]
-        rows["Axis"][i] = [*lamp["axis"], lamp["falloff"]]
-        rows["Cone"][i, :2] = lamp["versineInner"], lamp["versineOuter"]
-    uniforms: dict[str, Any] = {f"_SrbfLamp{name}": values for name, values in rows.items()}
-    return uniforms | {"_SrbfWeights": weights, "_SrbfLampCount": len(lamps), "_SrbfAssetFromWorld": matrix.astype(np.float32)}
+    lamps = [light for light in lights if isinstance(light, PointLight)]
+    packed = packed_lamps(lamps, MOST_LAMPS)
+    return {"_SrbfWeights": weights, "_SrbfLampCount": len(lamps), "_SrbfLamps": packed, "_SrbfAssetFromWorld": matrix.astype(np.float32)}
 
 
 @needs_spirv
@@ -200,6 +195,12 @@ def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], answers:
     assert np.linalg.det(AXES) == -1  # left-handed to right-handed
     np.testing.assert_array_equal(np.array(said["axes"]).reshape(4, 4)[:3, :3], AXES)
     np.testing.assert_allclose(said["versines"][0], [5e-7, 1 - math.cos(0.3), 1 - math.cos(2)], rtol=1e-6)
+    spot = SpotLight(
+        (0.4, -0.3, 1.1), (0.5, 1, 2), a0=0.8, radius=0.05, falloff="inverse-square", direction=(0, 0.6, -0.8),
+        inner=math.radians(20), outer=math.radians(35),
+    )  # fmt: skip
+    point = PointLight((0.4, -0.3, 1.1), (0.5, 1, 2), a0=0.7, radius=0.01)
+    np.testing.assert_allclose(np.reshape(said["lamp"], (8, 4)), packed_lamps([spot, point], 2), rtol=2e-7)
     assert said["wronghalves"] == [[]]
     values = np.array([1.00048828125, 1.0009766, -0.3333333, 65519, 65520, 3e-8, 0.99999], np.float32)
     with np.errstate(over="ignore"):
@@ -252,7 +253,6 @@ def test_the_files_that_use_unity_compile_against_its_interfaces(tmp_path: Path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_shader_declares_as_many_lamps_as_the_component_sets() -> None:
-    root = engine_root("unity") / "Srbf"
-    assert "#define SRBF_LAMPS 8 " in (root / "Shaders/SrbfUnity.hlsl").read_text()
-    assert "MostLamps = 8;" in (root / "Runtime/SrbfRelitRenderer.cs").read_text()
+def test_the_component_sets_as_many_lamps_as_the_shader_has() -> None:
+    code = (engine_root("unity") / "Srbf" / "Runtime/SrbfRelitRenderer.cs").read_text()
+    assert f"MostLamps = {MOST_LAMPS};" in code

@@ -1,7 +1,7 @@
 export { type Asset, type Basis, type LoadOptions, loadAsset } from "./asset";
 export { SrbfError } from "./errors";
 export type { ByteImage, FloatImage, HalfImage } from "./image";
-export { type LampUniforms, lampUniforms, versine } from "./lamp";
+export { type LampUniforms, lampRoom, lampUniforms, packedLamps, versine } from "./lamp";
 export type { LayerStack } from "./layers";
 export {
   type DirectionalLight,

@@ -37,6 +37,8 @@ static class Answers
         }
         Print("axes", SrbfMath.Axes);
         Print("versines", SrbfMath.Versine(0.001), SrbfMath.Versine(0.3), SrbfMath.Versine(2));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0.6, -0.8), 0.8, 0.05, false, 40, 70));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0, 1), 0.7, 0.01, true, -1, -1));
         var halves = new List<double>();
         for (int bits = 0; bits < 65536; bits++)
             if ((bits & 0x7C00) != 0x7C00 && SrbfImage.ToHalf(SrbfImage.FromHalf((ushort)bits)) != bits) halves.Add(bits);

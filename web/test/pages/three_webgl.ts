@@ -15,16 +15,18 @@ function shared(): THREE.WebGLRenderer {
   return renderer;
 }
 
-/** The lightmap that the asset draws into its own target. */
+/** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function threeLightmap(job: Job) {
   const map = await SrbfRelightingMap.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true });
-  map.lights.push(...job.lights.map(lightOfJson));
-  map.update(shared());
   const { width, height } = map.asset.manifest;
   const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
-  const pixels = read(target, width, height);
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(shared());
+    return picture(width, height, read(target, width, height));
+  });
   map.dispose();
-  return picture(width, height, pixels);
+  return { pictures };
 }
 
 /** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */

@@ -104,6 +104,24 @@ namespace Srbf
         /// <summary>1 - cos of a spot's half-angle, precise for narrow ones; the shader's versineInner and versineOuter.</summary>
         public static double Versine(double halfAngle) { return 2 * Math.Sin(halfAngle / 2) * Math.Sin(halfAngle / 2); }
 
+        /// <summary>
+        /// Sixteen floats of a lamp in the asset's frame, as srbfUnpackLamp takes them: its colour becomes the irradiance at 1 m. Angles are
+        /// Unity's, whole and in degrees; below 0 for a point light.
+        /// </summary>
+        public static float[] PackedLamp(Vector place, Vector color, Vector axis, double a0, double radius, bool linear, double innerDegrees, double outerDegrees)
+        {
+            double atOne = linear ? a0 : a0 * a0;
+            double inner = outerDegrees < 0 ? 3 : Versine(innerDegrees * 0.5 * Math.PI / 180), outer = outerDegrees < 0 ? 4 : Versine(outerDegrees * 0.5 * Math.PI / 180);
+            Func<double, float> low = value => (float)(value - (float)value);
+            return Array.ConvertAll(new[]
+            {
+                place.X, place.Y, place.Z, radius,
+                low(place.X), low(place.Y), low(place.Z), linear ? 0 : 1,
+                color.X * atOne, color.Y * atOne, color.Z * atOne, inner,
+                axis.X, axis.Y, axis.Z, outer,
+            }, value => (float)value);
+        }
+
         static void Add(double[] sums, int i, Vector color, double weight)
         {
             sums[3 * i] += color.X * weight;
