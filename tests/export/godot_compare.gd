@@ -18,6 +18,7 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	viewport.render_target_update_mode = SubViewport.UPDATE_ALWAYS
 	var relight := SrbfRelight.new()
 	relight.asset = asset
+	relight.suns_by_table = job.by_table
 	relight.transform = str_to_var(job.transform)
 	for light in job.lights:
 		relight.lights.append(_light(light))

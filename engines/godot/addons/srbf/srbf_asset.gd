@@ -8,6 +8,8 @@ extends Resource
 
 @export var method: String
 @export var quantity: String
+## Whether direct light is left out, to be added by the engine.
+@export var is_indirect: bool
 ## Whether the texels are the pixels of a fixed camera.
 @export var is_view: bool
 @export var width: int
@@ -37,6 +39,7 @@ extends Resource
 @export var cluster_index: Image
 
 var _textures := {}
+var _table := PackedFloat32Array()  # red, green, blue of w_table
 
 
 ## The asset that an asset.json describes; null, and an error in the log, where something is missing.
@@ -49,6 +52,7 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var asset := SrbfAsset.new()
 	asset.method = manifest.method
 	asset.quantity = manifest.quantity
+	asset.is_indirect = manifest.get("transport") == "indirect"
 	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
@@ -111,10 +115,11 @@ func texture(name: StringName) -> ImageTexture:
 
 ## The first lines of a shader for this asset.
 func defines() -> String:
+	var kind := ("#define SRBF_IRRADIANCE\n" if quantity == "irradiance" else "") + ("#define SRBF_INDIRECT\n" if is_indirect and quantity == "irradiance" else "")
 	if method == "relighting-map":
-		return "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
+		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
 	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
-	return "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+	return kind + "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
 ## Relighting maps: one weight a map for all far lights together, the sum of color R_i(direction).
@@ -155,6 +160,32 @@ func plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -
 		weights[4 * f + 1] = green
 		weights[4 * f + 2] = blue
 		weights[4 * f + 3] = 1.0
+	return Image.create_from_data(scalars + 1, clusters, false, Image.FORMAT_RGBAF, weights.to_byte_array())
+
+
+## plane_weights by the table that lamps use, in a fraction of the time: for suns that move. It differs from the functions by
+## w_table.error of asset.json.
+func table_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> Image:
+	if _table.is_empty():
+		var table: Image = w_table.duplicate()
+		table.convert(Image.FORMAT_RGBF)
+		_table = table.get_data().to_float32_array()
+	var row := w_table.get_width()
+	var columns := row / w_table_size
+	var sums := PackedVector3Array()
+	sums.resize(spreads.size())
+	for n in directions.size():
+		var place := (_octahedral(directions[n]) + Vector2.ONE) * (0.5 * (w_table_size - 1))
+		var node := Vector2i(place).clampi(0, w_table_size - 2)
+		var part := place - Vector2(node)
+		for f in sums.size():
+			var at := ((f / columns) * w_table_size + node.y) * row + (f % columns) * w_table_size + node.x
+			var top := _entry(at).lerp(_entry(at + 1), part.x)
+			var bottom := _entry(at + row).lerp(_entry(at + row + 1), part.x)
+			sums[f] += colors[n] * top.lerp(bottom, part.y)
+	var weights := PackedFloat32Array()
+	for sum in sums:
+		weights.append_array([sum.x, sum.y, sum.z, 1.0])
 	return Image.create_from_data(scalars + 1, clusters, false, Image.FORMAT_RGBAF, weights.to_byte_array())
 
 
@@ -235,6 +266,18 @@ func _belongs(triangle: Array, points: PackedVector3Array, limit: float) -> bool
 func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
 	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
 	return across.dot(normals[triangle[0]]) > 0.0
+
+
+func _entry(texel: int) -> Vector3:
+	return Vector3(_table[3 * texel], _table[3 * texel + 1], _table[3 * texel + 2])
+
+
+## A direction's place on the octahedral square, -1 to 1 [Cigolle2014].
+static func _octahedral(direction: Vector3) -> Vector2:
+	var d := direction / (absf(direction.x) + absf(direction.y) + absf(direction.z))
+	if d.z >= 0.0:
+		return Vector2(d.x, d.y)
+	return Vector2((1.0 - absf(d.y)) * (-1.0 if d.x < 0.0 else 1.0), (1.0 - absf(d.x)) * (-1.0 if d.y < 0.0 else 1.0))
 
 
 func _gaussians(spread: float, directions: PackedVector3Array, colors: PackedVector3Array) -> PackedFloat64Array:

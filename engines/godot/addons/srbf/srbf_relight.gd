@@ -17,6 +17,8 @@ const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 @export var lights: Array[Light3D]
 ## How many omni and spot lights a shader has room for.
 @export_range(1, 64) var most_lamps := 4
+## Eigen maps: weigh directional lights by the table, as omni and spot lights are, where they move every frame.
+@export var suns_by_table := false
 ## For canvas items, in stops.
 @export var exposure := 0.0
 
@@ -60,7 +62,7 @@ func _process(_delta: float) -> void:
 		found.assign(get_tree().root.find_children("*", "Light3D", true, false))
 	found = found.filter(func(light: Light3D) -> bool: return light.is_visible_in_tree())
 	var asset_from_godot := asset.asset_from_world * Z_UP * global_transform.affine_inverse()
-	var now := [asset_from_godot, exposure, get_viewport().use_hdr_2d]
+	var now := [asset_from_godot, exposure, suns_by_table, get_viewport().use_hdr_2d]
 	for light in found:
 		now.append_array([light.global_transform, light.light_color, light.light_energy, light.light_negative])
 		if not light is DirectionalLight3D:
@@ -87,7 +89,7 @@ func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 	if asset.method == "relighting-map":
 		_give("srbf_weights", asset.map_weights(directions, colors))
 		return
-	var image := asset.plane_weights(directions, colors)
+	var image := asset.table_weights(directions, colors) if suns_by_table else asset.plane_weights(directions, colors)
 	if _weights == null:
 		_weights = ImageTexture.create_from_image(image)
 		_give("srbf_weights", _weights)
@@ -141,8 +143,8 @@ static func _decay(light: Light3D) -> float:
 
 func _material(type: String, file: String) -> ShaderMaterial:
 	var shader := Shader.new()
-	shader.code = "shader_type %s;\n%s%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
-		type, asset.defines(), "#define SRBF_IRRADIANCE\n" if asset.quantity == "irradiance" else "", most_lamps, file
+	shader.code = "shader_type %s;\n%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+		type, asset.defines(), most_lamps, file
 	]
 	var material := ShaderMaterial.new()
 	material.shader = shader
