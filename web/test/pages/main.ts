@@ -2,6 +2,7 @@
 import { babylonMaterial } from "./babylon";
 import { host, layers, load } from "./host";
 import type { Job } from "./job";
+import { playcanvasMaterial } from "./playcanvas";
 import { nodesLightmap, nodesMaterial } from "./three_nodes";
 import { threeLightmap, threeMaterial } from "./three_webgl";
 
@@ -10,6 +11,7 @@ const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   host,
   layers,
   load,
+  "playcanvas-material": playcanvasMaterial,
   "nodes-lightmap": nodesLightmap,
   "nodes-material": nodesMaterial,
   "three-lightmap": threeLightmap,
