@@ -14,9 +14,11 @@ float srbfCenterWeight(highp sampler2D rTable, vec3 lightDirection, vec4 center)
     float versine = srbfVersine(lightDirection, center.xyz);
 #ifdef SRBF_FORMULA
     return srbfWeightFormula(versine, center.w);
-#elif defined(SRBF_PAIRS)
+#else
+#ifdef SRBF_PAIRS
     return srbfWeightPairs(rTable, versine);
 #else
     return srbfWeight(rTable, 1.0 - versine);
+#endif
 #endif
 }

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, ktx2, uint8
+from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, wgsl
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
@@ -21,6 +21,12 @@ TARGETS: dict[str, Target] = {
     "dds": dds.write,
     "ktx2": ktx2.write,
     "gltf": gltf.write,
+    "godot": godot.write,
+    "unity": unity.write,
+    "unreal": unreal.write,
+    "hlsl": hlsl.write,
+    "metal": metal.write,
+    "wgsl": wgsl.write,
 }
 
 

@@ -285,15 +285,16 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
             asset.manifest["domain"] = domain
             asset.manifest["asset_from_world"] = [[*row, 0.0] for row in turn.tolist()] + [[0, 0, 0, 1.0]]
             kind = 0 if domain == "sphere" else 1 if turn[2, 2] == 1 else 2
-            matrix = ", ".join(map(repr, turn.T.ravel().tolist()))
             for i in range(K):
                 center = ", ".join(map(repr, asset.basis.centers[i].tolist()))
-                row = f"environment, int(a.x), rTable, vec4({center}, 0.0), mat3({matrix}), {kind}"
+                row = f"environment, int(a.x), rTable, vec4({center}, 0.0), assetFromMap, {kind}"
                 found = evaluate(
                     "combine/environment_row.glsl",
                     f"vec4(srbfCombineEnvironmentRow({row}), 0.0)",
                     vec4(rows),
                     images={"environment": ENVIRONMENT.image, "rTable": asset.table[None, :, None]},
+                    arrays={"assetFromMap": padded(turn)},
+                    declarations="uniform vec4 assetFromMap[3];",
                 )[:, :3]
                 expected = folded_weights(asset, [ENVIRONMENT])[i]
                 np.testing.assert_allclose(found.sum(axis=0), expected, atol=SUM * (expected.max() + 1))

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: MIT
+@tool
+class_name SrbfAsset
+extends Resource
+## An asset of srbf in one resource: layers, tables, geometry, and the weights that far lights give the layers.
+##
+## Directions and positions here are in the asset's own frame, z up; SrbfRelight turns Godot's y-up world into it.
+
+@export var method: String
+@export var quantity: String
+## Whether the texels are the pixels of a fixed camera.
+@export var is_view: bool
+@export var width: int
+@export var height: int
+## World to the frame that the asset was captured in, both z up.
+@export var asset_from_world: Transform3D
+@export var layer_images: Array[Image]
+## Mip levels of the layers, the full size included.
+@export var levels := 1
+@export var scale: PackedVector4Array
+@export var bias: PackedVector4Array
+@export var position: Image
+@export var normal: Image
+@export var coverage: Image
+@export var ambient: Image
+## Unit centers of the Gaussians: of the maps themselves, or of the light functions.
+@export var centers: PackedVector3Array
+## Relighting maps: R at cos θ = -1 + 2 j / (n - 1).
+@export var r_table: Image
+@export var scalars: int
+@export var clusters: int
+@export var spreads: PackedFloat64Array
+## Scalar planes: red, green, blue of center b in function f at 3 (f B + b).
+@export var light_coefficients: PackedFloat32Array
+@export var w_table: Image
+@export var w_table_size: int
+@export var cluster_index: Image
+
+var _textures := {}
+
+
+## The asset that an asset.json describes; null, and an error in the log, where something is missing.
+static func read(manifest_path: String) -> SrbfAsset:
+	var manifest = JSON.parse_string(FileAccess.get_file_as_string(manifest_path))
+	if not manifest is Dictionary or manifest.get("format") != "srbf-asset" or manifest.get("version") != 1:
+		push_error("expected an asset of srbf, version 1, at %s, found none" % manifest_path)
+		return null
+	var folder := manifest_path.get_base_dir()
+	var asset := SrbfAsset.new()
+	asset.method = manifest.method
+	asset.quantity = manifest.quantity
+	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
+	asset.width = int(manifest.width)
+	asset.height = int(manifest.height)
+	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
+	var layers: Array = manifest.maps if asset.method == "relighting-map" else manifest.planes
+	asset.levels = int(layers[0].get("levels", 1))
+	var arrays := {}  # layers in one file, by its name
+	for layer in layers:
+		if layer.has("layer"):
+			if not arrays.has(layer.file):
+				arrays[layer.file] = SrbfDds.read(folder.path_join(layer.file))
+			asset.layer_images.append(arrays[layer.file][layer.layer] if layer.layer < arrays[layer.file].size() else null)
+		else:
+			asset.layer_images.append(_image(folder, layer.file))
+		asset.scale.append(_vector4(layer.scale))
+		asset.bias.append(_vector4(layer.bias))
+	for name in ["position", "normal", "coverage", "ambient"]:
+		if manifest.has(name):
+			asset.set(name, _image(folder, manifest[name]))
+	if asset.method == "relighting-map":
+		asset.centers = _vectors(manifest.basis.centers)
+		asset.r_table = _image(folder, manifest.r_table.file)
+		asset.r_table.convert(Image.FORMAT_RF)
+	else:
+		asset.scalars = int(manifest.scalars)
+		asset.clusters = int(manifest.get("clusters", 1))
+		asset.centers = _vectors(manifest.light_basis.centers)
+		asset.spreads = PackedFloat64Array(manifest.light_basis.spreads)
+		var coefficients := _image(folder, manifest.light_coefficients.file)
+		coefficients.convert(Image.FORMAT_RGBF)
+		asset.light_coefficients = coefficients.get_data().to_float32_array()
+		asset.w_table = _image(folder, manifest.w_table.file)
+		asset.w_table_size = int(manifest.w_table.size)
+		if manifest.has("cluster_index"):
+			asset.cluster_index = _image(folder, manifest.cluster_index.file)
+			asset.cluster_index.convert(Image.FORMAT_R8)
+	if asset.layer_images.has(null):
+		return null
+	return asset
+
+
+## All stored layers, one texture.
+func layers() -> Texture2DArray:
+	if not _textures.has("layers"):
+		var texture := Texture2DArray.new()
+		texture.create_from_images(layer_images)
+		_textures.layers = texture
+	return _textures.layers
+
+
+## One of the images as a texture; null where the asset has none.
+func texture(name: StringName) -> ImageTexture:
+	var image: Image = get(name)
+	if image == null:
+		return null
+	if not _textures.has(name):
+		_textures[name] = ImageTexture.create_from_image(image)
+	return _textures[name]
+
+
+## The first lines of a shader for this asset.
+func defines() -> String:
+	if method == "relighting-map":
+		return "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
+	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
+	return "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+
+
+## Relighting maps: one weight a map for all far lights together, the sum of color R_i(direction).
+func map_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+	var table := r_table.get_data().to_float32_array()
+	var middle := 0.5 * (table.size() - 1)
+	var weights := PackedVector4Array()
+	for center in centers:
+		var sum := Vector3.ZERO
+		for n in directions.size():
+			var place := (clampf(directions[n].dot(center), -1.0, 1.0) + 1.0) * middle
+			var entry := mini(int(place), table.size() - 2)
+			sum += colors[n] * lerpf(table[entry], table[entry + 1], place - entry)
+		weights.append(Vector4(sum.x, sum.y, sum.z, 0.0))
+	return weights
+
+
+## Scalar planes: an image of scalars + 1 weights a row, a row a cluster, for all far lights together.
+func plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> Image:
+	var gaussians := {}  # by spread, of which there are few
+	for spread in spreads:
+		if not gaussians.has(spread):
+			gaussians[spread] = _gaussians(spread, directions, colors)
+	var weights := PackedFloat32Array()
+	weights.resize(spreads.size() * 4)
+	var at := 0
+	for f in spreads.size():
+		var gaussian: PackedFloat64Array = gaussians[spreads[f]]
+		var red := 0.0
+		var green := 0.0
+		var blue := 0.0
+		for b in range(0, gaussian.size(), 3):
+			red += light_coefficients[at] * gaussian[b]
+			green += light_coefficients[at + 1] * gaussian[b + 1]
+			blue += light_coefficients[at + 2] * gaussian[b + 2]
+			at += 3
+		weights[4 * f] = red
+		weights[4 * f + 1] = green
+		weights[4 * f + 2] = blue
+		weights[4 * f + 3] = 1.0
+	return Image.create_from_data(scalars + 1, clusters, false, Image.FORMAT_RGBAF, weights.to_byte_array())
+
+
+## Where a texel is, in Godot's frame, y up.
+func point(texel: Vector2i) -> Vector3:
+	return _to_godot(position.get_pixel(texel.x, texel.y))
+
+
+## Where nine in ten of the covered texels are, by each axis, in Godot's frame: what a view sees far away is no part of it.
+func bounds() -> AABB:
+	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
+	for row in height:
+		for column in width:
+			if not coverage or coverage.get_pixel(column, row).r >= 0.5:
+				var place := point(Vector2i(column, row))
+				for axis in 3:
+					sides[axis].append(place[axis])
+	var low := Vector3.ZERO
+	var high := Vector3.ZERO
+	for axis in 3:
+		sides[axis].sort()
+		var count := sides[axis].size()
+		low[axis] = sides[axis][count / 20] if count else 0.0
+		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
+	return AABB(low, high - low)
+
+
+## A mesh through the position map's covered texels: second UV layer, normals, triangles; Godot's frame, y up. What is longer than
+## `longest` times the middle length of an edge spans two charts, and is left out.
+func texel_mesh(longest := 4.0) -> ArrayMesh:
+	if position == null:
+		push_error("expected a position map in the asset, found none: it has no mesh")
+		return null
+	var points := PackedVector3Array()
+	var normals := PackedVector3Array()
+	var places := PackedVector2Array()
+	for row in height:
+		for column in width:
+			points.append(point(Vector2i(column, row)))
+			normals.append(_to_godot(normal.get_pixel(column, row)) if normal else Vector3.UP)
+			places.append(Vector2((column + 0.5) / width, (row + 0.5) / height))
+	var lengths := PackedFloat32Array()
+	for row in height:
+		for column in width - 1:
+			lengths.append(points[row * width + column].distance_to(points[row * width + column + 1]))
+	lengths.sort()
+	var limit := longest * lengths[lengths.size() / 2]
+	var indices := PackedInt32Array()
+	for row in height - 1:
+		for column in width - 1:
+			var corner := row * width + column
+			for triangle in [[corner, corner + 1, corner + width], [corner + 1, corner + width + 1, corner + width]]:
+				if _belongs(triangle, points, limit):
+					if _faces_away(triangle, points, normals):
+						triangle.reverse()
+					indices.append_array(PackedInt32Array(triangle))
+	var arrays := []
+	arrays.resize(Mesh.ARRAY_MAX)
+	arrays[Mesh.ARRAY_VERTEX] = points
+	arrays[Mesh.ARRAY_NORMAL] = normals
+	arrays[Mesh.ARRAY_TEX_UV2] = places
+	arrays[Mesh.ARRAY_INDEX] = indices
+	var mesh := ArrayMesh.new()
+	mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+	return mesh
+
+
+func _belongs(triangle: Array, points: PackedVector3Array, limit: float) -> bool:
+	for n in 3:
+		if coverage and coverage.get_pixel(triangle[n] % width, triangle[n] / width).r < 0.5:
+			return false
+		if points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
+			return false
+	return true
+
+
+## Godot's front faces turn clockwise.
+func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
+	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
+	return across.dot(normals[triangle[0]]) > 0.0
+
+
+func _gaussians(spread: float, directions: PackedVector3Array, colors: PackedVector3Array) -> PackedFloat64Array:
+	var sums := PackedFloat64Array()
+	for center in centers:
+		var sum := Vector3.ZERO
+		for n in directions.size():
+			var angle := acos(clampf(directions[n].dot(center), -1.0, 1.0)) / spread
+			sum += colors[n] * exp(-0.5 * angle * angle)
+		sums.append_array([sum.x, sum.y, sum.z])
+	return sums
+
+
+static func _image(folder: String, file: String) -> Image:
+	var path := folder.path_join(file)
+	var image := Image.load_from_file(ProjectSettings.globalize_path(path))
+	if image == null:
+		push_error("expected an image at %s, found none" % path)
+	return image
+
+
+static func _transform(rows: Variant) -> Transform3D:
+	if rows == null:
+		return Transform3D.IDENTITY
+	var columns: Array[Vector3] = []
+	for column in 4:
+		columns.append(Vector3(rows[0][column], rows[1][column], rows[2][column]))
+	return Transform3D(columns[0], columns[1], columns[2], columns[3])
+
+
+static func _vectors(listed: Array) -> PackedVector3Array:
+	var vectors := PackedVector3Array()
+	for numbers in listed:
+		vectors.append(Vector3(numbers[0], numbers[1], numbers[2]).normalized())
+	return vectors
+
+
+static func _vector4(numbers: Array) -> Vector4:
+	return Vector4(numbers[0], numbers[1], numbers[2], numbers[3] if numbers.size() > 3 else 0.0)
+
+
+static func _to_godot(color: Color) -> Vector3:
+	return Vector3(color.r, color.b, -color.g)

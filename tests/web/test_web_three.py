@@ -1,0 +1,182 @@
+"""three.js with WebGL2, in a browser: the pixels of every method under every kind of light are numpy's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+
+from srbf.asset import Asset
+from srbf.export import Settings, export
+from srbf.methods import linear_response, relight
+
+ENCODINGS = ("float", "half", "uint8")
+ALBEDO = (0.8, 0.5, 0.3)
+MATERIALS = ("MeshStandardMaterial", "MeshLambertMaterial", "MeshBasicMaterial")
+
+
+@pytest.fixture(scope="module")
+def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) -> dict[tuple[str, str], tuple[Asset, str]]:
+    """(asset, URL) by method and encoding."""
+    out = {}
+    for encoding in ENCODINGS:
+        for asset in (
+            make_asset(k=7, encoding=encoding, ambient=True),
+            make_planes(scalars=9, encoding=encoding, ambient=True),
+            make_planes(scalars=5, clusters=7, encoding=encoding),
+        ):
+            ready = complete(on_a_plane(asset))
+            out[ready.method, encoding] = ready, browser.serve(ready)
+    return out
+
+
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
+def test_the_lightmap_that_three_draws_is_numpys(browser: Any, served: dict, method: str, encoding: str) -> None:
+    asset, url = served[method, encoding]
+    kinds = list(LIGHTS) if encoding == "half" else ["directional", "several"]
+    for target in ("float", "half"):
+        drawn = browser.lightmaps("three-lightmap", url, [LIGHTS[kind] for kind in kinds], target=target)
+        for picture, kind in zip(drawn, kinds, strict=True):
+            error = np.abs(picture - relight(asset, LIGHTS[kind]))
+            assert (error <= tolerance(asset, LIGHTS[kind], target)).all(), (kind, target)
+
+
+@pytest.mark.parametrize("source", ["maps", "lightmap"])
+@pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
+def test_a_lambert_material_shows_albedo_times_irradiance_over_pi(browser: Any, served: dict, method: str, source: str) -> None:
+    """Texel for texel, receivers from the vertex stage, the mesh's uv1 with v downwards."""
+    asset, url = served[method, "half"]
+    job = {
+        "asset": url,
+        "lights": LIGHTS["several"],
+        "material": "MeshLambertMaterial",
+        "color": ALBEDO,
+        "half": HALF_EXTENT,
+        "source": source,
+    }
+    if (method, source) == ("clustered-eigen-map", "maps"):
+        assert 'expected source "lightmap"' in browser.answer("three-material", **job)["error"]
+        return
+    shown = browser.picture("three-material", **job)
+    assert (np.abs(shown * np.pi / ALBEDO - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
+    half = browser.picture("three-material", **job, target="half")
+    assert (np.abs(half * np.pi / ALBEDO - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"], "half")).all()
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_an_asset_adds_as_three_s_own_lightmap_does(browser: Any, served: dict, material: str) -> None:
+    asset, url = served["relighting-map", "half"]
+    job = {"asset": url, "lights": LIGHTS["several"], "material": material, "color": ALBEDO, "half": HALF_EXTENT, "source": "maps"}
+    relit = np.concatenate([relight(asset, LIGHTS["several"]), np.ones((asset.height, asset.width, 1), np.float32)], axis=2)
+    own = browser.picture("three-material", **job, reference=relit.ravel().tolist())
+    assert own.max() > 0.1
+    assert (np.abs(browser.picture("three-material", **job) - own) <= tolerance(asset, LIGHTS["several"])).all()
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+def test_radiance_replaces_the_outgoing_light(browser: Any, make_asset: Callable[..., Asset], material: str) -> None:
+    """A view: positions from the map, whatever the mesh is; uv with v upwards, as three's own geometries have it."""
+    asset = complete(make_asset(k=5, encoding="half"), quantity="radiance", source={"receiver": {"kind": "view", "camera": "Camera"}})
+    asset.manifest["maps"] = complete(asset).manifest["maps"]
+    job = {"asset": browser.serve(asset), "lights": LIGHTS["several"], "material": material, "color": ALBEDO, "half": HALF_EXTENT}
+    expected = relight(asset, LIGHTS["several"])
+    shown = browser.picture("three-material", **job, source="maps")
+    assert (np.abs(shown - expected) <= tolerance(asset, LIGHTS["several"])).all()
+    upside_down = browser.picture("three-material", **job, source="maps", apply={"uvOrigin": "bottom"})
+    assert (np.abs(upside_down[::-1] - expected) <= tolerance(asset, LIGHTS["several"])).all()
+
+
+@pytest.mark.parametrize("kind", FOLLOWED)
+def test_three_s_own_lights_are_followed(browser: Any, served: dict, kind: str) -> None:
+    """In three's units and its y-up world; the light replaces three's own diffuse light of the same lamps."""
+    asset, url = served["relighting-map", "half"]
+    followed, lights = FOLLOWED[kind]
+    job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": followed}
+    shown = browser.picture("three-material", **job)
+    assert (np.abs(shown * np.pi / ALBEDO - relight(asset, lights)) <= tolerance(asset, lights)).all()
+
+
+def test_direct_light_stays_three_s_where_the_asset_has_none(browser: Any, served: dict) -> None:
+    asset, url = served["relighting-map", "half"]
+    followed, lights = FOLLOWED["directional"]
+    job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": followed}
+    shown = browser.picture("three-material", **job, apply={"direct": "engine"})
+    direct = np.array(lights[0].color) * lights[0].direction[2]  # N.L: the quad faces +z
+    assert (np.abs(shown * np.pi / ALBEDO - relight(asset, lights) - direct) <= tolerance(asset, lights) + 1e-6).all()
+
+
+def test_lights_are_moved_into_a_moved_asset(browser: Any, make_asset: Callable[..., Asset]) -> None:
+    turn, scale = np.eye(4), 1.7
+    turn[:3, :3] = scale * np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, 0.28, -0.96], [0, 0.96, 0.28]])
+    turn[:3, 3] = 0.3, -0.2, 0.1
+    asset = complete(make_asset(k=6, encoding="half"), asset_from_world=turn.tolist())
+    drawn = browser.lightmaps("three-lightmap", browser.serve(asset), [LIGHTS["several"]])[0]
+    assert (np.abs(drawn - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
+
+
+def test_linear_filtering_is_bilinear(browser: Any, served: dict) -> None:
+    """Between texels the sum of filtered maps is the filtered sum; the hardware's fractions have 8 bits."""
+    asset, url = served["relighting-map", "half"]
+    bare = replace(asset, images={"position": asset.images["position"]})
+    lights = LIGHTS["directional"]
+    height, width = asset.height, asset.width
+    job = {"asset": url, "lights": lights, "material": "MeshBasicMaterial", "color": (1, 1, 1), "half": HALF_EXTENT, "source": "maps"}
+    shown = browser.picture("three-material", **job, filter="linear", size=[2 * width, 2 * height]) * np.pi
+    signed = _doubled(linear_response(bare, lights))
+    ambient = _doubled(asset.images["ambient"].astype(np.float32))
+    bound = 2 / 256 * np.abs(asset.coefficients()).sum(axis=0).max()
+    assert np.abs(shown - (np.maximum(signed, 0) + ambient)).max() < bound
+    assert np.abs(shown - np.repeat(np.repeat(relight(asset, lights), 2, 0), 2, 1)).max() > 10 * bound
+
+
+@pytest.mark.parametrize(
+    ("light", "message"),
+    [
+        ({"type": "HemisphereLight"}, "expected a DirectionalLight, PointLight or SpotLight to follow, found HemisphereLight"),
+        ({"type": "PointLight", "decay": 1.5}, "expected a decay of 2"),
+        ({"type": "PointLight", "distance": 3}, "expected a light of distance 0"),
+    ],
+)
+def test_lights_that_no_asset_answers_are_refused(browser: Any, served: dict, light: dict, message: str) -> None:
+    _, url = served["relighting-map", "half"]
+    light = {"color": (1, 1, 1), "intensity": 1, "position": (0, 1, 0), **light}
+    job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": [light]}
+    assert message in browser.answer("three-material", **job)["error"]
+
+
+def _doubled(image: np.ndarray) -> np.ndarray:
+    """`image` at twice the size, bilinear, edges clamped."""
+
+    def along(axis: int, pixels: np.ndarray) -> np.ndarray:
+        n = pixels.shape[axis]
+        place = (np.arange(2 * n) + 0.5) / 2 - 0.5
+        low = np.floor(place).astype(int)
+        part = (place - low).reshape([-1 if i == axis else 1 for i in range(3)])
+        first, second = np.clip(low, 0, n - 1), np.clip(low + 1, 0, n - 1)
+        return pixels.take(first, axis) * (1 - part) + pixels.take(second, axis) * part
+
+    return along(1, along(0, image))
+
+
+@pytest.mark.parametrize(("target", "form"), [("dds", "bc7"), ("ktx2", "bc7"), ("ktx2", "bc1"), ("dds", "half"), ("ktx2", "uint8")])
+def test_texture_arrays_are_relit_as_they_are_read_by_numpy(
+    browser: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], target: str, form: str
+) -> None:
+    """The GPU's decoder of blocks against OpenImageIO's: BC7 is exact, BC1's mixed colours may round to another byte."""
+    made = [make_asset(k=4, encoding="half", height=12, width=20)]
+    if form != "bc1":
+        made += [make_planes(scalars=5, clusters=7, encoding="half", height=12, width=20)]
+    for asset in map(complete, made):
+        url = browser.place(lambda folder, asset=asset: export(asset, target, folder, Settings(encoding=form)))
+        exported = Asset.open(browser.folder(url))
+        drawn = browser.lightmaps("three-lightmap", url, [LIGHTS["several"]])[0]
+        error = np.abs(drawn - relight(exported, LIGHTS["several"]))
+        step = replace(exported, stored=np.ones_like(exported.stored), bias=np.zeros_like(exported.bias))
+        allowed = tolerance(exported, LIGHTS["several"]) + (relight(step, LIGHTS["several"]) if form == "bc1" else 0)
+        print(form, error.max(), allowed.max())
+        assert (error <= allowed).all()

@@ -1,0 +1,40 @@
+/** An equirectangular map as many directional lights: `srbf.lights.environment_samples`. */
+import type { EnvironmentLight } from "./lights";
+import { determinant, type Matrix4, type Triple, turned } from "./matrix";
+
+const UPRIGHT = 1e-8; // how far the turned zenith's row may be from (0, 0, 1), as numpy.allclose has it
+
+/**
+ * Unit direction of every texel in the asset's frame, and its radiance times solid angle (sr). On the hemisphere only what is above the (turned)
+ * horizon counts; unturned, a row that straddles it is cut there.
+ */
+export function* environmentSamples(
+  light: EnvironmentLight,
+  domain: "sphere" | "hemisphere",
+  assetFromWorld: Matrix4,
+): Generator<readonly [Triple, Triple]> {
+  const { width, height, pixels, color } = light;
+  const scale = Math.cbrt(determinant(assetFromWorld));
+  const rotation = assetFromWorld.map((row) => row.map((value) => value / scale));
+  const up = rotation[2];
+  const upright = Math.abs(up[0]) <= UPRIGHT && Math.abs(up[1]) <= UPRIGHT && Math.abs(up[2] - 1) <= 1e-5;
+  const cut = domain === "hemisphere" && upright;
+  const elevation = (row: number) => {
+    const angle = Math.PI / 2 - row * (Math.PI / height);
+    return cut ? Math.max(angle, 0) : angle;
+  };
+  for (let r = 0; r < height; ++r) {
+    const top = elevation(r);
+    const bottom = elevation(r + 1);
+    const solidAngle = (Math.sin(top) - Math.sin(bottom)) * ((2 * Math.PI) / width);
+    if (solidAngle === 0) continue;
+    const centre = (top + bottom) / 2;
+    for (let c = 0; c < width; ++c) {
+      const azimuth = (0.5 - (c + 0.5) / width) * 2 * Math.PI;
+      const direction = turned(rotation, [Math.cos(centre) * Math.cos(azimuth), Math.cos(centre) * Math.sin(azimuth), Math.sin(centre)]);
+      if (domain === "hemisphere" && !upright && direction[2] <= 0) continue;
+      const at = 3 * (r * width + c);
+      yield [direction, [pixels[at] * solidAngle * color[0], pixels[at + 1] * solidAngle * color[1], pixels[at + 2] * solidAngle * color[2]]];
+    }
+  }
+}

@@ -1,0 +1,58 @@
+/** Members of the shaders' SrbfLamp: `srbf/gl/uniforms.py`. */
+import type { LampLight } from "./lights";
+import type { Triple } from "./matrix";
+
+export interface LampUniforms {
+  position: Triple;
+  /** What single precision dropped of the position. */
+  positionLow: Triple;
+  color: Triple;
+  axis: Triple;
+  a0: number;
+  radius: number;
+  /** 1 - cos of a spot's half-angles; 3 and 4 for a point light. */
+  versineInner: number;
+  versineOuter: number;
+  /** 0 linear, 1 inverse-square. */
+  falloff: number;
+}
+
+/** The uniforms of a lamp that is already in the asset's frame. */
+export function lampUniforms(light: LampLight): LampUniforms {
+  const high = light.position.map(Math.fround) as unknown as Triple;
+  return {
+    position: high,
+    positionLow: light.position.map((x, i) => x - high[i]) as unknown as Triple,
+    color: light.color,
+    axis: light.kind === "spot" ? light.direction : [0, 0, 1],
+    a0: light.a0,
+    radius: light.radius,
+    versineInner: light.kind === "spot" ? versine(light.inner) : 3,
+    versineOuter: light.kind === "spot" ? versine(light.outer) : 4,
+    falloff: light.falloff === "inverse-square" ? 1 : 0,
+  };
+}
+
+/**
+ * Lamps as the shaders' arrays hold them, four vec4 each, zeros up to `room` lamps: (position, radius), (positionLow, falloff), (colour at 1 m,
+ * versineInner), (axis, versineOuter).
+ */
+export function packedLamps(lamps: readonly LampUniforms[], room: number): Float32Array {
+  const out = new Float32Array(16 * room);
+  lamps.forEach((lamp, i) => {
+    const atOne = lamp.falloff === 1 ? lamp.a0 ** 2 : lamp.a0;
+    const color = lamp.color.map((component) => component * atOne);
+    out.set([...lamp.position, lamp.radius, ...lamp.positionLow, lamp.falloff, ...color, lamp.versineInner, ...lamp.axis, lamp.versineOuter], 16 * i);
+  });
+  return out;
+}
+
+/** Room for `count` lamps in a program: a power of two, so that few programs serve any number. */
+export function lampRoom(count: number): number {
+  return 2 ** Math.ceil(Math.log2(Math.max(count, 1)));
+}
+
+/** 1 - cos of an angle (rad), precise for small ones. */
+export function versine(angle: number): number {
+  return 2 * Math.sin(angle / 2) ** 2;
+}

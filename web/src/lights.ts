@@ -1,0 +1,123 @@
+/**
+ * Lights to relight by: directional, point, spot, environment. Metres, radians, scene-linear Rec.709; the asset's own world, Blender's: right-handed,
+ * z up. The arithmetic is that of `srbf/lights.py`, in double precision.
+ */
+import { SrbfError } from "./errors";
+import { carried, determinant, type Matrix4, type Triple, turned } from "./matrix";
+
+export const DEFAULT_RADIUS = 1e-4; // metres: a receiver no nearer than this, so that a lamp in a surface stays finite
+const WHITE: Triple = [1, 1, 1];
+
+/** A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it. */
+export interface DirectionalLight {
+  readonly kind: "directional";
+  readonly direction: Triple;
+  readonly color: Triple;
+}
+
+/** A lamp; `color` is its irradiance at the distance `a0` (m); |L| is never less than `radius` (m). */
+interface Lamp {
+  readonly position: Triple;
+  readonly color: Triple;
+  readonly a0: number;
+  /** `linear`: a0/|L|, the article's; `inverse-square`: its square. */
+  readonly falloff: "linear" | "inverse-square";
+  readonly radius: number;
+}
+
+export interface PointLight extends Lamp {
+  readonly kind: "point";
+}
+
+/** A lamp times a smooth cone about `direction` (where it shines): full inside the half-angle `inner`, none past `outer` (rad). */
+export interface SpotLight extends Lamp {
+  readonly kind: "spot";
+  readonly direction: Triple;
+  readonly inner: number;
+  readonly outer: number;
+}
+
+/** An equirectangular radiance map, `width` x `height` RGB: u = 1/2 - atan2(y, x) / 2 pi, top row first and towards +z. */
+export interface EnvironmentLight {
+  readonly kind: "environment";
+  readonly width: number;
+  readonly height: number;
+  readonly pixels: ArrayLike<number>;
+  readonly color: Triple;
+}
+
+export type Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight;
+export type LampLight = PointLight | SpotLight;
+
+/** @throws SrbfError on a direction of no length. */
+export function directionalLight(direction: Triple, color: Triple = WHITE): DirectionalLight {
+  return { kind: "directional", direction: unit(direction), color: finite(color, "color") };
+}
+
+/** @throws SrbfError on numbers that are not finite, or a0 or radius not above 0. */
+export function pointLight(position: Triple, options: Partial<Omit<Lamp, "position">> = {}): PointLight {
+  return { kind: "point", ...lamp(position, options) };
+}
+
+/** @throws SrbfError as `pointLight`, and on half-angles that are not 0 <= inner <= outer <= pi. */
+export function spotLight(
+  position: Triple,
+  direction: Triple,
+  cone: { inner: number; outer: number },
+  options: Partial<Omit<Lamp, "position">> = {},
+): SpotLight {
+  const { inner, outer } = cone;
+  if (!(0 <= inner && inner <= outer && outer <= Math.PI)) {
+    throw new SrbfError(`expected spot half-angles 0 <= inner <= outer <= pi rad, found inner ${inner}, outer ${outer}`);
+  }
+  return { kind: "spot", ...lamp(position, options), direction: unit(direction), inner, outer };
+}
+
+/** @throws SrbfError where `pixels` are not width x height x 3 finite numbers. */
+export function environmentLight(width: number, height: number, pixels: ArrayLike<number>, color: Triple = WHITE): EnvironmentLight {
+  if (!(width > 0 && height > 0) || pixels.length !== width * height * 3) {
+    throw new SrbfError(`expected ${width} x ${height} x 3 numbers of an environment, found ${pixels.length}; drop alpha, if it has any`);
+  }
+  for (let i = 0; i < pixels.length; ++i) {
+    if (!Number.isFinite(pixels[i])) throw new SrbfError("expected a finite environment image, found NaN or Inf pixels");
+  }
+  return { kind: "environment", width, height, pixels, color: finite(color, "color") };
+}
+
+/** A light carried by a rigid motion and uniform scale (a0 and radius scale along); an environment's directions are turned when it is folded. */
+export function moved<L extends Light>(light: L, matrix: Matrix4): L {
+  if (light.kind === "environment") return light;
+  if (light.kind === "directional") return { ...light, direction: unit(turned(matrix, light.direction)) };
+  const scale = Math.cbrt(Math.abs(determinant(matrix)));
+  const out = { ...light, position: carried(matrix, light.position), a0: light.a0 * scale, radius: light.radius * scale };
+  return light.kind === "spot" ? { ...out, direction: unit(turned(matrix, light.direction)) } : out;
+}
+
+export function isLamp(light: Light): light is LampLight {
+  return light.kind === "point" || light.kind === "spot";
+}
+
+/** @throws SrbfError on a vector that is zero or not finite. */
+export function unit(v: Triple): Triple {
+  const largest = Math.max(Math.abs(v[0]), Math.abs(v[1]), Math.abs(v[2])); // so that no square over- or underflows
+  const scaled = v.map((x) => x / Math.max(largest, 1e-300));
+  const length = Math.hypot(...scaled);
+  if (!(Number.isFinite(length) && length >= 1e-12)) {
+    throw new SrbfError(`expected a direction of non-zero, finite length, found ${v.join(", ")}; give x, y, z not all zero`);
+  }
+  return [scaled[0] / length, scaled[1] / length, scaled[2] / length];
+}
+
+function lamp(position: Triple, options: Partial<Omit<Lamp, "position">>): Lamp {
+  const { color = WHITE, a0 = 1, falloff = "linear", radius = DEFAULT_RADIUS } = options;
+  for (const [name, value] of Object.entries({ a0, radius })) {
+    if (!(Number.isFinite(value) && value > 0)) throw new SrbfError(`expected ${name} above 0, found ${value}`);
+  }
+  if (falloff !== "linear" && falloff !== "inverse-square") throw new SrbfError(`expected a falloff of linear, inverse-square, found ${falloff}`);
+  return { position: finite(position, "position"), color: finite(color, "color"), a0, falloff, radius };
+}
+
+function finite(v: Triple, name: string): Triple {
+  if (v.length !== 3 || !v.every(Number.isFinite)) throw new SrbfError(`expected ${name} as three finite numbers, found ${v.join(", ")}`);
+  return v;
+}

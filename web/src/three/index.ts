@@ -1,0 +1,5 @@
+export type { TargetOptions } from "./lightmap_pass";
+export type { MaterialOptions } from "./material";
+export { SrbfRelightingMap, type RelightingMapOptions } from "./relighting_map";
+export { lightOf, type SceneLight } from "./scene_lights";
+export { type Filter, SrbfTextures } from "./textures";

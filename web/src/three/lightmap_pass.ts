@@ -1,0 +1,116 @@
+/** The asset drawn anew into a texture of its own size whenever its light changes, to be filtered as any lightmap is. */
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Camera,
+  FloatType,
+  GLSL3,
+  HalfFloatType,
+  LinearFilter,
+  LinearMipmapLinearFilter,
+  Mesh,
+  NearestFilter,
+  NoBlending,
+  RawShaderMaterial,
+  RGBAFormat,
+  type WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import type { Asset } from "../asset";
+import { shaderText } from "../shader";
+import type { Filter } from "./textures";
+import type { Uniforms } from "./uniforms";
+
+export interface TargetOptions {
+  /** What the lightmap is kept in. */
+  target?: "half" | "float";
+  /** How it is sampled. */
+  filter?: Filter;
+  /** Mip maps, as far as the gutter between charts reaches. */
+  mipmaps?: boolean;
+  anisotropy?: number;
+}
+
+const VERTEX = `precision highp float;
+in vec3 position;
+void main() {
+    gl_Position = vec4(position.xy, 0.0, 1.0);
+}`;
+
+/** `srbfRelit` over every texel; row 0 of the target is the asset's top row. */
+export class LightmapPass {
+  readonly target: WebGLRenderTarget;
+  private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
+  private readonly camera = new Camera();
+  private room = 0;
+
+  constructor(
+    private readonly asset: Asset,
+    private readonly uniforms: Uniforms,
+    options: TargetOptions = {},
+  ) {
+    const { width, height } = asset.manifest;
+    const { target = "half", filter = "linear", mipmaps = false, anisotropy = 1 } = options;
+    this.target = new WebGLRenderTarget(width, height, {
+      type: target === "half" ? HalfFloatType : FloatType,
+      format: RGBAFormat,
+      depthBuffer: false,
+      magFilter: filter === "linear" ? LinearFilter : NearestFilter,
+      minFilter: mipmaps ? LinearMipmapLinearFilter : filter === "linear" ? LinearFilter : NearestFilter,
+      generateMipmaps: mipmaps,
+      anisotropy,
+    });
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]), 3));
+    this.mesh = new Mesh(geometry, new RawShaderMaterial());
+    this.mesh.frustumCulled = false;
+  }
+
+  /** Draw it with the numbers that the uniforms hold; the renderer is left as it was. */
+  draw(renderer: WebGLRenderer): void {
+    const room = (this.uniforms.srbfLamps.value as Float32Array).length / 16;
+    if (room !== this.room) this.compile(room);
+    const kept = { target: renderer.getRenderTarget(), autoClear: renderer.autoClear, xr: renderer.xr.enabled, shadows: renderer.shadowMap.autoUpdate };
+    renderer.autoClear = false;
+    renderer.xr.enabled = false;
+    renderer.shadowMap.autoUpdate = false;
+    renderer.setRenderTarget(this.target);
+    renderer.render(this.mesh, this.camera);
+    renderer.setRenderTarget(kept.target);
+    renderer.autoClear = kept.autoClear;
+    renderer.xr.enabled = kept.xr;
+    renderer.shadowMap.autoUpdate = kept.shadows;
+  }
+
+  dispose(): void {
+    this.target.dispose();
+    this.mesh.geometry.dispose();
+    this.mesh.material.dispose();
+  }
+
+  private compile(room: number): void {
+    this.mesh.material.dispose();
+    const { srbfPositions } = this.uniforms;
+    const receiver = srbfPositions ? "texelFetch(srbfPositions, ivec2(gl_FragCoord.xy), 0).xyz" : "vec3(0.0)";
+    this.mesh.material = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      uniforms: this.uniforms,
+      vertexShader: VERTEX,
+      fragmentShader: `precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+${shaderText(this.asset, room)}
+${srbfPositions ? "uniform highp sampler2D srbfPositions;" : ""}
+out vec4 relit;
+void main() {
+    vec2 uv = gl_FragCoord.xy / vec2(textureSize(srbfLayers, 0).xy);
+    relit = vec4(srbfRelit(uv, 0.0, ${receiver}), 1.0);
+}`,
+      blending: NoBlending,
+      depthTest: false,
+      depthWrite: false,
+    });
+    this.room = room;
+  }
+}

@@ -1,0 +1,153 @@
+/** An asset in a three.js scene: its textures, the lights that it follows, the materials that it lights. */
+import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
+import { type Asset, loadAsset, type LoadOptions } from "../asset";
+import { SrbfError } from "../errors";
+import { lampRoom } from "../lamp";
+import type { Encoding } from "../manifest";
+import { type FrameValues, needPositions, uniformVectors } from "../shader";
+import { LightmapPass, type TargetOptions } from "./lightmap_pass";
+import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
+import { SceneAsset } from "./scene_asset";
+import { SrbfTextures } from "./textures";
+import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
+
+export interface RelightingMapOptions extends TargetOptions {
+  /**
+   * `maps`: materials sum the layers at every pixel. `lightmap`: `update` draws a lightmap whenever a light changes, and materials sample it, with mip
+   * maps if asked for; clustered eigen maps know only this.
+   */
+  source?: "maps" | "lightmap";
+}
+
+const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
+
+/**
+ * An asset that lights three.js materials. Add lights by `follow` (three's own, in three's world) or to `lights` (of the library, in the asset's
+ * world: Blender's, z up), call `update` once a frame, `dispose` at the end.
+ */
+export class SrbfRelightingMap extends SceneAsset {
+  readonly textures: SrbfTextures;
+  readonly source: "maps" | "lightmap";
+  private readonly uniforms: Uniforms;
+  private readonly pass?: LightmapPass;
+  private readonly patched = new Map<Material, Patch>();
+  private room = 1;
+  private drawn = "";
+
+  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  constructor(asset: Asset, options: RelightingMapOptions = {}) {
+    super(asset);
+    const clustered = asset.manifest.method === "clustered-eigen-map";
+    this.source = options.source ?? (clustered ? "lightmap" : "maps");
+    if (clustered && this.source === "maps") {
+      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
+    }
+    this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
+    this.uniforms = assetUniforms(asset, this.textures);
+    if (this.source === "lightmap") {
+      this.pass = new LightmapPass(asset, this.uniforms, options);
+      this.uniforms.srbfLightmap = { value: this.pass.target.texture };
+    }
+  }
+
+  /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
+  static async load(url: string, options: RelightingMapOptions & LoadOptions = {}): Promise<SrbfRelightingMap> {
+    return new SrbfRelightingMap(await loadAsset(url, options), options);
+  }
+
+  /** The lightmap that `update` draws (v downwards), for shaders of your own; only with `source: "lightmap"`. */
+  get lightmap(): Texture | undefined {
+    return this.pass?.target.texture;
+  }
+
+  /** Light `material` by this asset. @throws SrbfError on a material of another kind than Standard, Physical, Lambert, Basic. */
+  apply<M extends Material>(material: M, options: MaterialOptions = {}): M {
+    checkMaterial(material);
+    if (this.patched.has(material)) return material;
+    const { manifest } = this.asset;
+    const patch: Patch = {
+      asset: this.asset,
+      uniforms: this.uniforms,
+      source: this.source,
+      room: this.room,
+      options: {
+        channel: options.channel ?? 1,
+        uvOrigin: options.uvOrigin ?? "top",
+        receivers: options.receivers ?? (manifest.source?.receiver?.kind === "view" ? "map" : "vertex"),
+        direct: options.direct ?? (manifest.transport === "indirect" ? "engine" : "asset"),
+      },
+    };
+    if (patch.options.receivers === "map") needPositions(this.asset, 1);
+    this.patched.set(material, patch);
+    const before = material.onBeforeCompile;
+    const keyBefore = material.customProgramCacheKey;
+    material.onBeforeCompile = (shader, renderer) => {
+      before.call(material, shader, renderer);
+      patchShader(shader, material, patch);
+    };
+    material.customProgramCacheKey = () => `${keyBefore.call(material)} ${patchKey(patch)}`;
+    material.needsUpdate = true;
+    return material;
+  }
+
+  /**
+   * Bring uniforms, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   *
+   * @throws SrbfError on lamps where the asset has no positions for them, or more layers and lamps than the GPU's uniforms hold.
+   */
+  update(renderer?: WebGLRenderer): void {
+    const frame = this.frame();
+    if (this.pass) needPositions(this.asset, frame.lamps.length);
+    if (renderer) {
+      checkCompression(renderer, this.asset);
+      this.checkUniforms(renderer, lampRoom(frame.lamps.length));
+    }
+    setFrame(this.uniforms, this.textures, frame);
+    (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(this.assetFromScene());
+    const room = lampRoom(frame.lamps.length);
+    if (room !== this.room) this.recompile(room);
+    if (this.pass) this.redraw(frame, renderer);
+  }
+
+  dispose(): void {
+    this.textures.dispose();
+    this.pass?.dispose();
+  }
+
+  private redraw(frame: FrameValues, renderer: WebGLRenderer | undefined): void {
+    if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
+    const state = JSON.stringify([[...frame.weights], frame.lamps]);
+    if (state === this.drawn) return;
+    this.pass?.draw(renderer);
+    this.drawn = state;
+  }
+
+  private recompile(room: number): void {
+    this.room = room;
+    for (const [material, patch] of this.patched) {
+      patch.room = room;
+      if (this.source === "maps") material.needsUpdate = true;
+    }
+  }
+
+  private checkUniforms(renderer: WebGLRenderer, room: number): void {
+    const most = renderer.capabilities.maxFragmentUniforms - (this.pass ? 0 : VECTORS_KEPT_FREE);
+    const needed = uniformVectors(this.asset, room);
+    if (needed > most) {
+      throw new SrbfError(
+        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} lamps; ` +
+          (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
+      );
+    }
+  }
+}
+
+const EXTENSIONS: Partial<Record<Encoding, string>> = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
+
+function checkCompression(renderer: WebGLRenderer, asset: Asset): void {
+  const { encoding } = asset.layers;
+  const extension = EXTENSIONS[encoding];
+  if (extension !== undefined && !renderer.extensions.has(extension)) {
+    throw new SrbfError(`expected a GPU that reads ${encoding} (${extension}), found one without; serve it srbf export --target uint8`);
+  }
+}

@@ -1,0 +1,50 @@
+/** What both renderers' classes share: an asset with lights in a three.js scene. */
+import { type Light as ThreeLight, Matrix4 } from "three";
+import type { Asset } from "../asset";
+import { type Light, moved } from "../lights";
+import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
+import { type FrameValues, frameValues } from "../shader";
+import { rowsOf, threeMatrix } from "./rows";
+import { checkKind, lightOf, type SceneLight } from "./scene_lights";
+
+/** An asset, and the lights that shine on it: three's own by `follow`, in three's world, and those of the library in `lights`. */
+export class SceneAsset {
+  /** Lights of the library beside the followed ones, in the asset's world: Blender's, z up, metres. */
+  readonly lights: Light[] = [];
+  /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
+  readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
+  private readonly followed = new Set<SceneLight>();
+
+  constructor(readonly asset: Asset) {}
+
+  /** Take three.js lights as they are at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
+  follow(...lights: ThreeLight[]): this {
+    for (const light of lights) {
+      checkKind(light);
+      this.followed.add(light);
+    }
+    return this;
+  }
+
+  unfollow(...lights: ThreeLight[]): this {
+    for (const light of lights) this.followed.delete(light as SceneLight);
+    return this;
+  }
+
+  /** Every light as the library has it, in the asset's world. */
+  currentLights(): Light[] {
+    const worldFromScene = rowsOf(this.worldFromScene);
+    const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
+    return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
+  }
+
+  /** The numbers that shaders take of the lights as they are now. */
+  protected frame(): FrameValues {
+    return frameValues(this.asset, this.currentLights());
+  }
+
+  /** From three's world to the asset's frame, metres. */
+  protected assetFromScene(): Matrix4 {
+    return threeMatrix(multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene)));
+  }
+}

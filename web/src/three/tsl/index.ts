@@ -1,0 +1,1 @@
+export { type RelightingNodesOptions, SrbfRelightingNodes } from "./relighting_nodes";

@@ -1,0 +1,129 @@
+/** An asset for three.js' WebGPURenderer, on WebGPU and on its WebGL2 backend. */
+import { FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, NearestFilter, RenderTarget } from "three";
+import { attribute, Fn, positionWorld, screenCoordinate, texture, textureLoad, vec2, vec4 } from "three/tsl";
+import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
+import { type Asset, loadAsset, type LoadOptions } from "../../asset";
+import { SrbfError } from "../../errors";
+import { needPositions } from "../../shader";
+import type { TargetOptions } from "../lightmap_pass";
+import type { MaterialOptions } from "../material";
+import { SceneAsset } from "../scene_asset";
+import { SrbfTextures } from "../textures";
+import { NodeInputs } from "./inputs";
+import { applyLight } from "./material";
+import { type N, texelAt } from "./nodes";
+import { relit } from "./relit";
+
+export interface RelightingNodesOptions extends TargetOptions {
+  /** As of `SrbfRelightingMap`. */
+  source?: "maps" | "lightmap";
+  /** Room for point and spot lights; their number may change without compiling anew. */
+  maxLamps?: number;
+}
+
+/** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once a frame. */
+export class SrbfRelightingNodes extends SceneAsset {
+  readonly textures: SrbfTextures;
+  readonly source: "maps" | "lightmap";
+  /** The lightmap that `update` draws; only with `source: "lightmap"`. */
+  readonly target?: RenderTarget;
+  private readonly inputs: NodeInputs;
+  private readonly quad?: QuadMesh;
+  private drawn = "";
+
+  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  constructor(asset: Asset, options: RelightingNodesOptions = {}) {
+    super(asset);
+    const clustered = asset.manifest.method === "clustered-eigen-map";
+    this.source = options.source ?? (clustered ? "lightmap" : "maps");
+    if (clustered && this.source === "maps") {
+      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
+    }
+    const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
+    this.textures = new SrbfTextures(asset, filter);
+    this.inputs = new NodeInputs(asset, this.textures, filter, options.maxLamps ?? 16);
+    if (this.source === "lightmap") {
+      this.target = lightmapTarget(asset, options);
+      this.quad = new QuadMesh(this.passMaterial());
+    }
+  }
+
+  /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
+  static async load(url: string, options: RelightingNodesOptions & LoadOptions = {}): Promise<SrbfRelightingNodes> {
+    return new SrbfRelightingNodes(await loadAsset(url, options), options);
+  }
+
+  /** The asset's light on a mesh: irradiance or radiance, a vec3 node. */
+  light(options: MaterialOptions = {}): N {
+    const channel = options.channel ?? 1;
+    const own = attribute(channel === 0 ? "uv" : `uv${channel}`, "vec2") as N;
+    const uv = options.uvOrigin === "bottom" ? vec2(own.x, own.y.oneMinus()) : own;
+    if (this.target) return (texture(this.target.texture, uv) as N).rgb;
+    const kind = this.asset.manifest.source?.receiver?.kind;
+    const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
+    return relit(this.inputs, uv, receivers === "map" ? this.mapped(uv) : this.inputs.assetFromScene.mul(vec4(positionWorld as N, 1)).xyz);
+  }
+
+  /** Light a node material by this asset. @throws SrbfError on a material that takes no light. */
+  apply<M extends NodeMaterial>(material: M, options: MaterialOptions = {}): M {
+    const { quantity, transport } = this.asset.manifest;
+    const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
+    applyLight(material, this.light(options), quantity, direct === "asset");
+    return material;
+  }
+
+  /**
+   * Bring the nodes, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   *
+   * @throws SrbfError on lamps where the asset has no positions for them, and on more lamps than `maxLamps`.
+   */
+  update(renderer?: Renderer): void {
+    const frame = this.frame();
+    if (this.target) needPositions(this.asset, frame.lamps.length);
+    this.inputs.set(frame);
+    this.inputs.assetFromScene.value.copy(this.assetFromScene());
+    if (!this.target || !this.quad) return;
+    if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
+    const state = JSON.stringify([[...frame.weights], frame.lamps]);
+    if (state === this.drawn) return;
+    const kept = renderer.getRenderTarget();
+    renderer.setRenderTarget(this.target);
+    this.quad.render(renderer);
+    renderer.setRenderTarget(kept);
+    this.drawn = state;
+  }
+
+  dispose(): void {
+    this.textures.dispose();
+    this.target?.dispose();
+    (this.quad?.material as NodeMaterial | undefined)?.dispose();
+  }
+
+  private passMaterial(): NodeMaterial {
+    const { width, height } = this.asset.manifest;
+    const material = new NodeMaterial();
+    const uv = (screenCoordinate as N).div(vec2(width, height));
+    material.fragmentNode = (Fn as N)(() => vec4(relit(this.inputs, uv, this.mapped(uv)), 1))();
+    material.depthTest = false;
+    material.depthWrite = false;
+    return material;
+  }
+
+  private mapped(uv: N): N {
+    const { positions } = this.textures;
+    if (!positions) return vec4(0).xyz;
+    return (textureLoad(positions, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).xyz;
+  }
+}
+
+function lightmapTarget(asset: Asset, options: TargetOptions): RenderTarget {
+  const { target = "half", filter = "linear", mipmaps = false, anisotropy = 1 } = options;
+  return new RenderTarget(asset.manifest.width, asset.manifest.height, {
+    type: target === "half" ? HalfFloatType : FloatType,
+    depthBuffer: false,
+    magFilter: filter === "linear" ? LinearFilter : NearestFilter,
+    minFilter: mipmaps ? LinearMipmapLinearFilter : filter === "linear" ? LinearFilter : NearestFilter,
+    generateMipmaps: mipmaps,
+    anisotropy,
+  });
+}

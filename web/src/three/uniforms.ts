@@ -1,0 +1,44 @@
+/** The uniforms of `shaderText` as three.js has them; every material and pass of an asset shares these objects. */
+import { type IUniform, Matrix4 } from "three";
+import type { Asset } from "../asset";
+import { lampRoom, packedLamps } from "../lamp";
+import { type FrameValues, paddedCenters } from "../shader";
+import type { SrbfTextures } from "./textures";
+
+export type Uniforms = Record<string, IUniform>;
+
+/** Uniforms that hold the asset; the lights are none yet. */
+export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
+  const uniforms: Uniforms = {
+    srbfLayers: { value: textures.layers },
+    srbfAmbient: { value: textures.ambient },
+    srbfTable: { value: textures.table },
+    srbfScale: { value: asset.scale },
+    srbfBias: { value: asset.bias },
+    srbfLamps: { value: packedLamps([], 1) },
+    srbfLampCount: { value: 0 },
+    srbfAssetFromScene: { value: new Matrix4() },
+  };
+  if (textures.positions) uniforms.srbfPositions = { value: textures.positions };
+  if (asset.basis.kind === "gaussian") {
+    uniforms.srbfWeights = { value: new Float32Array(4 * asset.layers.count) };
+    uniforms.srbfCenters = { value: paddedCenters(asset) };
+  } else {
+    uniforms.srbfWeights = { value: textures.weights };
+    uniforms.srbfTableSize = { value: asset.basis.tableSize };
+    if (textures.clusters) uniforms.srbfClusters = { value: textures.clusters };
+  }
+  return uniforms;
+}
+
+/** Write the numbers of a frame. */
+export function setFrame(uniforms: Uniforms, textures: SrbfTextures, frame: FrameValues): void {
+  if (textures.weights) {
+    (textures.weights.image.data as Float32Array).set(frame.weights);
+    textures.weights.needsUpdate = true;
+  } else {
+    (uniforms.srbfWeights.value as Float32Array).set(frame.weights);
+  }
+  uniforms.srbfLamps.value = packedLamps(frame.lamps, lampRoom(frame.lamps.length));
+  uniforms.srbfLampCount.value = frame.lamps.length;
+}

@@ -1,0 +1,23 @@
+/** Jobs without a GPU: what the core computes and decodes. */
+import { frameValues, loadAsset } from "../../src";
+import { foldedWeights } from "../../src/weights";
+import { type Job, lightOfJson } from "./job";
+
+/** Folded weights in double precision, and the lamps' uniforms. */
+export async function host(job: Job) {
+  const asset = await loadAsset(job.asset, { verify: true });
+  const lights = job.lights.map(lightOfJson);
+  return { weights: [...foldedWeights(asset, lights, asset.assetFromWorld)], lamps: frameValues(asset, lights).lamps };
+}
+
+/** The layers as they were decoded, level after level. */
+export async function layers(job: Job) {
+  const asset = await loadAsset(job.asset);
+  return { levels: asset.layers.levels.map((level) => [...level]), encoding: asset.layers.encoding };
+}
+
+/** Load with checksums compared. */
+export async function load(job: Job) {
+  await loadAsset(job.asset, { verify: true });
+  return {};
+}

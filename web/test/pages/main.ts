@@ -1,0 +1,29 @@
+/** Runs jobs one after the other; every job makes what it needs and disposes of it. */
+import { host, layers, load } from "./host";
+import type { Job } from "./job";
+import { nodesLightmap, nodesMaterial } from "./three_nodes";
+import { threeLightmap, threeMaterial } from "./three_webgl";
+
+const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
+  host,
+  layers,
+  load,
+  "nodes-lightmap": nodesLightmap,
+  "nodes-material": nodesMaterial,
+  "three-lightmap": threeLightmap,
+  "three-material": threeMaterial,
+};
+
+declare global {
+  interface Window {
+    runJob?: (job: Job) => Promise<unknown>;
+  }
+}
+
+window.runJob = async (job) => {
+  try {
+    return await RUNS[job.run](job);
+  } catch (error) {
+    return { error: error instanceof Error ? `${error.name}: ${error.message}` : String(error) };
+  }
+};

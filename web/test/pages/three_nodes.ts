@@ -1,0 +1,73 @@
+/** Jobs for three.js' WebGPURenderer, on WebGPU or forced on WebGL2. */
+import * as THREE from "three";
+import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMaterial, RenderTarget, WebGPURenderer } from "three/webgpu";
+import { SrbfRelightingNodes } from "../../src/three/tsl";
+import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { addLights, facingCamera, quad } from "./three_scene";
+
+const MATERIALS = { MeshStandardMaterial: MeshStandardNodeMaterial, MeshLambertMaterial: MeshLambertNodeMaterial, MeshBasicMaterial: MeshBasicNodeMaterial };
+const renderers = new Map<string, WebGPURenderer>();
+
+async function rendererOf(job: Job): Promise<WebGPURenderer> {
+  const backend = job.backend as string;
+  let renderer = renderers.get(backend);
+  if (!renderer) {
+    renderer = new WebGPURenderer({ forceWebGL: backend === "webgl" });
+    await renderer.init();
+    const found = (renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend ? "webgpu" : "webgl";
+    if (found !== backend) throw new Error(`expected the ${backend} backend, found ${found}`);
+    renderer.toneMapping = THREE.NoToneMapping;
+    renderers.set(backend, renderer);
+  }
+  return renderer;
+}
+
+/** The lightmaps that the asset draws into its own target under one set of lights after the other. */
+export async function nodesLightmap(job: Job) {
+  const renderer = await rendererOf(job);
+  const map = await SrbfRelightingNodes.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest" });
+  const { width, height } = map.asset.manifest;
+  const pictures = [];
+  for (const lights of job.lightSets) {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(renderer);
+    pictures.push(picture(width, height, await read(renderer, map.target as RenderTarget, width, height)));
+  }
+  map.dispose();
+  return { pictures };
+}
+
+/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+export async function nodesMaterial(job: Job) {
+  const renderer = await rendererOf(job);
+  const map = await SrbfRelightingNodes.load(job.asset, { source: job.source as "maps", filter: (job.filter as "nearest") ?? "nearest", target: "float" });
+  const { width, height } = map.asset.manifest;
+  const scene = new THREE.Scene();
+  const material = new MATERIALS[job.material as "MeshBasicMaterial"]({ color: new THREE.Color(...(job.color as [number, number, number])) });
+  const mesh = quad(job, material);
+  scene.add(mesh);
+  addLights(job, map, scene);
+  map.apply(material, job.apply as object);
+  map.update(renderer);
+  const target = new RenderTarget(width, height, { type: job.target === "half" ? THREE.HalfFloatType : THREE.FloatType });
+  renderer.setRenderTarget(target);
+  await renderer.renderAsync(scene, facingCamera(job));
+  renderer.setRenderTarget(null);
+  const pixels = await read(renderer, target, width, height);
+  target.dispose();
+  material.dispose();
+  mesh.geometry.dispose();
+  map.dispose();
+  return picture(width, height, pixels);
+}
+
+/** The target's rows from the picture's top: WebGPU hands them so, WebGL from the bottom. */
+async function read(renderer: WebGPURenderer, target: RenderTarget, width: number, height: number): Promise<Float32Array> {
+  const raw = (await renderer.readRenderTargetPixelsAsync(target, 0, 0, width, height)) as Float32Array | Uint16Array;
+  const stride = raw.length / height; // WebGPU pads rows to 256 bytes
+  const pixels = new Float32Array(width * height * 4);
+  const value = (x: number) => (target.texture.type === THREE.FloatType ? x : THREE.DataUtils.fromHalfFloat(x));
+  const packed = raw.length === pixels.length ? width * 4 : Math.round(stride);
+  for (let row = 0; row < height; ++row) for (let i = 0; i < width * 4; ++i) pixels[row * width * 4 + i] = value(raw[row * packed + i]);
+  return (renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend ? pixels : upsideDown(pixels, height);
+}

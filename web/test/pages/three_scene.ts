@@ -1,0 +1,46 @@
+/** What the jobs of both three.js renderers share: a quad in the receivers' plane, a camera above it, and lights. */
+import * as THREE from "three";
+import type { Light, Triple } from "../../src";
+import { type Job, lightOfJson } from "./job";
+
+interface Followed {
+  lights: Light[];
+  follow(...lights: THREE.Light[]): unknown;
+}
+
+/** The rectangle |x| <= half[0], |y| <= half[1] at z = half[2] of the asset's world, row 0 at +y, in three's y-up world. */
+export function quad<M extends THREE.Material>(job: Job, material: M): THREE.Mesh<THREE.BufferGeometry, M> {
+  const [a, b, z] = job.half as Triple;
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute([-a, z, -b, a, z, -b, -a, z, b, a, z, b], 3));
+  geometry.setAttribute("normal", new THREE.Float32BufferAttribute([0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0], 3));
+  geometry.setAttribute("uv", new THREE.Float32BufferAttribute([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5], 2));
+  geometry.setAttribute("uv1", new THREE.Float32BufferAttribute([0, 0, 1, 0, 0, 1, 1, 1], 2));
+  geometry.setIndex([0, 2, 1, 1, 2, 3]);
+  return new THREE.Mesh(geometry, material);
+}
+
+export function facingCamera(job: Job): THREE.OrthographicCamera {
+  const [a, b] = job.half as Triple;
+  const camera = new THREE.OrthographicCamera(-a, a, b, -b, 0.1, 100);
+  camera.position.set(0, 50, 0);
+  camera.up.set(0, 0, -1);
+  camera.lookAt(0, 0, 0);
+  return camera;
+}
+
+/** `job.lights` as the library's, and `job.follow` as three's own: {type, color, intensity, position, target, angle, penumbra, decay}, y up. */
+export function addLights(job: Job, map: Followed, scene: THREE.Scene): void {
+  map.lights.push(...job.lights.map(lightOfJson));
+  for (const json of (job.follow as Record<string, unknown>[]) ?? []) {
+    const kind = json.type as "SpotLight";
+    const light = new THREE[kind]() as THREE.SpotLight;
+    light.color.setRGB(...(json.color as [number, number, number]));
+    light.intensity = json.intensity as number;
+    light.position.set(...(json.position as [number, number, number]));
+    if (json.target) light.target.position.set(...(json.target as [number, number, number]));
+    for (const key of ["angle", "penumbra", "decay", "distance"] as const) if (key in json) light[key] = json[key] as number;
+    scene.add(light);
+    map.follow(light);
+  }
+}

@@ -1,0 +1,73 @@
+/** Jobs for three.js' WebGLRenderer. */
+import * as THREE from "three";
+import { SrbfRelightingMap } from "../../src/three";
+import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { addLights, facingCamera, quad } from "./three_scene";
+
+let renderer: THREE.WebGLRenderer | undefined;
+
+function shared(): THREE.WebGLRenderer {
+  renderer ??= new THREE.WebGLRenderer({ antialias: false });
+  renderer.toneMapping = THREE.NoToneMapping;
+  renderer.debug.onShaderError = (gl, program, vertex, fragment) => {
+    throw new Error(`${gl.getProgramInfoLog(program)} ${gl.getShaderInfoLog(vertex)} ${gl.getShaderInfoLog(fragment)}`);
+  };
+  return renderer;
+}
+
+/** The lightmaps that the asset draws into its own target under one set of lights after the other. */
+export async function threeLightmap(job: Job) {
+  const map = await SrbfRelightingMap.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true });
+  const { width, height } = map.asset.manifest;
+  const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(shared());
+    return picture(width, height, read(target, width, height));
+  });
+  map.dispose();
+  return { pictures };
+}
+
+/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+export async function threeMaterial(job: Job) {
+  const map = await SrbfRelightingMap.load(job.asset, { source: job.source as "maps", filter: (job.filter as "nearest") ?? "nearest", target: "float" });
+  const { width, height } = map.asset.manifest;
+  const scene = new THREE.Scene();
+  const kind = job.material as "MeshBasicMaterial";
+  const material = new THREE[kind]({ color: new THREE.Color(...(job.color as [number, number, number])) });
+  const mesh = quad(job, material);
+  scene.add(mesh);
+  if (job.reference) {
+    const data = new Float32Array(job.reference as number[]);
+    material.lightMap = new THREE.DataTexture(data, width, height, THREE.RGBAFormat, THREE.FloatType);
+    material.lightMap.channel = 1;
+    material.lightMap.needsUpdate = true;
+  } else {
+    addLights(job, map, scene);
+    map.apply(material, job.apply as object);
+    map.update(shared());
+  }
+  const size = (job.size as [number, number]) ?? [width, height];
+  const target = new THREE.WebGLRenderTarget(size[0], size[1], { type: job.target === "half" ? THREE.HalfFloatType : THREE.FloatType });
+  shared().setRenderTarget(target);
+  shared().render(scene, facingCamera(job));
+  shared().setRenderTarget(null);
+  const pixels = read(target, size[0], size[1]);
+  target.dispose();
+  material.dispose();
+  mesh.geometry.dispose();
+  map.dispose();
+  return picture(size[0], size[1], upsideDown(pixels, size[1])); // the framebuffer's row 0 is at the bottom
+}
+
+function read(target: THREE.WebGLRenderTarget, width: number, height: number): Float32Array {
+  if (target.texture.type === THREE.FloatType) {
+    const pixels = new Float32Array(width * height * 4);
+    shared().readRenderTargetPixels(target, 0, 0, width, height, pixels);
+    return pixels;
+  }
+  const halves = new Uint16Array(width * height * 4);
+  shared().readRenderTargetPixels(target, 0, 0, width, height, halves);
+  return Float32Array.from(halves, (bits) => THREE.DataUtils.fromHalfFloat(bits));
+}
