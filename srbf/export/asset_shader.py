@@ -1,7 +1,8 @@
 """What an engine's shader calls for one asset: the pack's functions with the asset's own numbers, in any dialect.
 
 `srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
-centers, scale and bias are constants of the shader: a fixed scale of 1 costs nothing, and an engine passes weights and lamps alone.
+centers, scale and bias are constants of the shader, floats that need no decoding are not decoded, and an engine passes weights and
+lamps alone.
 """
 
 from __future__ import annotations
@@ -92,12 +93,19 @@ class AssetShader:
 
 def counts(asset: Asset) -> dict[str, int]:
     """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights."""
-    if asset.method == "relighting-map":
-        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS}
     if asset.method not in _FUNCTIONS:
         raise InputError(f"expected an asset of {', '.join(_FUNCTIONS)}, found {asset.method}: no shader relights it")
+    plain = {"SRBF_PLAIN": 1} if _is_plain(asset) else {}
+    if asset.method == "relighting-map":
+        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS} | plain
     size = asset.manifest["w_table"]["size"]
-    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS}
+    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS} | plain
+
+
+def _is_plain(asset: Asset) -> bool:
+    """Whether what is stored needs no decoding: scale 1 and bias 0, unused channels 0."""
+    unused = asset.scale == 0
+    return bool(((asset.scale == 1) | unused).all() and not asset.bias.any() and not asset.stored.transpose(0, 3, 1, 2)[unused].any())
 
 
 def asset_shader(asset: Asset, prepare: Callable[[str, str], str] = lambda text, path: text) -> AssetShader:

@@ -58,7 +58,7 @@ namespace Srbf
                 for (int level = 0; blocks != null && level < levels; level++) layers.SetPixelData(blocks.Data(i, level), level, i);
                 if (blocks == null) layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
             }
-            layers.Apply(false, true);
+            layers.Apply(false);  // kept readable: the imported asset is written from the host's copy
             return layers;
         }
 
@@ -80,7 +80,7 @@ namespace Srbf
             if (format == TextureFormat.RFloat) texture.SetPixelData(image.Values, 0);
             else if (format == TextureFormat.R8) texture.SetPixelData(System.Array.ConvertAll(image.Values, value => (byte)value), 0);
             else texture.SetPixelData(Halves(image.Rgba()), 0);
-            texture.Apply(false, true);
+            texture.Apply(false);
             return texture;
         }
 
