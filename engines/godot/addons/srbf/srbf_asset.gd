@@ -213,32 +213,38 @@ func bounds() -> AABB:
 	return AABB(low, high - low)
 
 
-## A mesh through the position map's covered texels: second UV layer, normals, triangles; Godot's frame, y up. What is longer than
-## `longest` times the middle length of an edge spans two charts, and is left out.
-func texel_mesh(longest := 4.0) -> ArrayMesh:
+## A mesh through the position map's covered texels, of at most some `most` vertices: second UV layer, normals, triangles; Godot's frame.
+## What is longer than `longest` times the middle length of an edge spans two charts, and is left out.
+func texel_mesh(longest := 4.0, most := 65536) -> ArrayMesh:
 	if position == null:
 		push_error("expected a position map in the asset, found none: it has no mesh")
 		return null
+	var step := maxi(1, ceili(sqrt(float(width) * height / most)))
+	var columns := _steps(width, step)
+	var rows := _steps(height, step)
+	var across := columns.size()
 	var points := PackedVector3Array()
 	var normals := PackedVector3Array()
 	var places := PackedVector2Array()
-	for row in height:
-		for column in width:
+	var covered := PackedByteArray()
+	for row in rows:
+		for column in columns:
 			points.append(point(Vector2i(column, row)))
 			normals.append(_to_godot(normal.get_pixel(column, row)) if normal else Vector3.UP)
 			places.append(Vector2((column + 0.5) / width, (row + 0.5) / height))
+			covered.append(1 if not coverage or coverage.get_pixel(column, row).r >= 0.5 else 0)
 	var lengths := PackedFloat32Array()
-	for row in height:
-		for column in width - 1:
-			lengths.append(points[row * width + column].distance_to(points[row * width + column + 1]))
+	for corner in points.size() - 1:
+		if covered[corner] and covered[corner + 1] and (corner + 1) % across:
+			lengths.append(points[corner].distance_to(points[corner + 1]))
 	lengths.sort()
-	var limit := longest * lengths[lengths.size() / 2]
+	var limit := longest * lengths[lengths.size() / 2] if lengths else INF
 	var indices := PackedInt32Array()
-	for row in height - 1:
-		for column in width - 1:
-			var corner := row * width + column
-			for triangle in [[corner, corner + 1, corner + width], [corner + 1, corner + width + 1, corner + width]]:
-				if _belongs(triangle, points, limit):
+	for row in rows.size() - 1:
+		for column in across - 1:
+			var corner := row * across + column
+			for triangle in [[corner, corner + 1, corner + across], [corner + 1, corner + across + 1, corner + across]]:
+				if _belongs(triangle, points, covered, limit):
 					if _faces_away(triangle, points, normals):
 						triangle.reverse()
 					indices.append_array(PackedInt32Array(triangle))
@@ -249,21 +255,28 @@ func texel_mesh(longest := 4.0) -> ArrayMesh:
 	arrays[Mesh.ARRAY_TEX_UV2] = places
 	arrays[Mesh.ARRAY_INDEX] = indices
 	var mesh := ArrayMesh.new()
-	mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+	if indices:
+		mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
 	return mesh
 
 
-func _belongs(triangle: Array, points: PackedVector3Array, limit: float) -> bool:
+## Every so many texels of a side, the last one always.
+static func _steps(size: int, step: int) -> PackedInt32Array:
+	var chosen := PackedInt32Array(range(0, size, step))
+	if chosen[-1] != size - 1:
+		chosen.append(size - 1)
+	return chosen
+
+
+static func _belongs(triangle: Array, points: PackedVector3Array, covered: PackedByteArray, limit: float) -> bool:
 	for n in 3:
-		if coverage and coverage.get_pixel(triangle[n] % width, triangle[n] / width).r < 0.5:
-			return false
-		if points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
+		if not covered[triangle[n]] or points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
 			return false
 	return true
 
 
 ## Godot's front faces turn clockwise.
-func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
+static func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
 	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
 	return across.dot(normals[triangle[0]]) > 0.0
 
