@@ -2,7 +2,7 @@
 
 Relit dB is against the fit in floats (`srbf.export.loss`), held out what `srbf evaluate` says of the exported folder. GPU memory is that of
 1024² texels at the same bytes a texel, with the mip levels of one chart (a third more; clusters have none) and the clusters' index; lamp
-tables stand beside it. `--time` exports 25 maps of 1024², the first capture's tiled. Exit status 1 where a bar is missed.
+tables stand beside it. `--time` exports 25 maps of 1024² as well, those of the first capture repeated. Exit status 1 where a bar is missed.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ MIPS = 4 / 3
 METHODS = {
     "25 maps": RelightingMap(k=25, encoding="float"),
     "eigen map, 28 scalars": EigenMap(scalars=28, encoding="float"),
+    "64 clusters of 8 scalars": ClusteredEigenMap(encoding="float"),
     "256 clusters of 12 scalars": ClusteredEigenMap(clusters=256, scalars=12, encoding="float"),
 }
 CONTAINERS = (("exr", "half"), ("uint8", "uint8"), ("dds", "bc7"), ("dds", "bc1"))
@@ -133,7 +134,7 @@ def main() -> None:
     arguments = parser.parse_args()
     scratch = Path(tempfile.mkdtemp(prefix="srbf-containers-"))
     try:
-        missed = [line for path in arguments.captures for line in run(path, scratch, arguments.time)]
+        missed = [line for i, path in enumerate(arguments.captures) for line in run(path, scratch, arguments.time and i == 0)]
     finally:
         shutil.rmtree(scratch)
     sys.exit("\n".join(missed) if missed else 0)
@@ -162,12 +163,12 @@ def run(path: Path, scratch: Path, timed: bool) -> list[str]:
         for way, psnr in (ways_to_blocks(asset) if asset.method == "relighting-map" else scalars_a_layer(asset)).items():
             print(f"  {name}: {way}: {psnr:.2f} dB", flush=True)
         if timed and asset.method == "relighting-map":
-            began = time.perf_counter()
+            began, cpu = time.perf_counter(), time.process_time()
             report = export(tiled(asset), "ktx2", scratch / "large", Settings("bc7"), force=True)
             print(f"  25 maps of 1024² as KTX2 of BC7, {report.levels} levels, {report.layer_bytes / MIB:.1f} MiB: ", end="")
-            print(f"{time.perf_counter() - began:.1f} s, {report.psnr:.2f} dB", flush=True)
+            print(f"{time.perf_counter() - began:.1f} s, {time.process_time() - cpu:.1f} s of CPU, {report.psnr:.2f} dB", flush=True)
     maps, half = rows["25 maps", "bc7"], rows["25 maps", "half"]
-    clustered = rows["256 clusters of 12 scalars", "bc7"]
+    clustered = rows["64 clusters of 8 scalars", "bc7"]
     missed = []
     if maps.gpu > BAR_MIB or maps.psnr < BAR_PSNR:
         missed.append(f"{path}: 25 maps as BC7: {maps.gpu:.1f} MiB, {maps.psnr:.1f} dB; the bar is {BAR_MIB:g} MiB, {BAR_PSNR:g} dB")

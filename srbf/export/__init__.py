@@ -76,7 +76,7 @@ def export(
                 "nothing was written: take a larger --encoding, or lower --min-psnr"
             )
         source = exported.manifest.setdefault("source", {})
-        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3)}
+        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3), "notes": list(written.notes)}
         exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # what a target has put beside the asset included
         write_json(temporary / MANIFEST, exported.manifest)
         disk = folder_bytes(temporary)

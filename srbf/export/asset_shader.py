@@ -30,9 +30,9 @@ vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table,
 }
 
 /* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
-vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
                      vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfRelightLights(layers, uv, 0.0, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
+    return srbfRelightLights(layers, uv, level, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
 }
 """
 _PLANES = """
@@ -47,9 +47,9 @@ vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table,
 }
 
 /* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
-vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, highp sampler2D weights, highp sampler2D table, vec3 receiver,
-                     vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfEigenMapLights(layers, uv, 0.0, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, highp sampler2D weights, highp sampler2D table,
+                     vec3 receiver, vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
+    return srbfEigenMapLights(layers, uv, level, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
 }
 """
 _CLUSTERED = """
@@ -104,7 +104,8 @@ def asset_shader(asset: Asset, prepare: Callable[[str, str], str] = lambda text,
     """The shader of one asset, its files by `pack_files`; InputError on functions that no shader knows."""
     defines = counts(asset)
     stem = asset.method.replace("-", "_")
-    files = [*pack_files([f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl"], None, prepare), parse(_FUNCTIONS[asset.method], "asset")]
+    needed = [f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl", "combine/mip_level.glsl"]
+    files = [*pack_files(needed, None, prepare), parse(_FUNCTIONS[asset.method], "asset")]
     if asset.method == "relighting-map":
         arrays = {"srbfCenters": padded(asset.basis.centers), "srbfScale": padded(asset.scale), "srbfBias": padded(asset.bias)}
         return AssetShader(defines, {name: ("SRBF_K", rows) for name, rows in arrays.items()}, files)

@@ -113,10 +113,30 @@ def test_the_readme_lists_every_file() -> None:
     assert sorted(re.findall(r"^\| `(\w+/\w+\.\w+)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)) == FILES
 
 
+def test_the_readme_says_what_every_stage_and_define_takes() -> None:
+    """Every fragment stage of a method has a row, and every uniform and define that a stage names is explained."""
+    text = (ROOT / "README.md").read_text()
+    after = text[text.index("## Defines") :]
+    for name in STAGES:
+        source = (ROOT / "stages" / name).read_text()
+        if name.split(".")[0] in ("direct", "shadow", "shadow_height", "shadow_tint", "add", "finish", "fullscreen"):
+            continue
+        kind = name.split("_")[-1]
+        assert f"`{name}`" in after or (f"`…{kind}`" in after), name
+        for uniform in re.findall(r"^uniform (?:highp )?\w+ (\w+)", source, re.MULTILINE):
+            if not name.startswith("environment_"):
+                assert f"`{uniform}`" in after or f"`{uniform}[" in after, f"{name}: {uniform}"
+    for file in FILES:
+        for define in re.findall(r"\bSRBF_(?:K|SCALARS|LAYERS|LAMPS|UNITS|PLAIN|PAIRS|FORMULA|DEPTH)\b", (ROOT / file).read_text()):
+            assert f"| `{define}` |" in after
+
+
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", range(4))
 def test_the_readme_snippets_compile(context: Any, version: str, which: int) -> None:
-    snippet = re.findall(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)[which]
+    snippets = re.findall(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len(snippets) == 4
+    snippet = snippets[which]
     head = "precision highp float; precision highp int;\n"
     tail = "out vec4 o;\nvoid main() { o = relitLightmap(vec2(0.5), vec3(1.0)).rgbr; }\n"
     vertex = resolve("stages/fullscreen.vert", version=version)
