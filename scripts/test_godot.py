@@ -30,7 +30,7 @@ from srbf.asset import Asset  # noqa: E402
 from srbf.export.godot import write  # noqa: E402
 from srbf.export.settings import PLAIN, Settings  # noqa: E402
 from srbf.image import decode_srgb, encode_srgb  # noqa: E402
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
 from srbf.methods import relight  # noqa: E402
 
 RENDERERS = {
@@ -49,6 +49,7 @@ Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.fl
 COLOR = (0.9, 0.5, 0.7)  # as Godot's inspector shows it: sRGB
 STRAIGHT = np.eye(4)
 ASKEW = np.array([[0, 0, 1.25, 0.3], [1.25, 0, 0, -0.1], [0, 1.25, 0, 0.2], [0, 0, 0, 1]], np.float64)  # turned, scaled and moved
+TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon is not the sky's
 PLACE = np.array([0.4, 1.3, -0.2])
 TOWARDS = np.array([0.3, 0.8, 0.4]) / np.linalg.norm([0.3, 0.8, 0.4])
 
@@ -104,7 +105,19 @@ SPOT = Lit(
     2.0,
     (np.radians(50), 2.0),
 )
-LIGHTS = {"directional": [SUN], "point": [OMNI], "squared": [SQUARED], "spot": [SPOT], "all": [SUN, OMNI, SPOT], "by table": [SUN]}
+LIGHTS = {
+    "directional": [SUN],
+    "point": [OMNI],
+    "squared": [SQUARED],
+    "spot": [SPOT],
+    "all": [SUN, OMNI, SPOT],
+    "by table": [SUN],
+    "sky": [SUN],
+}
+SKY = (
+    np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
+)  # a panorama of Godot's, which begins where x is 0 and -z is ahead
+SKY_ENERGY = 0.7
 
 
 def affine(asset: Asset) -> Asset:
@@ -143,11 +156,13 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
 
 def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
     """What compare.gd is to render: name, mode, whether the viewport is linear, where the asset stands, lights."""
-    every = [name for name in LIGHTS if name != "by table"]
+    every = [name for name in LIGHTS if name not in ("by table", "sky")]
     for name in every:
         placed = ASKEW if name == "all" else STRAIGHT
         yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
     yield {"name": "all", "mode": "canvas", "hdr": False, "placed": STRAIGHT}
+    for placed in (STRAIGHT, ASKEW, TIPPED):
+        yield {"name": "sky", "mode": "canvas", "hdr": True, "placed": placed}
     if asset.method != "relighting-map":
         yield {"name": "by table", "mode": "canvas", "hdr": True, "placed": STRAIGHT, "by_table": True}
     if np.array_equal(asset.asset_from_world, np.eye(4)):
@@ -163,7 +178,9 @@ def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
     world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
     moved = asset.asset_from_world @ np.linalg.inv(world_from_asset)
     instance = replace(asset, manifest={**asset.manifest, "asset_from_world": moved.tolist()})
-    lights = [lit.light() for lit in LIGHTS[job["name"]]]
+    lights: list[Light] = [lit.light() for lit in LIGHTS[job["name"]]]
+    if job["name"] == "sky":
+        lights.append(EnvironmentLight(np.roll(SKY, 4, axis=1), (SKY_ENERGY,) * 3))  # ours begins a quarter turn further
     picture = far_lamp(instance, SUN) if job.get("by_table") else relight(instance, lights)
     if asset.quantity == "irradiance":
         picture = picture / np.pi
@@ -226,6 +243,7 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     written = [
         {
             **{key: job[key] for key in ("name", "mode", "hdr")},
+            "sky": SKY.ravel().tolist() if job["name"] == "sky" else None,
             "by_table": job.get("by_table", False),
             "transform": transform(job["placed"]),
             "lights": [lit.node for lit in LIGHTS[job["name"]]],

@@ -19,6 +19,10 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	var relight := SrbfRelight.new()
 	relight.asset = asset
 	relight.suns_by_table = job.by_table
+	if job.sky:
+		var rows := PackedFloat32Array(job.sky).to_byte_array()
+		relight.sky = ImageTexture.create_from_image(Image.create_from_data(16, 8, false, Image.FORMAT_RGBF, rows))
+		relight.sky_energy = 0.7
 	relight.transform = str_to_var(job.transform)
 	for light in job.lights:
 		relight.lights.append(_light(light))
