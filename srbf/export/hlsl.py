@@ -77,14 +77,16 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
     return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in pack)])
 
 
-def asset_include(asset: Asset) -> str:
+def asset_include(asset: Asset, pairs: bool = False) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader. With `pairs`
+    relighting maps take `srbf.gl.textures.pairs_of` their R table in its place.
 
     Raises InputError on an asset that no shader relights.
     """
-    known = set(counts(asset))
-    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
+    defined = counts(asset, pairs)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
     writer = HlslWriter(shader.files)
     defines = "\n".join(f"#define {name} {value}" for name, value in shader.defines.items())
     arrays = "\n".join(

@@ -50,4 +50,4 @@ def unity_include(asset: Asset) -> str:
         f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)  // radiance has it' if radiance else '(albedo)'}",
         *(["#define SRBF_CLUSTERED"] if asset.method == "clustered-eigen-map" else []),
     ]
-    return asset_include(asset) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'
+    return asset_include(asset, pairs=True) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'

@@ -70,8 +70,9 @@ def asset_module(asset: Asset) -> str:
     """Everything that a WGSL shader needs to relight one asset: its numbers, the pack's functions that it needs, and
     `srbfAssetDirectional`, `srbfAssetPoint`. InputError on an asset that no shader relights.
     """
-    known = set(counts(asset))
-    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, constant_of))
+    defined = counts(asset)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, constant_of))
     arrays = "\n".join(
         f"const {name} = array<vec4f, {count}>(\n{rows_of(values, 'vec4f({})'.format)},\n);"
         for name, (count, values) in shader.arrays.items()
