@@ -11,13 +11,14 @@ from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.dialect import WIDTH, Writer, wrapped
+from srbf.export.preprocessing import preprocess
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     ASSIGNMENTS,
     SAMPLERS,
     SCALARS,
     VECTORS,
-    WIDTH,
     Constant,
     Function,
     Group,
@@ -26,15 +27,12 @@ from srbf.export.translation import (
     Parameter,
     Struct,
     Token,
-    Writer,
     is_group,
     is_sign,
     pack_files,
-    preprocess,
     render_plain,
     significant,
     split,
-    wrapped,
 )
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
