@@ -7,7 +7,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, wgsl
+from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, web, wgsl
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
@@ -27,6 +27,7 @@ TARGETS: dict[str, Target] = {
     "hlsl": hlsl.write,
     "metal": metal.write,
     "wgsl": wgsl.write,
+    "web": web.write,
 }
 
 
