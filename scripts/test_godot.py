@@ -30,7 +30,7 @@ from srbf.asset import Asset  # noqa: E402
 from srbf.export.godot import write  # noqa: E402
 from srbf.export.settings import PLAIN, Settings  # noqa: E402
 from srbf.image import decode_srgb, encode_srgb  # noqa: E402
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
 from srbf.methods import relight  # noqa: E402
 
 RENDERERS = {
@@ -42,12 +42,14 @@ STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a b
 FLOAT_ERROR = 1e-4  # single precision, of sums whose terms reach 10
 BYTE_STEP = 1.5 / 255
 RANGE = 20.0  # metres: where Godot's own omni and spot lights end
+FAR = 1e6  # metres
 SECONDS = 300  # of one Godot
 
 Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)  # Godot's (x, y, z) to (x, -z, y)
 COLOR = (0.9, 0.5, 0.7)  # as Godot's inspector shows it: sRGB
 STRAIGHT = np.eye(4)
 ASKEW = np.array([[0, 0, 1.25, 0.3], [1.25, 0, 0, -0.1], [0, 1.25, 0, 0.2], [0, 0, 0, 1]], np.float64)  # turned, scaled and moved
+TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon is not the sky's
 PLACE = np.array([0.4, 1.3, -0.2])
 TOWARDS = np.array([0.3, 0.8, 0.4]) / np.linalg.norm([0.3, 0.8, 0.4])
 
@@ -103,7 +105,19 @@ SPOT = Lit(
     2.0,
     (np.radians(50), 2.0),
 )
-LIGHTS = {"directional": [SUN], "point": [OMNI], "squared": [SQUARED], "spot": [SPOT], "all": [SUN, OMNI, SPOT]}
+LIGHTS = {
+    "directional": [SUN],
+    "point": [OMNI],
+    "squared": [SQUARED],
+    "spot": [SPOT],
+    "all": [SUN, OMNI, SPOT],
+    "by table": [SUN],
+    "sky": [SUN],
+}
+SKY = (
+    np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
+)  # a panorama of Godot's, which begins where x is 0 and -z is ahead
+SKY_ENERGY = 0.7
 
 
 def affine(asset: Asset) -> Asset:
@@ -123,6 +137,7 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
         "relighting map, uint8": lambda: build_asset(7, "uint8"),
         "relighting map, bc7": lambda: build_asset(7, "float", 12, 16),
         "eigen map, half": lambda: build_planes(9, None, "half", ambient=True),
+        "eigen map, indirect": lambda: build_planes(9, None, "half"),
         "eigen map, bc7, mips": lambda: build_planes(9, None, "float", 12, 16),
         "clustered eigen map, half": lambda: build_planes(9, 5, "half", ambient=True),
         "clustered eigen map, uint8": lambda: build_planes(6, 4, "uint8"),
@@ -134,17 +149,24 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
             asset.manifest["asset_from_world"] = [[0, 1.5, 0, 0.2], [-1.5, 0, 0, 0.1], [0, 0, 1.5, -0.3], [0, 0, 0, 1]]
         else:
             asset = affine(asset)
+        if name.endswith("indirect"):
+            asset.manifest["transport"] = "indirect"
         yield name, asset, Settings("bc7", 3 if name.endswith("mips") else 1) if "bc7" in name else PLAIN
 
 
 def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
     """What compare.gd is to render: name, mode, whether the viewport is linear, where the asset stands, lights."""
-    for name in LIGHTS:
+    every = [name for name in LIGHTS if name not in ("by table", "sky")]
+    for name in every:
         placed = ASKEW if name == "all" else STRAIGHT
         yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
     yield {"name": "all", "mode": "canvas", "hdr": False, "placed": STRAIGHT}
+    for placed in (STRAIGHT, ASKEW, TIPPED):
+        yield {"name": "sky", "mode": "canvas", "hdr": True, "placed": placed}
+    if asset.method != "relighting-map":
+        yield {"name": "by table", "mode": "canvas", "hdr": True, "placed": STRAIGHT, "by_table": True}
     if np.array_equal(asset.asset_from_world, np.eye(4)):
-        for name in LIGHTS:
+        for name in every if asset.transport == "combined" else ("directional", "point", "squared"):
             yield {"name": name, "mode": "spatial", "hdr": True, "placed": STRAIGHT}
             yield {"name": name, "mode": "spatial", "hdr": False, "placed": STRAIGHT}
         for name in ("directional", "point", "squared"):
@@ -152,14 +174,27 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
 
 
 def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
-    """What srbf.methods.relight says; of a white mesh what it sends out."""
+    """What srbf.methods.relight says; of irradiance what white sends out."""
     world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
     moved = asset.asset_from_world @ np.linalg.inv(world_from_asset)
     instance = replace(asset, manifest={**asset.manifest, "asset_from_world": moved.tolist()})
-    picture = relight(instance, [lit.light() for lit in LIGHTS[job["name"]]])
-    if job["mode"] == "spatial" and asset.quantity == "irradiance":
+    lights: list[Light] = [lit.light() for lit in LIGHTS[job["name"]]]
+    if job["name"] == "sky":
+        lights.append(EnvironmentLight(np.roll(SKY, 4, axis=1), (SKY_ENERGY,) * 3))  # ours begins a quarter turn further
+    picture = far_lamp(instance, SUN) if job.get("by_table") else relight(instance, lights)
+    if asset.quantity == "irradiance":
         picture = picture / np.pi
+    if asset.transport == "indirect" and job["mode"] == "spatial":
+        picture = picture + white(asset, *LIGHTS[job["name"]])  # Godot's own direct light
     return picture
+
+
+def far_lamp(asset: Asset, sun: Lit) -> ndarray:
+    """A directional light read from the table: a lamp so far away that all receivers see it from one direction."""
+    far = sun.light()
+    assert isinstance(far, DirectionalLight)
+    place = tuple((np.array(far.direction) * FAR).tolist())
+    return relight(asset, [PointLight(place, far.color, a0=FAR)])
 
 
 def white(asset: Asset, lit: Lit) -> ndarray:
@@ -208,6 +243,8 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     written = [
         {
             **{key: job[key] for key in ("name", "mode", "hdr")},
+            "sky": SKY.ravel().tolist() if job["name"] == "sky" else None,
+            "by_table": job.get("by_table", False),
             "transform": transform(job["placed"]),
             "lights": [lit.node for lit in LIGHTS[job["name"]]],
             "camera": transform(camera),

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
 extends Node3D
-## A lamp to drag over the asset: on a mesh through its texels, or in its picture laid flat.
+## A lamp to drag over the asset: on model.glb or a mesh through its texels, or in its picture laid flat.
 
 const HELP := "drag: move the lamp    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
+const MODEL := "res://model.glb"  # second UV layer: the asset's
 const TURN := 0.03  # radians a key press
 
 var _dragged := false
 var _middle := Vector3.ZERO
 var _size := 1.0
+var _model: Node3D
 
 @onready var _asset: SrbfAsset = $Relight.asset
 @onready var _picture: ColorRect = $Canvas/Picture
@@ -15,7 +17,10 @@ var _size := 1.0
 
 func _ready() -> void:
 	if _asset.position:
-		$Surface.mesh = _asset.texel_mesh()
+		if ResourceLoader.exists(MODEL):
+			_show_model()
+		else:
+			$Surface.mesh = _asset.texel_mesh()
 		var box := _asset.bounds()
 		_middle = box.get_center()
 		_size = maxf(box.get_longest_axis_size(), 1e-3)
@@ -80,9 +85,20 @@ func move_lamp(mouse: Vector2) -> void:
 		$Lamp.position = hit
 
 
+func _show_model() -> void:
+	_model = load(MODEL).instantiate()
+	add_child(_model)
+	var surfaces: Array[Node] = [_picture]
+	surfaces.append_array(_model.find_children("*", "MeshInstance3D", true, false))
+	$Relight.surfaces = surfaces
+	$Relight.apply()
+
+
 func _show_picture(flat: bool) -> void:
 	_picture.visible = flat
 	$Surface.visible = not flat
+	if _model:
+		_model.visible = not flat
 	$Canvas/Help.text = HELP % ("mesh" if flat else "picture")
 
 

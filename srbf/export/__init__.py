@@ -7,7 +7,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, wgsl
+from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, web, wgsl
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
@@ -27,6 +27,7 @@ TARGETS: dict[str, Target] = {
     "hlsl": hlsl.write,
     "metal": metal.write,
     "wgsl": wgsl.write,
+    "web": web.write,
 }
 
 
@@ -76,7 +77,7 @@ def export(
                 "nothing was written: take a larger --encoding, or lower --min-psnr"
             )
         source = exported.manifest.setdefault("source", {})
-        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3)}
+        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3), "notes": list(written.notes)}
         exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # what a target has put beside the asset included
         write_json(temporary / MANIFEST, exported.manifest)
         disk = folder_bytes(temporary)

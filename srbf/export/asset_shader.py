@@ -1,7 +1,8 @@
 """What an engine's shader calls for one asset: the pack's functions with the asset's own numbers, in any dialect.
 
 `srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
-centers, scale and bias are constants of the shader: a fixed scale of 1 costs nothing, and an engine passes weights and lamps alone.
+centers, scale and bias are constants of the shader, floats that need no decoding are not decoded, and an engine passes weights and
+lamps alone.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table,
 }
 
 /* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
-vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
                      vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfRelightLights(layers, uv, 0.0, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
+    return srbfRelightLights(layers, uv, level, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
 }
 """
 _PLANES = """
@@ -47,9 +48,9 @@ vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table,
 }
 
 /* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
-vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, highp sampler2D weights, highp sampler2D table, vec3 receiver,
-                     vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfEigenMapLights(layers, uv, 0.0, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
+vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, highp sampler2D weights, highp sampler2D table,
+                     vec3 receiver, vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
+    return srbfEigenMapLights(layers, uv, level, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
 }
 """
 _CLUSTERED = """
@@ -92,19 +93,27 @@ class AssetShader:
 
 def counts(asset: Asset) -> dict[str, int]:
     """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights."""
-    if asset.method == "relighting-map":
-        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS}
     if asset.method not in _FUNCTIONS:
         raise InputError(f"expected an asset of {', '.join(_FUNCTIONS)}, found {asset.method}: no shader relights it")
+    plain = {"SRBF_PLAIN": 1} if _is_plain(asset) else {}
+    if asset.method == "relighting-map":
+        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS} | plain
     size = asset.manifest["w_table"]["size"]
-    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS}
+    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS} | plain
+
+
+def _is_plain(asset: Asset) -> bool:
+    """Whether what is stored needs no decoding: scale 1 and bias 0, unused channels 0."""
+    unused = asset.scale == 0
+    return bool(((asset.scale == 1) | unused).all() and not asset.bias.any() and not asset.stored.transpose(0, 3, 1, 2)[unused].any())
 
 
 def asset_shader(asset: Asset, prepare: Callable[[str, str], str] = lambda text, path: text) -> AssetShader:
     """The shader of one asset, its files by `pack_files`; InputError on functions that no shader knows."""
     defines = counts(asset)
     stem = asset.method.replace("-", "_")
-    files = [*pack_files([f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl"], None, prepare), parse(_FUNCTIONS[asset.method], "asset")]
+    needed = [f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl", "combine/mip_level.glsl"]
+    files = [*pack_files(needed, None, prepare), parse(_FUNCTIONS[asset.method], "asset")]
     if asset.method == "relighting-map":
         arrays = {"srbfCenters": padded(asset.basis.centers), "srbfScale": padded(asset.scale), "srbfBias": padded(asset.bias)}
         return AssetShader(defines, {name: ("SRBF_K", rows) for name, rows in arrays.items()}, files)

@@ -35,9 +35,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white sky, unlit.
     """
     notes: list[str] = []
-    document = _document(asset, notes) if settings.mesh is None else Document.read(settings.mesh)
-    picture = _fallback(document, asset)
-    lit = _light_up(document, asset, picture, settings.mesh)
+    document, lit = _lit_document(asset, settings.mesh, notes)
     if asset.transport == "indirect":
         notes.append("without the extension a viewer shows the indirect light alone")
     with atomic_path(folder / MODEL) as temporary:
@@ -46,10 +44,21 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     return Written((f"{MODEL}: {lit} triangles relit by TEXCOORD_{UV_SET}", *notes, *written.notes))
 
 
+def model(asset: Asset, mesh: Path | None = None) -> bytes:
+    """`model.glb` alone, as `write` writes it."""
+    return _lit_document(asset, mesh, [])[0].pack()
+
+
 def white_sky(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
     """The asset under a sky of radiance 1/pi, irradiance 1 on an open plane, or of radiance 1, which shows a white one as 1."""
     radiance = 1 / np.pi if asset.quantity == "irradiance" else 1.0
     return relight(asset, [EnvironmentLight(np.full((*SKY, 3), radiance, np.float32))])
+
+
+def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Document, int]:
+    """The mesh with the lightmap on its materials, and how many of its triangles have it."""
+    document = _document(asset, notes) if mesh is None else Document.read(mesh)
+    return document, _light_up(document, asset, _fallback(document, asset), mesh)
 
 
 def _document(asset: Asset, notes: list[str]) -> Document:

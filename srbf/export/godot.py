@@ -16,6 +16,7 @@ from srbf.gl.includes import resolve_text
 
 DATA = "asset"  # the folder of the asset's images, which Godot's own importers are told to leave alone
 IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
+MODEL = "model.glb"  # what the example shows in place of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
 METHODS = {"relighting-map": "relighting_map", "eigen-map": "eigen_map", "clustered-eigen-map": "clustered_eigen_map"}
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": dds.write, "bc1": dds.write}
@@ -30,7 +31,8 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `project.godot`, the addon with the shaders of all methods, `asset.json` with its images below `asset/`.
 
     Layers are EXRs (half, float), PNGs (uint8) or one DDS (bc7, bc1, and whatever has mip levels); those in memory stay as they are unless
-    `settings` say otherwise. InputError on relighting maps of other functions than Gaussians, which no shader knows.
+    `settings` say otherwise. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
+    maps of other functions than Gaussians, which no shader knows.
     """
     if asset.method == "relighting-map" and asset.manifest["basis"]["kind"] != "gaussian":
         raise InputError(f"expected relighting maps of Gaussians for Godot, found {asset.manifest['basis']['kind']}; fit without --basis")
@@ -46,6 +48,8 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     files.write_json(folder / MANIFEST, manifest)
     files.write_text(folder / DATA / ".gdignore", "")
     files.write_text(folder / IMPORTED, f"{MANIFEST}\n")
+    if settings.mesh is not None:
+        shutil.copy(settings.mesh, folder / MODEL)
     return Written((*notes, "docs/engines/godot.md: open the folder as a project, or copy addons/srbf, asset/ and asset.* into one"))
 
 

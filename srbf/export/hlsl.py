@@ -10,13 +10,15 @@ from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
-from srbf.export.asset_shader import asset_shader, rows_of
+from srbf.export.asset_shader import asset_shader, counts, rows_of
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
+    MATRICES,
     SAMPLERS,
     VECTORS,
     Constant,
     Function,
+    Group,
     Node,
     PackFile,
     Parameter,
@@ -24,13 +26,16 @@ from srbf.export.translation import (
     Token,
     Writer,
     guarded,
+    is_sign,
     pack_files,
+    preprocess,
     render_plain,
     significant,
     split,
 )
 
 TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "int"), ("u", "uint"), ("b", "bool")) for n in (2, 3, 4)}
+TYPES |= {f"mat{n}": f"float{n}x{n}" for n in (2, 3, 4)}  # the same rows and columns: a matrix times a vector is mul(matrix, vector)
 TEXTURES = {"sampler2D": "Texture2D", "sampler2DArray": "Texture2DArray"}
 WORDS = {"mix": "lerp", "fract": "frac", "inversesqrt": "rsqrt", "uintBitsToFloat": "asfloat", "floatBitsToUint": "asuint"}
 # Words of HLSL that GLSL leaves free: geometry-shader modifiers, storage classes, and what the engines define.
@@ -74,11 +79,12 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
 
 def asset_include(asset: Asset) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`. One such include a shader.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader.
 
     Raises InputError on an asset that no shader relights.
     """
-    shader = asset_shader(asset)
+    known = set(counts(asset))
+    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
     writer = HlslWriter(shader.files)
     defines = "\n".join(f"#define {name} {value}" for name, value in shader.defines.items())
     arrays = "\n".join(
@@ -121,6 +127,10 @@ class HlslWriter(Writer):
         lines = [f"    {item.name} made;", *(f"    made.{self.name(name)} = {self.name(name)};" for _, name in members), "    return made;"]
         return super().struct(item) + f"\n\n{item.name} {_maker(item.name)}({parameters}) {{\n" + "\n".join(lines) + "\n}"
 
+    def body(self, function: Function) -> str:
+        matrices = frozenset(parameter.name for parameter in function.parameters if parameter.type in MATRICES)
+        return self.expression(_multiplied(function.body.inside, matrices) if matrices else function.body.inside)
+
     def call(self, name: str, arguments: list[str]) -> str:
         arguments = [_bare(argument) for argument in arguments]
         trimmed = [argument.strip() for argument in arguments]
@@ -150,6 +160,37 @@ class HlslWriter(Writer):
         """The place and level of a Load; the pack fetches from plain textures alone."""
         parts = re.fullmatch(r"int2\((.+)\)", place)
         return f"int3({parts[1]}, {level})" if parts and _balanced(parts[1]) else f"int3({place}, {level})"
+
+
+def _multiplied(nodes: Sequence[Node], matrices: frozenset[str]) -> list[Node]:
+    """`matrix * vector` as mul(matrix, vector), where a matrix is a parameter; ShaderError on any other use of one."""
+    out: list[Node] = []
+    i = 0
+    while i < len(nodes):
+        node = nodes[i]
+        if isinstance(node, Group):
+            out.append(Group(node.opening, tuple(_multiplied(node.inside, matrices))))
+        elif node.kind == "name" and node.text in matrices:
+            start = next((j for j in range(i + 1, len(nodes)) if not _is_space(nodes[j])), len(nodes))
+            if start == len(nodes) or not is_sign(nodes[start], "*"):
+                raise ShaderError(
+                    f"expected {node.text} times a vector, found another use of the matrix; HLSL's writer knows that one alone"
+                )
+            start = next(j for j in range(start + 1, len(nodes)) if not _is_space(nodes[j]))
+            end = start + 1
+            while end < len(nodes) and (isinstance(nodes[end], Group) or is_sign(nodes[end], ".") or is_sign(nodes[end - 1], ".")):
+                end += 1
+            comma = (Token("sign", ","), Token("space", " "))
+            out += [Token("name", "mul"), Group("(", (node, *comma, *_multiplied(nodes[start:end], matrices)))]
+            i = end - 1
+        else:
+            out.append(node)
+        i += 1
+    return out
+
+
+def _is_space(node: Node) -> bool:
+    return isinstance(node, Token) and node.kind == "space"
 
 
 def _maker(struct: str) -> str:

@@ -26,6 +26,7 @@ PRECISIONS = frozenset({"highp", "mediump", "lowp"})
 SAMPLERS = frozenset({"sampler2D", "sampler2DArray"})
 SCALARS = frozenset({"void", "float", "int", "uint", "bool"})
 VECTORS = frozenset(f"{kind}vec{n}" for kind in ("", "i", "u", "b") for n in (2, 3, 4))
+MATRICES = frozenset({"mat2", "mat3", "mat4"})
 ASSIGNMENTS = frozenset({"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="})
 WIDTH = 140  # of a line of the pack
 SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
@@ -33,7 +34,6 @@ SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
 UNTRANSLATABLE = frozenset(
     {"mod", "texture", "textureGather", "textureOffset", "dFdx", "dFdy", "discard", "while", "do", "switch", "uniform", "varying"}
     | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "inout"}
-    | {f"mat{n}" for n in ("2", "3", "4")}
 )
 
 
@@ -160,6 +160,45 @@ def parse(text: str, path: str) -> PackFile:
         items.append(_item(nodes[i : end + 1], path))
         i = end + 1
     return PackFile(path, tuple(items))
+
+
+def preprocess(text: str, path: str, known: set[str], define: Callable[[str, str], str]) -> str:
+    """A file's text with its conditions taken; a `#define` becomes what `define` (name, value) says, and is `known` from there on.
+
+    Raises ShaderError on `#error`, with its words, and on conditions past `#ifdef`, `#ifndef` and `#elif defined(...)`.
+    """
+    lines: list[str] = []
+    taken: list[str] = []  # of every open condition: yes, not yet, or no more
+    for line in text.splitlines():
+        match = re.match(r"\s*#\s*(\w+)\s*(.*?)\s*(?://.*)?$", line)
+        word, rest = (match[1], match[2]) if match else ("", "")
+        if word in ("ifndef", "ifdef"):
+            taken.append("yes" if (rest in known) == (word == "ifdef") else "not yet")
+        elif word in ("elif", "else"):
+            holds = word == "else" or _defined(rest, path) in known
+            taken[-1] = "yes" if taken[-1] == "not yet" and holds else "not yet" if taken[-1] == "not yet" else "no more"
+        elif word == "endif":
+            taken.pop()
+        elif any(state != "yes" for state in taken):
+            continue
+        elif word in ("", "include"):
+            lines.append(line)
+        elif word == "error":
+            raise ShaderError(f"{path}: {rest}")
+        else:
+            name, _, value = rest.partition(" ")
+            if word != "define" or "(" in name or not value:
+                raise ShaderError(f"{path}: expected #ifdef, #ifndef, #elif, #error or the #define of a number, found {line.strip()!r}")
+            known.add(name)
+            lines.append(define(name, value.strip()))
+    return "\n".join([*lines, ""])
+
+
+def _defined(condition: str, path: str) -> str:
+    match = re.fullmatch(r"defined\s*\(?\s*(\w+)\s*\)?", condition)
+    if match is None:
+        raise ShaderError(f"{path}: expected #elif defined(NAME), found #elif {condition}")
+    return match[1]
 
 
 def tokens(text: str) -> list[Token]:

@@ -30,6 +30,7 @@ from srbf.export.translation import (
     is_group,
     is_sign,
     pack_files,
+    preprocess,
     render_plain,
     significant,
     split,
@@ -37,6 +38,7 @@ from srbf.export.translation import (
 )
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
+TYPES |= {f"mat{n}": f"mat{n}x{n}f" for n in (2, 3, 4)}
 TYPES |= {"float": "f32", "int": "i32", "uint": "u32", "bool": "bool"}
 TEXTURES = {"sampler2D": "texture_2d<f32>", "sampler2DArray": "texture_2d_array<f32>"}
 WORDS = {"inversesqrt": "inverseSqrt"}
@@ -60,7 +62,7 @@ def module(paths: Iterable[str], defines: Mapping[str, object], root: Path | Non
     Raises ShaderError where a define is missing or WGSL has no word for something.
     """
     known = set(defines)
-    pack = pack_files(paths, root, lambda text, path: preprocess(text, path, known))
+    pack = pack_files(paths, root, lambda text, path: preprocess(text, path, known, constant_of))
     return "\n".join([HEADING + constants(defines), *_texts(WgslWriter(pack))])
 
 
@@ -69,7 +71,7 @@ def asset_module(asset: Asset) -> str:
     `srbfAssetDirectional`, `srbfAssetPoint`. InputError on an asset that no shader relights.
     """
     known = set(counts(asset))
-    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known))
+    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, constant_of))
     arrays = "\n".join(
         f"const {name} = array<vec4f, {count}>(\n{rows_of(values, 'vec4f({})'.format)},\n);"
         for name, (count, values) in shader.arrays.items()
@@ -91,34 +93,9 @@ def constants(defines: Mapping[str, object]) -> str:
     return "".join(f"const {name}: i32 = {value};\n" for name, value in defines.items())
 
 
-def preprocess(text: str, path: str, known: set[str]) -> str:
-    """A file's text without directives but `#include`: conditions taken, `#define` as a constant that is `known` from there on.
-
-    Raises ShaderError on `#error`, with its words, and on other directives.
-    """
-    lines: list[str] = []
-    taken: list[bool] = []
-    for line in text.splitlines():
-        match = re.match(r"\s*#\s*(\w+)\s*(.*?)\s*(?://.*)?$", line)
-        if match is None or match[1] == "include":
-            lines += [line] if all(taken) else []
-            continue
-        word, rest = match[1], match[2]
-        if word in ("ifndef", "ifdef"):
-            taken.append((rest in known) == (word == "ifdef"))
-        elif word == "else":
-            taken[-1] = not taken[-1]
-        elif word == "endif":
-            taken.pop()
-        elif all(taken) and word == "error":
-            raise ShaderError(f"{path}: {rest}")
-        elif all(taken):
-            name, _, value = rest.partition(" ")
-            if word != "define" or "(" in name or not value:
-                raise ShaderError(f"{path}: expected #ifdef, #ifndef, #error or the #define of a number, found {line.strip()!r}")
-            known.add(name)
-            lines.append(f"const int {name} = {value.strip()};")
-    return "\n".join([*lines, ""])
+def constant_of(name: str, value: str) -> str:
+    """What `#define name value` becomes."""
+    return f"const int {name} = {value};"
 
 
 class WgslWriter(Writer):

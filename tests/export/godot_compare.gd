@@ -18,6 +18,11 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	viewport.render_target_update_mode = SubViewport.UPDATE_ALWAYS
 	var relight := SrbfRelight.new()
 	relight.asset = asset
+	relight.suns_by_table = job.by_table
+	if job.sky:
+		var rows := PackedFloat32Array(job.sky).to_byte_array()
+		relight.sky = ImageTexture.create_from_image(Image.create_from_data(16, 8, false, Image.FORMAT_RGBF, rows))
+		relight.sky_energy = 0.7
 	relight.transform = str_to_var(job.transform)
 	for light in job.lights:
 		relight.lights.append(_light(light))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,17 @@ LIGHTS: dict[str, Light] = {
 ALL = list(LIGHTS.values())
 
 
+@cache
+def shared_context() -> Any:
+    """One context for all pictures of a process."""
+    return create_context()
+
+
+@cache
+def corner_shader() -> str:
+    return spirv.cross_compile(spirv.compile_stage("fullscreen.vert", {}), "glsl")
+
+
 def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
     """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of scalar planes, float32."""
     weights = padded(methods.folded_weights(asset, lights).astype(np.float32))
@@ -51,9 +63,9 @@ def magnitude(asset: Asset, light: Light) -> np.ndarray:
 
 def run(fragment: str, asset: Asset, images: dict[str, np.ndarray], uniforms: dict[str, Any]) -> np.ndarray:
     """A GLSL 3.30 fragment shader of spirv-cross over the asset's texels, (H, W, 4): `images` and `uniforms` by the names that they had."""
-    with create_context() as context, ExitStack() as made:
-        vertex = spirv.cross_compile(spirv.compile_stage("fullscreen.vert", {}), "glsl")
-        program = context.program(vertex_shader=vertex, fragment_shader=fragment)
+    context = shared_context()
+    with context, ExitStack() as made:
+        program = context.program(vertex_shader=corner_shader(), fragment_shader=fragment)
         made.callback(program.release)
         textures = AssetTextures(context, asset, Limits.of(context), made)
         own = {"layers": textures.layers}
@@ -74,10 +86,15 @@ def run(fragment: str, asset: Asset, images: dict[str, np.ndarray], uniforms: di
                     program[member].write(np.ascontiguousarray(value))
                 else:
                     program[member].value = value
-        target = context.framebuffer([context.texture((asset.width, asset.height), 4, dtype="f4")])
+        pixels = context.texture((asset.width, asset.height), 4, dtype="f4")
+        target = context.framebuffer([pixels])
         corners = context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32))
+        triangle = context.vertex_array(program, [(corners, "2f", "corner")])
+        for resource in (pixels, target, corners, triangle):
+            made.callback(resource.release)
         target.use()
-        context.vertex_array(program, [(corners, "2f", "corner")]).render(vertices=3)
+        context.enable_only(context.NOTHING)
+        triangle.render(vertices=3)
         return np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(asset.height, asset.width, 4).copy()
 
 

@@ -48,8 +48,8 @@ CALLS = {
     ("clustered-eigen-map", False): "srbfAssetDirectional(layers, layersSampler, clusters, uv, weightRows)",
     ("relighting-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
     ("eigen-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
-    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, weights, table, receiver, lamps, 3)",
-    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, weightRows, table, receiver, lamps, 3)",
+    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weights, table, receiver, lamps, 3)",
+    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weightRows, table, receiver, lamps, 3)",
     ("clustered-eigen-map", None): "srbfAssetLights(layers, layersSampler, clusters, uv, weightRows, table, receiver, lamps, 3)",
     ("clustered-eigen-map", True): "srbfAssetPoint(layers, layersSampler, clusters, uv, table, receiver, lamp)",
 }
@@ -100,7 +100,7 @@ def test_what_ships_keeps_names_comments_and_citations(path: str) -> None:
     [
         ("float f(float a) { return mod(a, 2.0); }", "found mod"),
         ("uniform float x;", "found uniform"),
-        ("vec3 f(mat4 m) { return m[0].xyz; }", "found mat4"),
+        ("bvec2 f(vec2 a) { return lessThan(a, a.yx); }", "found lessThan"),
         ("float f(float a) { return (a; }", "brackets in pairs"),
         ("float x;", "a function, a struct or a constant"),
     ],
@@ -108,6 +108,16 @@ def test_what_ships_keeps_names_comments_and_citations(path: str) -> None:
 def test_glsl_past_the_subset_is_refused_by_name(text: str, complaint: str) -> None:
     with pytest.raises(ShaderError, match=complaint):
         parse(text, "mine.glsl")
+
+
+def test_a_matrix_times_a_vector_is_hlsls_mul_and_nothing_else() -> None:
+    file = parse("vec3 f(mat3 m, vec4 v) { return 2.0 * (m * v.xyz) + m * vec3(1.0, v.xy); }", "mine.glsl")
+    text = hlsl.HlslWriter([file]).file(file)
+    assert "return 2.0 * (mul(m, v.xyz)) + mul(m, float3(1.0, v.xy));" in text
+    spirv.compile_hlsl(text + ENTRY)
+    other = parse("vec3 f(mat3 m) { return m[0]; }", "mine.glsl")
+    with pytest.raises(ShaderError, match="expected m times a vector"):
+        hlsl.HlslWriter([other]).file(other)
 
 
 def test_words_that_hlsl_keeps_to_itself_are_renamed() -> None:

@@ -14,7 +14,7 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import wgsl
-from srbf.export.translation import library_paths, parse
+from srbf.export.translation import library_paths, parse, preprocess
 from srbf.gl.uniforms import lamp_uniforms, packed_lamps
 from srbf.lights import PointLight
 
@@ -49,7 +49,7 @@ MANY = """var lamps: array<vec4f, 4 * SRBF_LAMPS>;
     for (var i = 0; i < 12; i++) { lamps[i] = values[i]; }
     var weights: array<vec4f, WEIGHTS>;
     for (var i = 0; i < WEIGHTS; i++) { weights[i] = values[12 + i]; }
-    return vec4f(srbfAssetLights(layers, nearest, CLUSTERS uv, CHOSEN, table, receiver, lamps, 3), 1.0);"""
+    return vec4f(srbfAssetLights(layers, nearest, CLUSTERS uv, LEVEL CHOSEN, table, receiver, lamps, 3), 1.0);"""
 
 
 def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
@@ -61,7 +61,12 @@ def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
     if light is ALL:
         rows = weights = weights_of(asset, ALL[:1])
         chosen = "weights" if method == "relighting-map" else "weightRows"
-        body = MANY.replace("CLUSTERS", clusters).replace("CHOSEN", chosen).replace("WEIGHTS", str(len(weights)))
+        body = (
+            MANY.replace("CLUSTERS", clusters)
+            .replace("LEVEL", "" if clusters else "0.0,")
+            .replace("CHOSEN", chosen)
+            .replace("WEIGHTS", str(len(weights)))
+        )
         values = np.concatenate([packed_lamps(ALL[1:], 3), weights.reshape(-1, 4)])  # type: ignore[arg-type]
         rows = np.zeros((1, 1, 4), np.float32) if chosen == "weights" else rows
     elif isinstance(light, PointLight):
@@ -148,6 +153,15 @@ def test_glsl_that_wgsl_has_no_form_for_is_refused(text: str, complaint: str) ->
     writer = wgsl.WgslWriter([parse(text, "mine.glsl")])
     with pytest.raises(ShaderError, match=complaint):
         writer.file(writer.files[0])
+
+
+@pytest.mark.parametrize(("known", "answer"), [({}, "3"), ({"A"}, "1"), ({"B"}, "2"), ({"A", "B"}, "1")])
+def test_conditions_are_taken_as_a_compiler_takes_them(known: set[str], answer: str) -> None:
+    text = "#ifdef A\n1\n#elif defined(B)\n2\n#else\n3\n#ifndef A\n#define C 4\n#endif\n#endif\n"
+    seen = set(known)
+    expected = [answer] + (["C is 4"] if answer == "3" else [])
+    assert preprocess(text, "mine.glsl", seen, "{} is {}".format).split("\n")[:-1] == expected
+    assert ("C" in seen) == (answer == "3")
 
 
 def test_a_missing_count_is_told_of_as_the_pack_does() -> None:

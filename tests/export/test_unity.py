@@ -16,6 +16,8 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.containers import read_texture_array
+from srbf.containers.dds_header import DXGI
 from srbf.export import spirv, unity
 from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.engine_folder import engine_root
@@ -28,7 +30,7 @@ needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono"
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 HERE = Path(__file__).parent / "unity"
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage")
+ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds")
 AXES = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)  # of the asset from Unity's, written down once more
 OFFSET = np.array([0.2, -0.4, 0.3])  # of the imported scene's root, in the asset's axes
 FARS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)), DirectionalLight((-0.6, 0.1, 0.4), (0.2, 0.5, 0.9))]
@@ -217,6 +219,28 @@ def test_c_sharp_reads_large_images_of_either_kind(
     layer = Asset.open(tmp_path).stored[1]
     found = np.array(answers(tmp_path)["layer1"][0]).reshape(layer.shape)
     np.testing.assert_array_equal(found.astype(np.float32), layer.astype(np.float32))
+
+
+@needs_mono
+@pytest.mark.parametrize("encoding", ["bc7", "bc1", "uint8"])
+def test_c_sharp_reads_texture_arrays_level_by_level(
+    make_asset: Callable[..., Asset], answers: Callable[..., Any], encoding: Any, tmp_path: Path
+) -> None:
+    unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding=encoding, levels=3))
+    texture = read_texture_array(tmp_path / "images~" / "maps.dds")
+    said = answers(tmp_path)
+    assert said["blocks"] == [[36, 20, 3, 3, DXGI[encoding]]]
+    for level, data in enumerate(texture.levels):
+        np.testing.assert_array_equal(said[f"level{level}"], data)
+
+
+@needs_mono
+def test_c_sharp_tells_of_a_file_that_is_cut_short(make_asset: Callable[..., Asset], answers: Callable[..., Any], tmp_path: Path) -> None:
+    unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding="bc7"))
+    path = tmp_path / "images~" / "maps.dds"
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(AssertionError, match=r"expected \d+ bytes in .*maps.dds, found \d+"):
+        answers(tmp_path)
 
 
 @needs_mono

@@ -43,12 +43,17 @@ export function needPositions(asset: Asset, lamps: number): void {
  */
 export function shaderText(asset: Asset, room: number): string {
   const lines = Object.entries(shaderDefines(asset, room)).map(([name, value]) => `#define ${name} ${value}`);
-  return [...lines, SOURCES[asset.manifest.method]].join("\n");
+  return [...lines, shaderBody(asset)].join("\n");
+}
+
+/** `shaderText` without its defines, for engines that write those themselves. */
+export function shaderBody(asset: Asset): string {
+  return SOURCES[asset.manifest.method];
 }
 
 export function shaderDefines(asset: Asset, room: number): Record<string, number> {
   const own: Record<string, number> =
-    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_SCALARS: asset.basis.scalars };
+    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_SCALARS: asset.basis.scalars, SRBF_LAYERS: asset.layers.count };
   return { ...own, SRBF_LAMPS: room };
 }
 

@@ -17,7 +17,12 @@ static class Answers
         catch (FormatException error) { Console.WriteLine("refused " + error.Message); return; }
         Print("size", manifest.Width, manifest.Height, manifest.LayerFiles.Length, manifest.Scalars, manifest.Clusters, manifest.TableSize);
         Print("centers", manifest.Centers);
-        for (int i = 0; i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
+        string first = Path.Combine(folder, manifest.LayerFiles[0]);
+        SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
+        if (blocks != null) Print("blocks", blocks.Width, blocks.Height, blocks.Layers, blocks.Levels, blocks.Format);
+        for (int i = 0; blocks != null && i < blocks.Layers; i++)
+            for (int level = 0; level < blocks.Levels; level++) Print("level" + level, Array.ConvertAll(blocks.Data(i, level), b => (double)b));
+        for (int i = 0; blocks == null && i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
         SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
         Show("table", table);
         if (manifest.ClusterFile != null) Show("clusters", SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)));

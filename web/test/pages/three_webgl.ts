@@ -9,9 +9,9 @@ let renderer: THREE.WebGLRenderer | undefined;
 function shared(): THREE.WebGLRenderer {
   renderer ??= new THREE.WebGLRenderer({ antialias: false });
   renderer.toneMapping = THREE.NoToneMapping;
-  renderer.debug.onShaderError = (gl, program, vertex, fragment) => {
+  renderer.debug.onShaderError = ((gl: WebGL2RenderingContext, program: never, vertex: never, fragment: never) => {
     throw new Error(`${gl.getProgramInfoLog(program)} ${gl.getShaderInfoLog(vertex)} ${gl.getShaderInfoLog(fragment)}`);
-  };
+  }) as never; // other engines add to the DOM's types
   return renderer;
 }
 

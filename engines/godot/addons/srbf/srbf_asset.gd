@@ -8,8 +8,11 @@ extends Resource
 
 @export var method: String
 @export var quantity: String
+## Whether direct light is left out, to be added by the engine.
+@export var is_indirect: bool
 ## Whether the texels are the pixels of a fixed camera.
 @export var is_view: bool
+@export_enum("sphere", "hemisphere") var domain := "sphere"
 @export var width: int
 @export var height: int
 ## World to the frame that the asset was captured in, both z up.
@@ -37,6 +40,7 @@ extends Resource
 @export var cluster_index: Image
 
 var _textures := {}
+var _table := PackedFloat32Array()  # red, green, blue of w_table
 
 
 ## The asset that an asset.json describes; null, and an error in the log, where something is missing.
@@ -49,6 +53,8 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var asset := SrbfAsset.new()
 	asset.method = manifest.method
 	asset.quantity = manifest.quantity
+	asset.domain = manifest.domain
+	asset.is_indirect = manifest.get("transport") == "indirect"
 	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
@@ -111,38 +117,68 @@ func texture(name: StringName) -> ImageTexture:
 
 ## The first lines of a shader for this asset.
 func defines() -> String:
+	var kind := ("#define SRBF_IRRADIANCE\n" if quantity == "irradiance" else "") + ("#define SRBF_INDIRECT\n" if is_indirect and quantity == "irradiance" else "")
 	if method == "relighting-map":
-		return "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
+		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
 	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
-	return "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+	return kind + "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
-## Relighting maps: one weight a map for all far lights together, the sum of color R_i(direction).
-func map_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+## One weight a map, or a light function of every cluster, for all far lights together: the sum of color w(direction), w = 1.
+## `by_table`: scalar planes by the table that lamps use, off by w_table.error of asset.json, in a fraction of the time.
+func weights(directions: PackedVector3Array, colors: PackedVector3Array, by_table := false) -> PackedVector4Array:
+	if method == "relighting-map":
+		return _map_weights(directions, colors)
+	return _table_weights(directions, colors) if by_table else _plane_weights(directions, colors)
+
+
+## `weights` of a panorama, Godot's, in linear radiance; `rotation` turns Godot's world into the asset's frame.
+func sky_weights(sky: Image, rotation: Basis) -> PackedVector4Array:
+	var upright := rotation.y.is_equal_approx(Vector3(0.0, 0.0, 1.0))
+	var directions := PackedVector3Array()
+	var colors := PackedVector3Array()
+	for row in sky.get_height():
+		var top := PI / 2.0 - row * PI / sky.get_height()
+		var bottom := PI / 2.0 - (row + 1) * PI / sky.get_height()
+		if domain == "hemisphere" and upright:  # a row that straddles the horizon ends there
+			top = maxf(top, 0.0)
+			bottom = maxf(bottom, 0.0)
+		var solid_angle := (sin(top) - sin(bottom)) * TAU / sky.get_width()
+		var height_angle := (top + bottom) / 2.0
+		for column in sky.get_width():
+			var azimuth := (column + 0.5) / sky.get_width() * TAU
+			var direction := Vector3(cos(height_angle) * sin(azimuth), sin(height_angle), -cos(height_angle) * cos(azimuth))
+			direction = rotation * direction
+			if solid_angle > 0.0 and (domain == "sphere" or upright or direction.z > 0.0):
+				var color := sky.get_pixel(column, row)
+				directions.append(direction)
+				colors.append(Vector3(color.r, color.g, color.b) * solid_angle)
+	return weights(directions, colors)
+
+
+func _map_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
 	var table := r_table.get_data().to_float32_array()
 	var middle := 0.5 * (table.size() - 1)
-	var weights := PackedVector4Array()
+	var sums := PackedVector4Array()
 	for center in centers:
 		var sum := Vector3.ZERO
 		for n in directions.size():
 			var place := (clampf(directions[n].dot(center), -1.0, 1.0) + 1.0) * middle
 			var entry := mini(int(place), table.size() - 2)
 			sum += colors[n] * lerpf(table[entry], table[entry + 1], place - entry)
-		weights.append(Vector4(sum.x, sum.y, sum.z, 0.0))
-	return weights
+		sums.append(Vector4(sum.x, sum.y, sum.z, 1.0))
+	return sums
 
 
-## Scalar planes: an image of scalars + 1 weights a row, a row a cluster, for all far lights together.
-func plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> Image:
+func _plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
 	var gaussians := {}  # by spread, of which there are few
 	for spread in spreads:
 		if not gaussians.has(spread):
 			gaussians[spread] = _gaussians(spread, directions, colors)
-	var weights := PackedFloat32Array()
-	weights.resize(spreads.size() * 4)
+	var sums := PackedVector4Array()
 	var at := 0
-	for f in spreads.size():
-		var gaussian: PackedFloat64Array = gaussians[spreads[f]]
+	for spread in spreads:
+		var gaussian: PackedFloat64Array = gaussians[spread]
 		var red := 0.0
 		var green := 0.0
 		var blue := 0.0
@@ -151,11 +187,32 @@ func plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -
 			green += light_coefficients[at + 1] * gaussian[b + 1]
 			blue += light_coefficients[at + 2] * gaussian[b + 2]
 			at += 3
-		weights[4 * f] = red
-		weights[4 * f + 1] = green
-		weights[4 * f + 2] = blue
-		weights[4 * f + 3] = 1.0
-	return Image.create_from_data(scalars + 1, clusters, false, Image.FORMAT_RGBAF, weights.to_byte_array())
+		sums.append(Vector4(red, green, blue, 1.0))
+	return sums
+
+
+func _table_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+	if _table.is_empty():
+		var table: Image = w_table.duplicate()
+		table.convert(Image.FORMAT_RGBF)
+		_table = table.get_data().to_float32_array()
+	var row := w_table.get_width()
+	var columns := row / w_table_size
+	var sums := PackedVector3Array()
+	sums.resize(spreads.size())
+	for n in directions.size():
+		var place := (_octahedral(directions[n]) + Vector2.ONE) * (0.5 * (w_table_size - 1))
+		var node := Vector2i(place).clampi(0, w_table_size - 2)
+		var part := place - Vector2(node)
+		for f in sums.size():
+			var at := ((f / columns) * w_table_size + node.y) * row + (f % columns) * w_table_size + node.x
+			var top := _entry(at).lerp(_entry(at + 1), part.x)
+			var bottom := _entry(at + row).lerp(_entry(at + row + 1), part.x)
+			sums[f] += colors[n] * top.lerp(bottom, part.y)
+	var padded := PackedVector4Array()
+	for sum in sums:
+		padded.append(Vector4(sum.x, sum.y, sum.z, 1.0))
+	return padded
 
 
 ## Where a texel is, in Godot's frame, y up.
@@ -182,32 +239,38 @@ func bounds() -> AABB:
 	return AABB(low, high - low)
 
 
-## A mesh through the position map's covered texels: second UV layer, normals, triangles; Godot's frame, y up. What is longer than
-## `longest` times the middle length of an edge spans two charts, and is left out.
-func texel_mesh(longest := 4.0) -> ArrayMesh:
+## A mesh through the position map's covered texels, of at most some `most` vertices: second UV layer, normals, triangles; Godot's frame.
+## What is longer than `longest` times the middle length of an edge spans two charts, and is left out.
+func texel_mesh(longest := 4.0, most := 65536) -> ArrayMesh:
 	if position == null:
 		push_error("expected a position map in the asset, found none: it has no mesh")
 		return null
+	var step := maxi(1, ceili(sqrt(float(width) * height / most)))
+	var columns := _steps(width, step)
+	var rows := _steps(height, step)
+	var across := columns.size()
 	var points := PackedVector3Array()
 	var normals := PackedVector3Array()
 	var places := PackedVector2Array()
-	for row in height:
-		for column in width:
+	var covered := PackedByteArray()
+	for row in rows:
+		for column in columns:
 			points.append(point(Vector2i(column, row)))
 			normals.append(_to_godot(normal.get_pixel(column, row)) if normal else Vector3.UP)
 			places.append(Vector2((column + 0.5) / width, (row + 0.5) / height))
+			covered.append(1 if not coverage or coverage.get_pixel(column, row).r >= 0.5 else 0)
 	var lengths := PackedFloat32Array()
-	for row in height:
-		for column in width - 1:
-			lengths.append(points[row * width + column].distance_to(points[row * width + column + 1]))
+	for corner in points.size() - 1:
+		if covered[corner] and covered[corner + 1] and (corner + 1) % across:
+			lengths.append(points[corner].distance_to(points[corner + 1]))
 	lengths.sort()
-	var limit := longest * lengths[lengths.size() / 2]
+	var limit := longest * lengths[lengths.size() / 2] if lengths else INF
 	var indices := PackedInt32Array()
-	for row in height - 1:
-		for column in width - 1:
-			var corner := row * width + column
-			for triangle in [[corner, corner + 1, corner + width], [corner + 1, corner + width + 1, corner + width]]:
-				if _belongs(triangle, points, limit):
+	for row in rows.size() - 1:
+		for column in across - 1:
+			var corner := row * across + column
+			for triangle in [[corner, corner + 1, corner + across], [corner + 1, corner + across + 1, corner + across]]:
+				if _belongs(triangle, points, covered, limit):
 					if _faces_away(triangle, points, normals):
 						triangle.reverse()
 					indices.append_array(PackedInt32Array(triangle))
@@ -218,23 +281,42 @@ func texel_mesh(longest := 4.0) -> ArrayMesh:
 	arrays[Mesh.ARRAY_TEX_UV2] = places
 	arrays[Mesh.ARRAY_INDEX] = indices
 	var mesh := ArrayMesh.new()
-	mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+	if indices:
+		mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
 	return mesh
 
 
-func _belongs(triangle: Array, points: PackedVector3Array, limit: float) -> bool:
+## Every so many texels of a side, the last one always.
+static func _steps(size: int, step: int) -> PackedInt32Array:
+	var chosen := PackedInt32Array(range(0, size, step))
+	if chosen[-1] != size - 1:
+		chosen.append(size - 1)
+	return chosen
+
+
+static func _belongs(triangle: Array, points: PackedVector3Array, covered: PackedByteArray, limit: float) -> bool:
 	for n in 3:
-		if coverage and coverage.get_pixel(triangle[n] % width, triangle[n] / width).r < 0.5:
-			return false
-		if points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
+		if not covered[triangle[n]] or points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
 			return false
 	return true
 
 
 ## Godot's front faces turn clockwise.
-func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
+static func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
 	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
 	return across.dot(normals[triangle[0]]) > 0.0
+
+
+func _entry(texel: int) -> Vector3:
+	return Vector3(_table[3 * texel], _table[3 * texel + 1], _table[3 * texel + 2])
+
+
+## A direction's place on the octahedral square, -1 to 1 [Cigolle2014].
+static func _octahedral(direction: Vector3) -> Vector2:
+	var d := direction / (absf(direction.x) + absf(direction.y) + absf(direction.z))
+	if d.z >= 0.0:
+		return Vector2(d.x, d.y)
+	return Vector2((1.0 - absf(d.y)) * (-1.0 if d.x < 0.0 else 1.0), (1.0 - absf(d.x)) * (-1.0 if d.y < 0.0 else 1.0))
 
 
 func _gaussians(spread: float, directions: PackedVector3Array, colors: PackedVector3Array) -> PackedFloat64Array:

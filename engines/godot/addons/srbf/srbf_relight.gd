@@ -8,6 +8,7 @@ extends Node3D
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
 const RADIUS := 1e-4  # metres: no receiver is nearer to a lamp, as in Godot
+const SKY_WIDTH := 32
 const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 
 @export var asset: SrbfAsset
@@ -15,13 +16,20 @@ const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 @export var surfaces: Array[Node]
 ## Those to follow; all of the scene where none are named.
 @export var lights: Array[Light3D]
+## A panorama to light by, as Godot's PanoramaSky takes it; it is averaged down to 32 texels of width. Bytes are sRGB.
+@export var sky: Texture2D
+@export var sky_energy := 1.0
 ## How many omni and spot lights a shader has room for.
 @export_range(1, 64) var most_lamps := 4
+## Eigen maps: weigh directional lights by the table, as omni and spot lights are, where they move every frame.
+@export var suns_by_table := false
 ## For canvas items, in stops.
 @export var exposure := 0.0
 
 var _materials: Array[ShaderMaterial] = []
 var _weights: ImageTexture
+var _sky_weights: PackedVector4Array
+var _sky_of := []
 var _last := []
 
 
@@ -60,7 +68,7 @@ func _process(_delta: float) -> void:
 		found.assign(get_tree().root.find_children("*", "Light3D", true, false))
 	found = found.filter(func(light: Light3D) -> bool: return light.is_visible_in_tree())
 	var asset_from_godot := asset.asset_from_world * Z_UP * global_transform.affine_inverse()
-	var now := [asset_from_godot, exposure, get_viewport().use_hdr_2d]
+	var now := [asset_from_godot, exposure, suns_by_table, sky, sky_energy, get_viewport().use_hdr_2d]
 	for light in found:
 		now.append_array([light.global_transform, light.light_color, light.light_energy, light.light_negative])
 		if not light is DirectionalLight3D:
@@ -84,15 +92,40 @@ func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 		if light is DirectionalLight3D:
 			directions.append((asset_from_godot.basis * light.global_basis.z).normalized())
 			colors.append(irradiance(light))
+	var sums := asset.weights(directions, colors, suns_by_table)
+	if sky:
+		_follow_sky(asset_from_godot)
+		for i in sums.size():
+			sums[i] += _sky_weights[i] * sky_energy
 	if asset.method == "relighting-map":
-		_give("srbf_weights", asset.map_weights(directions, colors))
+		_give("srbf_weights", sums)
 		return
-	var image := asset.plane_weights(directions, colors)
+	var image := Image.create_from_data(asset.scalars + 1, asset.clusters, false, Image.FORMAT_RGBAF, sums.to_byte_array())
 	if _weights == null:
 		_weights = ImageTexture.create_from_image(image)
 		_give("srbf_weights", _weights)
 	else:
 		_weights.update(image)
+
+
+## The sky's weights cost more than all others, and change with the sky alone.
+func _follow_sky(asset_from_godot: Transform3D) -> void:
+	var now := [asset, sky, asset_from_godot.basis]
+	if now == _sky_of:
+		return
+	_sky_of = now
+	var image := sky.get_image().duplicate() as Image
+	if image.is_compressed():
+		image.decompress()
+	var encoded := image.get_format() <= Image.FORMAT_RGBA8
+	image.convert(Image.FORMAT_RGBF)
+	if encoded:
+		for row in image.get_height():
+			for column in image.get_width():
+				image.set_pixel(column, row, image.get_pixel(column, row).srgb_to_linear())
+	while image.get_width() > SKY_WIDTH and image.get_height() > 1:
+		image.shrink_x2()
+	_sky_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
 
 
 func _set_lamps(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
@@ -141,8 +174,8 @@ static func _decay(light: Light3D) -> float:
 
 func _material(type: String, file: String) -> ShaderMaterial:
 	var shader := Shader.new()
-	shader.code = "shader_type %s;\n%s%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
-		type, asset.defines(), "#define SRBF_IRRADIANCE\n" if asset.quantity == "irradiance" else "", most_lamps, file
+	shader.code = "shader_type %s;\n%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+		type, asset.defines(), most_lamps, file
 	]
 	var material := ShaderMaterial.new()
 	material.shader = shader

@@ -44,16 +44,33 @@ namespace Srbf
 
         static Texture2DArray Layers(SrbfManifest manifest, string folder)
         {
-            // A scalar means something else in the next cluster: its planes are never mixed by the sampler.
-            var layers = new Texture2DArray(manifest.Width, manifest.Height, manifest.LayerFiles.Length, TextureFormat.RGBAHalf, false, true)
+            string first = Path.Combine(folder, manifest.LayerFiles[0]);
+            SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
+            int levels = blocks == null ? 1 : blocks.Levels;
+            var layers = new Texture2DArray(manifest.Width, manifest.Height, manifest.LayerFiles.Length, FormatOf(blocks), levels, true)
             {
-                filterMode = manifest.ClusterFile != null ? FilterMode.Point : FilterMode.Bilinear,
+                // A scalar means something else in the next cluster: its planes are never mixed by the sampler.
+                filterMode = manifest.ClusterFile != null ? FilterMode.Point : levels > 1 ? FilterMode.Trilinear : FilterMode.Bilinear,
                 wrapMode = TextureWrapMode.Clamp,
             };
             for (int i = 0; i < manifest.LayerFiles.Length; i++)
-                layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
-            layers.Apply(false, true);
+            {
+                for (int level = 0; blocks != null && level < levels; level++) layers.SetPixelData(blocks.Data(i, level), level, i);
+                if (blocks == null) layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
+            }
+            layers.Apply(false);  // kept readable: the imported asset is written from the host's copy
             return layers;
+        }
+
+        static TextureFormat FormatOf(SrbfDds blocks)
+        {
+            switch (blocks == null ? SrbfDds.RgbaHalf : blocks.Format)
+            {
+                case SrbfDds.Bc7: return TextureFormat.BC7;
+                case SrbfDds.Bc1: return TextureFormat.DXT1;
+                case SrbfDds.Rgba8: return TextureFormat.RGBA32;
+                default: return TextureFormat.RGBAHalf;
+            }
         }
 
         /// <summary>Rows go up as they are: the image's top becomes v = 0, and the shader turns v over.</summary>
@@ -63,7 +80,7 @@ namespace Srbf
             if (format == TextureFormat.RFloat) texture.SetPixelData(image.Values, 0);
             else if (format == TextureFormat.R8) texture.SetPixelData(System.Array.ConvertAll(image.Values, value => (byte)value), 0);
             else texture.SetPixelData(Halves(image.Rgba()), 0);
-            texture.Apply(false, true);
+            texture.Apply(false);
             return texture;
         }
 

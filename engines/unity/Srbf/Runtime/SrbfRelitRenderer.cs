@@ -49,6 +49,7 @@ namespace Srbf
                 if (lamp.type == LightType.Directional) far.Add(Far(assetFromUnity, lamp, color));
                 else if ((lamp.type == LightType.Point || lamp.type == LightType.Spot) && count < MostLamps) SetLamp(assetFromUnity, lamp, color, count++);
             }
+            if (weighed != asset) GetComponent<Renderer>().SetPropertyBlock(null);  // arrays of a block never grow
             if (weighed != asset || Changed()) Weigh();
             GetComponent<Renderer>().GetPropertyBlock(block);
             block.SetTexture("_SrbfLayers", asset.layers);

@@ -23,17 +23,21 @@ float4 _SrbfLamps[4 * SRBF_LAMPS];  // four a lamp, as srbfUnpackLamp takes them
 float _SrbfLampCount;
 
 // The light that leaves a white surface, in Unity's units: a white Lambert surface that faces a light of intensity 1 gives 1.
-// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, metres.
+// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, metres. In fragment shaders: it takes derivatives.
 float3 SrbfRelitFrom(Texture2DArray layers, SamplerState layersSampler, float2 uv, float3 worldPosition)
 {
     float2 place = float2(uv.x, 1.0 - uv.y);
     float3 receiver = mul(_SrbfAssetFromWorld, float4(worldPosition, 1.0)).xyz;
+#ifndef SRBF_CLUSTERED  // a cluster's scalars mean nothing in a coarser level
+    float2 size = float2(srbfTextureSize(layers).xy);
+    float level = srbfMipLevel(ddx(place) * size, ddy(place) * size);
+#endif
 #if defined(SRBF_K)
-    float3 sum = srbfAssetLights(layers, layersSampler, place, _SrbfWeights, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeights, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #elif defined(SRBF_CLUSTERED)
     float3 sum = srbfAssetLights(layers, layersSampler, _SrbfClusters, place, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #else
-    float3 sum = srbfAssetLights(layers, layersSampler, place, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #endif
     float3 ambient = _SrbfAmbient.SampleLevel(sampler_SrbfAmbient, place, 0.0).rgb / 3.14159265;  // in Blender's units
     return srbfFinish(sum, ambient) * SRBF_UNITY_SCALE;
