@@ -7,32 +7,46 @@ SCENE ?= caustics
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
 
-.PHONY: setup demo test test-fast check torture bench extension clean
+.PHONY: setup setup-test demo test test-fast test-godot check torture bench extension web clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
 	sh scripts/debian-packages
 	sh scripts/make-venv $(PYTHON) $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
+	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export]'
+	touch $@
+
+setup-test: $(VENV)/.tested-by
+
+$(VENV)/.tested-by: $(VENV)/.installed
+	sh scripts/debian-packages test
 	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export,test,dev]'
 	touch $@
 
 demo: setup
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 
-test: setup
+test: setup-test
 	$(BIN)/pytest
 
-test-fast: setup
+test-fast: setup-test
 	$(BIN)/pytest -m "not blender" -n 2
 
-check: setup
+test-godot: setup-test
+	sh scripts/godot-chroot
+	$(BIN)/python scripts/test_godot.py
+
+web: setup-test
+	cd web && PATH=$(abspath $(BIN)):$$PATH && npm ci --no-audit --no-fund && npm run build
+
+check: setup-test
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-torture: setup
+torture: setup-test
 	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)
 
 bench: setup

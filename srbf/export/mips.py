@@ -12,7 +12,9 @@ from srbf.containers.texture_array import level_size
 from srbf.dilation import dilate, nearest_covered
 from srbf.parallel import each
 
-GUTTER = 2  # texels of a level between two charts, in its own texels: one of each chart's own for the bilinear filter
+GUTTER = (
+    2.5  # of a level's texels between two charts: a bilinear sample half a texel into one takes the next texel, whose nearest is its own
+)
 
 
 def smaller_levels(
@@ -26,7 +28,7 @@ def smaller_levels(
     found = [layers]
     for level in range(1, levels):
         across, down = level_size(width, height, level)
-        rows, columns = _shares(height, down), _shares(width, across)
+        rows, columns = shares(height, down), shares(width, across)
         weight = np.asarray(rows @ (columns @ coverage.T).T, np.float32)  # (h, w)
         nearest = nearest_covered(weight)
         smaller = np.empty((len(layers), down, across, layers.shape[3]), np.float32)
@@ -49,7 +51,7 @@ def smaller_levels(
     return found
 
 
-def _shares(size: int, smaller: int) -> sparse.csr_matrix:
+def shares(size: int, smaller: int) -> sparse.csr_matrix:
     """(smaller, size): the share of each texel in each smaller one, which covers size / smaller of them."""
     edges = np.arange(smaller + 1) * (size / smaller)
     rows, columns, shares = [], [], []
@@ -68,14 +70,21 @@ def coverage_of(asset: Asset) -> Float32[ndarray, "H W"]:
 
 
 def levels_without_bleeding(asset: Asset) -> int:
-    """The most levels, full size included, whose texels keep GUTTER of their own between any two charts; 1 where a texel's neighbour is
-    not its neighbour on the surface: clusters, whose scalars mean another thing in each, and vertices."""
+    """The most levels, full size included, with GUTTER of their own texels between any two charts, so that a bilinear sample of one chart
+    never takes of another; 1 where a texel's neighbour is not its neighbour on the surface (vertices) or means another thing (clusters).
+    """
     kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
     if "cluster_index" in asset.tables or kind == "vertices":
         return 1
-    all_levels = max(asset.width, asset.height).bit_length()
+    levels = max(asset.width, asset.height).bit_length()
     gap = chart_gap(coverage_of(asset))
-    return all_levels if gap is None else min(all_levels, 1 + max(0, int(np.log2(max(gap, 1) / GUTTER))))
+    if gap is None:
+        return levels
+    for level in range(1, levels):
+        across, down = level_size(asset.width, asset.height, level)
+        if gap < GUTTER * max(asset.width / across, asset.height / down):
+            return level
+    return levels
 
 
 def chart_gap(coverage: Float32[ndarray, "H W"]) -> int | None:

@@ -64,7 +64,7 @@ def test_fewer_maps_first(asset: Path, tmp_path: Path) -> None:
     [
         ([], 2, "--target or --keep"),
         (["--keep", 4, "--json"], 2, "--target with"),
-        (["--target", "gif"], 1, "expected a target of exr, uint8, dds, ktx2"),
+        (["--target", "gif"], 1, "expected a target of exr, uint8, dds, ktx2, gltf"),
         (["--keep", 4, "--encoding", "bc7"], 1, "--target dds or ktx2"),
         (["--target", "dds", "--levels", "many"], 1, "--levels auto or a whole number"),
         (["--target", "dds", "--levels", 9], 1, "0 to 4 mip levels"),

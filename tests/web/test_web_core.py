@@ -40,7 +40,9 @@ def test_weights_and_lamps_are_numpys(browser: Any, make_asset: Callable, make_p
     for kind, lights in LIGHTS.items():
         said = browser.answer("host", asset=url, lights=lights)
         expected = folded_weights(Asset.open(browser.folder(url)), lights)
-        np.testing.assert_allclose(np.reshape(said["weights"], (-1, 3)), expected, rtol=DOUBLE, atol=DOUBLE * max(np.abs(expected).max(), 1), err_msg=kind)
+        np.testing.assert_allclose(
+            np.reshape(said["weights"], (-1, 3)), expected, rtol=DOUBLE, atol=DOUBLE * max(np.abs(expected).max(), 1), err_msg=kind
+        )
         lamps = [lamp_uniforms(moved(light, asset.asset_from_world)) for light in lights if isinstance(light, PointLight)]
         assert len(said["lamps"]) == len(lamps)
         for found, lamp in zip(said["lamps"], lamps, strict=True):

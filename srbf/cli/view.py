@@ -1,0 +1,37 @@
+"""`srbf view`: an asset in the browser, its lights to be dragged."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from srbf.cli.parameters import AssetFolder
+from srbf.cli.terminal import note
+from srbf.viewer.server import ViewerServer, contents_of
+
+
+def view(
+    asset: AssetFolder,
+    capture: Annotated[
+        Path | None, typer.Argument(help="Folder of the capture it was fitted from, to compare with.", show_default=False)
+    ] = None,
+    mesh: Annotated[
+        Path | None, typer.Option(help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False)
+    ] = None,
+    port: Annotated[int, typer.Option(help="On 127.0.0.1; 0: any that is free.", min=0, max=65535)] = 0,
+    browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
+) -> None:
+    """Show an asset in the browser under lights that are dragged; Ctrl-C ends it."""
+    server = ViewerServer(contents_of(asset, capture, mesh), port)
+    try:
+        typer.echo(server.url)
+        if browser and not webbrowser.open(server.url):
+            note("no browser was found: open the address yourself")
+        server.serve_forever(poll_interval=0.1)
+    except KeyboardInterrupt:
+        return
+    finally:
+        server.server_close()

@@ -1,0 +1,49 @@
+"""What every engine's export starts from: its static files, and the asset's images in a folder that the engine's own importers pass by."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from srbf import files
+from srbf.asset import GEOMETRY, LAYERS, MANIFEST, Asset
+from srbf.errors import ShaderError
+from srbf.export import exr
+from srbf.export.settings import Settings, Target
+
+ENTRIES = ("r_table", "w_table", "light_coefficients", "cluster_index")  # keys of asset.json that hold a file among other things
+
+
+def engine_root(name: str) -> Path:
+    """The folder of an engine's static files: in an installed package, or beside the package in a checkout; ShaderError if in neither."""
+    package = Path(__file__).resolve().parents[1]
+    candidates = (package / "engines" / name, package.parent / "engines" / name)
+    for folder in candidates:
+        if folder.is_dir():
+            return folder
+    raise ShaderError(f"expected the files for {name} at {candidates[0]} or {candidates[1]}, found neither; install srbf again")
+
+
+def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, container: Target = exr.write) -> Asset:
+    """The asset by a `container` below `folder`/`data`, its asset.json in `folder`; the asset as it was written is returned."""
+    files.make_folder(folder / data)
+    container(asset, folder / data, settings)
+    written = Asset.open(folder / data)
+    files.write_json(folder / MANIFEST, below(data, files.read_json(folder / data / MANIFEST)))
+    (folder / data / MANIFEST).unlink()
+    return written
+
+
+def below(data: str, manifest: dict[str, Any]) -> dict[str, Any]:
+    """asset.json of files that lie in `data` beside it."""
+    moved = dict(manifest)
+    layers = LAYERS[manifest["method"]]
+    moved[layers] = [{**entry, "file": f"{data}/{entry['file']}"} for entry in manifest[layers]]
+    for key in ENTRIES:
+        if key in manifest:
+            moved[key] = {**manifest[key], "file": f"{data}/{manifest[key]['file']}"}
+    for key in (*GEOMETRY, "scene"):
+        if key in manifest:
+            moved[key] = f"{data}/{manifest[key]}"
+    moved["sha256"] = {f"{data}/{name}": digest for name, digest in manifest["sha256"].items()}
+    return moved

@@ -1,0 +1,84 @@
+"""A folder for an Unreal project: the asset, its shader include, and an editor script that imports both and builds a material."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.export.asset_shader import rows_of
+from srbf.export.engine_folder import engine_root, write_asset
+from srbf.export.hlsl import asset_include
+from srbf.export.settings import PLAIN, Settings, Written
+
+DATA = "images"
+SCRIPT = "import_srbf.py"
+# What the Custom node is given besides textures and places; the material parameter collection holds them by these names.
+LIGHTS = {
+    "SunDirection": (0.0, 0.0, 1.0, 0.0),  # towards the sun, Unreal's frame
+    "SunColor": (0.0, 0.0, 0.0, 0.0),  # linear, lux
+    "LampPosition": (0.0, 0.0, 100.0, 0.0),  # cm
+    "LampColor": (0.0, 0.0, 0.0, 0.0),  # linear, candela: lux at the distance a0 = 1 m
+    "LampAxis": (0.0, 0.0, -1.0, 0.0),  # where a spot shines
+    "LampShape": (1.0, 0.05, 3.0, 4.0),  # a0, radius (m), 1 - cos of a spot's half-angles, or 3 and 4
+}
+
+
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` by a name of its own, `node.json`, the Custom node, and the
+    editor script that imports all of it.
+
+    InputError on an asset that no shader relights.
+    """
+    asset_include(asset)  # refuses before anything is written
+    written = write_asset(asset, folder, DATA, settings)
+    text = unreal_include(written)
+    name = f"Srbf_{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    files.make_folder(folder / "Shaders")
+    files.write_text(folder / "Shaders" / f"{name}.ush", text)
+    files.write_json(folder / "node.json", custom_node(written, name))
+    shutil.copyfile(engine_root("unreal") / SCRIPT, folder / SCRIPT)
+    return Written(("docs/engines/unreal.md: run import_srbf.py in the editor; it copies Shaders/ into the project",))
+
+
+def unreal_include(asset: Asset) -> str:
+    """`Srbf_*.ush`: the asset's functions, and Unreal's axes and units."""
+    rows = rows_of(asset.asset_from_world, "{}".format)
+    frame = f"// World to the asset's frame, by rows.\nstatic const float4x4 srbfAssetFromWorld = float4x4(\n{rows}\n);\n"
+    return asset_include(asset) + "\n" + frame + "\n" + (engine_root("unreal") / "SrbfUnreal.ush").read_text(encoding="utf-8")
+
+
+def custom_node(asset: Asset, name: str) -> dict[str, Any]:
+    """The Custom node: its include, `inputs` in order, and `code`; the textures' files by input.
+
+    The result is what a surface sends out, to be added to the emissive colour: of irradiance assets for a white surface, so that the
+    material multiplies by its base colour, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
+    """
+    clustered = asset.method == "clustered-eigen-map"
+    textures = {"Table": asset.manifest["r_table" if asset.method == "relighting-map" else "w_table"]["file"]}
+    if clustered:
+        textures["Clusters"] = asset.manifest["cluster_index"]["file"]
+    if "ambient" in asset.images:
+        textures["Ambient"] = asset.manifest["ambient"]
+    scale = 1.0 if asset.quantity == "radiance" else 1 / math.pi
+    ambient = "Ambient.SampleLevel(AmbientSampler, UV, 0.0).rgb" if "Ambient" in textures else "float3(0.0, 0.0, 0.0)"
+    common = f"Layers, LayersSampler, {'Clusters, ' if clustered else ''}UV, Table"
+    code = [
+        f"float3 Sum = srbfAssetPoint({common}, float3(0.0, 0.0, 0.0), SrbfUnrealSun(SunDirection, SunColor));",
+        "SrbfLamp Lamp = SrbfUnrealLamp(LampPosition, LampColor, LampAxis, LampShape);",
+        f"Sum += srbfAssetPoint({common}, SrbfPlaceFromUnreal(WorldPosition), Lamp);",
+        f"return srbfFinish(Sum, {ambient}) * {scale!r};",
+    ]
+    return {
+        "include": f"/Project/{name}.ush",
+        "inputs": ["Layers", *textures, "UV", "WorldPosition", *LIGHTS],
+        "textures": {key: f"{DATA}/{file}" for key, file in textures.items()},
+        "layers": [f"{DATA}/{entry['file']}" for entry in asset.layers],
+        "filtered": not clustered,
+        "lights": {key: list(value) for key, value in LIGHTS.items()},
+        "code": "\n".join(code),
+    }

@@ -1,0 +1,59 @@
+"""A capture's own pictures, for the page to compare with: its lights, and an image by the light's number."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.errors import InputError
+from srbf.image import write_image
+
+KEPT = 32  # encoded images that are held
+
+
+@dataclass(eq=False)
+class References:
+    """Images as EXRs of floats, whatever the capture holds them as; they are made when asked for."""
+
+    capture: Capture
+    _made: dict[int, bytes] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    def check(self, asset: Asset) -> None:
+        """InputError where the capture is of something else than the asset, so that no picture of it could be compared."""
+        self.capture.require_directional("the viewer's comparison")
+        ours = (asset.width, asset.height, asset.quantity, asset.transport)
+        theirs = (self.capture.width, self.capture.height, self.capture.quantity, self.capture.transport)
+        if ours != theirs:
+            raise InputError(
+                f"expected the capture that the asset was fitted from ({_said(ours)}), found one of {_said(theirs)}; "
+                "leave it out, or give the right one"
+            )
+
+    def lights(self) -> dict[str, Any]:
+        """lights.json."""
+        return {"lights": [{"direction": list(light.direction), "role": light.role} for light in self.capture.lights]}
+
+    def image(self, index: int) -> bytes:
+        """The EXR of light `index`; IndexError where there is none."""
+        if not 0 <= index < len(self.capture.lights):
+            raise IndexError(index)
+        with self._lock:
+            if index not in self._made:
+                with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
+                    path = Path(folder) / "image.exr"
+                    write_image(path, self.capture.image(index), "float")
+                    self._made[index] = path.read_bytes()
+                while len(self._made) > KEPT:
+                    self._made.pop(next(iter(self._made)))
+            return self._made[index]
+
+
+def _said(facts: tuple[object, ...]) -> str:
+    width, height, quantity, transport = facts
+    return f"{width} x {height}, {quantity}, {transport}"

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// Runs the engine-free files on an exported asset and prints what they found, a name and numbers a line, for the tests to compare.
+using System;
+using System.Collections.Generic;
+using System.Globalization;
+using System.IO;
+using Srbf;
+
+static class Answers
+{
+    static void Main(string[] arguments)
+    {
+        CultureInfo.DefaultThreadCurrentCulture = CultureInfo.CurrentCulture = new CultureInfo("de-DE");  // a comma is a decimal point there
+        string folder = arguments[0];
+        SrbfManifest manifest;
+        try { manifest = SrbfManifest.Read(File.ReadAllText(Path.Combine(folder, "asset.json"))); }
+        catch (FormatException error) { Console.WriteLine("refused " + error.Message); return; }
+        Print("size", manifest.Width, manifest.Height, manifest.LayerFiles.Length, manifest.Scalars, manifest.Clusters, manifest.TableSize);
+        Print("centers", manifest.Centers);
+        string first = Path.Combine(folder, manifest.LayerFiles[0]);
+        SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
+        if (blocks != null) Print("blocks", blocks.Width, blocks.Height, blocks.Layers, blocks.Levels, blocks.Format);
+        for (int i = 0; blocks != null && i < blocks.Layers; i++)
+            for (int level = 0; level < blocks.Levels; level++) Print("level" + level, Array.ConvertAll(blocks.Data(i, level), b => (double)b));
+        for (int i = 0; blocks == null && i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
+        SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
+        Show("table", table);
+        if (manifest.ClusterFile != null) Show("clusters", SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)));
+        var lights = new List<FarLight>();
+        for (int i = 1; i + 5 < arguments.Length; i += 6)
+        {
+            var n = new double[6];
+            for (int j = 0; j < 6; j++) n[j] = double.Parse(arguments[i + j], CultureInfo.InvariantCulture);
+            lights.Add(new FarLight { ToLight = new Vector(n[0], n[1], n[2]).Normalized(), Color = new Vector(n[3], n[4], n[5]) });
+        }
+        if (manifest.Method == "relighting-map") Print("weights", SrbfMath.MapWeights(manifest.Centers, table.Values, lights));
+        else Print("weights", SrbfMath.PlaneWeights(manifest.Centers, manifest.Spreads, SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values, lights));
+        foreach (Vector axis in new[] { new Vector(1, 0, 0), new Vector(0, 1, 0), new Vector(0, 0, 1) })
+        {
+            Vector moved = SrbfMath.AssetFromUnity(axis), back = SrbfMath.UnityFromAsset(moved);
+            Print("axis", moved.X, moved.Y, moved.Z, back.X, back.Y, back.Z);
+        }
+        Print("axes", SrbfMath.Axes);
+        Print("versines", SrbfMath.Versine(0.001), SrbfMath.Versine(0.3), SrbfMath.Versine(2));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0.6, -0.8), 0.8, 0.05, false, 40, 70));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0, 1), 0.7, 0.01, true, -1, -1));
+        var halves = new List<double>();
+        for (int bits = 0; bits < 65536; bits++)
+            if ((bits & 0x7C00) != 0x7C00 && SrbfImage.ToHalf(SrbfImage.FromHalf((ushort)bits)) != bits) halves.Add(bits);
+        Print("wronghalves", halves.ToArray());
+        Print("halves", SrbfImage.ToHalf(1.00048828125f), SrbfImage.ToHalf(1.0009766f), SrbfImage.ToHalf(-0.3333333f), SrbfImage.ToHalf(65519), SrbfImage.ToHalf(65520), SrbfImage.ToHalf(3e-8f), SrbfImage.ToHalf(0.99999f));
+    }
+
+    static void Show(string name, SrbfImage image)
+    {
+        Print(name + "shape", image.Height, image.Width, image.Channels, image.Half ? 1 : 0);
+        Print(name, image.Values);
+    }
+
+    static void Print(string name, params double[] values) { Console.WriteLine(name + " " + string.Join(" ", Array.ConvertAll(values, v => v.ToString("R", CultureInfo.InvariantCulture)))); }
+
+    static void Print(string name, float[] values) { Print(name, Array.ConvertAll(values, v => (double)v)); }
+}

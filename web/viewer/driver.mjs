@@ -1,0 +1,124 @@
+// A browser for the viewer's tests: JSON lines in, JSON lines out. node driver.mjs CHROMIUM
+import { readFile } from "node:fs/promises";
+import { createInterface } from "node:readline";
+import { chromium } from "playwright-core";
+
+const browser = await chromium.launch({
+  executablePath: process.argv[2],
+  args: [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--use-gl=angle",
+    "--ignore-gpu-blocklist",
+    "--force-color-profile=srgb",
+    "--disable-background-networking",
+    "--disable-sync",
+    "--no-first-run",
+  ],
+});
+const said = [];
+let context;
+let page;
+
+const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 30_000, polling: 30 });
+
+const commands = {
+  async open({ url, width = 900, height = 700, touch = false }) {
+    await context?.close();
+    context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, hasTouch: touch });
+    page = await context.newPage();
+    page.on("console", (message) => said.push(`${message.type()}: ${message.text()}`));
+    page.on("pageerror", (error) => said.push(`error: ${error}`));
+    page.on("request", (request) => {
+      if (!request.url().startsWith(new URL(url).origin) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
+    });
+    await page.goto(url);
+    await settled();
+  },
+  async run({ script }) {
+    const value = await page.evaluate(script);
+    return value;
+  },
+  async drag({ path }) {
+    await page.mouse.move(...path[0]);
+    await page.mouse.down();
+    for (const point of path.slice(1)) await page.mouse.move(...point, { steps: 3 });
+    await page.mouse.up();
+    await settled();
+  },
+  async touch({ at }) {
+    await page.touchscreen.tap(...at);
+    await settled();
+  },
+  async click({ at, count = 1 }) {
+    await page.mouse.click(...at, { clickCount: count });
+    await settled();
+  },
+  async press({ keys }) {
+    for (const key of keys) await page.keyboard.press(key);
+    await settled();
+  },
+  /** Type a number into the panel's row of that name. */
+  async number({ name, value }) {
+    const input = page.locator(`.lil-gui .controller:has(.name:text-is("${name}")) input[type=text], .lil-gui .lil-controller:has(.lil-name:text-is("${name}")) input[type=text]`).first();
+    await input.fill(String(value));
+    await input.press("Enter");
+    await settled();
+  },
+  async choose({ selector, value }) {
+    await page.selectOption(selector, value);
+    await settled();
+  },
+  /** Click what hands out a file; its name and bytes. */
+  async download({ text }) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.getByText(text, { exact: true }).click()]);
+    await settled();
+    return { name: download.suggestedFilename(), bytes: (await readFile(await download.path())).toString("base64") };
+  },
+  async drop({ name, bytes }) {
+    const data = await page.evaluateHandle(
+      ([file, text]) => {
+        const transfer = new DataTransfer();
+        transfer.items.add(new File([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], file));
+        return transfer;
+      },
+      [name, bytes],
+    );
+    await page.dispatchEvent("#stage", "drop", { dataTransfer: data });
+    await page.waitForTimeout(50);
+    await settled();
+  },
+  /** The canvas as RGBA bytes, top row first. */
+  async canvas() {
+    return page.evaluate(() => {
+      const source = document.getElementById("canvas");
+      const copy = document.createElement("canvas");
+      copy.width = source.width;
+      copy.height = source.height;
+      const context = copy.getContext("2d");
+      context.drawImage(source, 0, 0);
+      const { data } = context.getImageData(0, 0, copy.width, copy.height);
+      let text = "";
+      for (let i = 0; i < data.length; i += 32768) text += String.fromCharCode(...data.subarray(i, i + 32768));
+      return { width: copy.width, height: copy.height, bytes: btoa(text) };
+    });
+  },
+  async shot({ path }) {
+    await page.screenshot({ path });
+  },
+};
+
+process.stdout.write(`${JSON.stringify({ ready: browser.version() })}\n`);
+for await (const line of createInterface({ input: process.stdin })) {
+  said.length = 0;
+  const { do: what, ...job } = JSON.parse(line);
+  let answer;
+  try {
+    answer = { value: await commands[what](job) };
+  } catch (error) {
+    answer = { error: String(error) };
+  }
+  process.stdout.write(`${JSON.stringify({ ...answer, said })}\n`);
+}
+await browser.close();

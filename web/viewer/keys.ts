@@ -1,0 +1,63 @@
+/** What keys do. */
+import { rounded } from "./light_state";
+import type { Changed, State } from "./state";
+
+const STEP = (2 * Math.PI) / 180;
+const LARGE_STEP = (10 * Math.PI) / 180;
+
+export const KEYS: [string, string][] = [
+  ["← → ↑ ↓", "move the sun, by 2°; with shift by 10°"],
+  ["space", "play or hold the path"],
+  ["1 … 9", "select a light"],
+  ["delete", "remove the light"],
+  ["double click", "put the lamp above a point, or aim the spot at it"],
+  ["t", "mesh or texels"],
+  ["c", "compare with the capture, the next way"],
+  ["m", "the next map"],
+  ["r", "reset the view"],
+  ["h", "hide the panel"],
+  ["?", "this list"],
+];
+
+export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void }): void {
+  window.addEventListener("keydown", (event) => {
+    const target = event.target as HTMLElement;
+    if (/^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " " && target.tagName === "BUTTON") return;
+    const step = event.shiftKey ? LARGE_STEP : STEP;
+    const turns: Record<string, [number, number]> = { ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
+    if (turns[event.key]) moveSun(state, ...turns[event.key]);
+    else if (event.key === " ") {
+      state.playing = !state.playing;
+      if (state.playing && state.path === "none") state.path = "turn";
+    } else if (/^[1-9]$/.test(event.key) && Number(event.key) <= state.lights.length) {
+      state.selected = Number(event.key) - 1;
+      changed({ panel: true });
+    } else if ((event.key === "Delete" || event.key === "Backspace") && state.lights[state.selected]) {
+      state.lights.splice(state.selected, 1);
+      state.selected = Math.min(state.selected, state.lights.length - 1);
+      changed({ lights: true, panel: true });
+    } else if (event.key === "t") act.nextView();
+    else if (event.key === "c") act.nextCompare();
+    else if (event.key === "m") act.nextMap();
+    else if (event.key === "r") act.reset();
+    else if (event.key === "h") act.hide();
+    else if (event.key === "?") act.help();
+    else return;
+    event.preventDefault();
+    changed({ lights: true });
+  });
+}
+
+/** The selected sun, or the first, by azimuth and elevation (rad); never over the zenith. */
+function moveSun(state: State, azimuth: number, elevation: number): void {
+  const selected = state.lights[state.selected];
+  const sun = selected?.kind === "directional" ? selected : state.lights.find((light) => light.kind === "directional");
+  if (sun?.kind !== "directional") return;
+  const [x, y, z] = sun.direction;
+  const height = Math.asin(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z))));
+  const now = Math.min(Math.PI / 2 - 1e-3, Math.max(-Math.PI / 2 + 1e-3, height + elevation));
+  const turn = Math.atan2(y, x) + azimuth;
+  sun.direction = rounded([Math.cos(now) * Math.cos(turn), Math.cos(now) * Math.sin(turn), Math.sin(now)]);
+  state.playing = false;
+}

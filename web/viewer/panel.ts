@@ -1,0 +1,219 @@
+/** The controls beside the picture: chips of the lights, and folders of numbers. */
+import { GUI } from "three/addons/libs/lil-gui.module.min.js";
+import type { Triple } from "../src";
+import { directionalState, isLampState, type LightState, pointState, rounded, spotState } from "./light_state";
+import type { Bounds } from "./receivers";
+import { type Changed, COMPARES, MOST_LIGHTS, PATHS, SHOWS, type State, TONES } from "./state";
+
+export interface Actions {
+  changed: Changed;
+  chooseEnvironment(): void;
+  savePng(): void;
+  saveFrames(): void;
+  savePath(): void;
+  resetCamera(): void;
+  moveTarget(on: boolean): void;
+}
+
+export interface PanelFacts {
+  maps: number;
+  hasPositions: boolean;
+  hasMesh: boolean;
+  hasCapture: boolean;
+  bounds: Bounds;
+}
+
+const KINDS: Record<LightState["kind"], string> = { directional: "Sun", point: "Point", spot: "Spot", environment: "Sky" };
+
+export class Panel {
+  private gui: GUI | undefined;
+  private readonly open = new Map<string, boolean>();
+
+  constructor(
+    private readonly chips: HTMLElement,
+    private readonly controls: HTMLElement,
+    private readonly state: State,
+    private readonly facts: PanelFacts,
+    private readonly actions: Actions,
+  ) {
+    this.rebuild();
+  }
+
+  /** After lights came, went or were selected. */
+  rebuild(): void {
+    this.gui?.folders.forEach((folder) => this.open.set(folder._title, !folder._closed));
+    const scrolled = this.controls.parentElement?.scrollTop ?? 0;
+    this.gui?.destroy();
+    this.gui = new GUI({ container: this.controls, title: "", autoPlace: false });
+    this.drawChips();
+    this.light();
+    this.picture();
+    if (this.facts.hasCapture) this.compare();
+    this.path();
+    this.save();
+    this.gui.folders.forEach((folder) => folder.open(this.open.get(folder._title) ?? folder._title !== "Path"));
+    if (this.controls.parentElement) this.controls.parentElement.scrollTop = scrolled;
+  }
+
+  /** After numbers changed elsewhere. */
+  refresh(): void {
+    this.gui?.controllersRecursive().forEach((controller) => controller.updateDisplay());
+    this.drawChips();
+  }
+
+  private get selected(): LightState | undefined {
+    return this.state.lights[this.state.selected];
+  }
+
+  private readonly relight = () => this.actions.changed({ lights: true });
+  private readonly redraw = () => this.actions.changed();
+
+  private drawChips(): void {
+    const { lights, selected } = this.state;
+    const numbers = new Map<string, number>();
+    const chips = lights.map((light, i) => {
+      const number = (numbers.get(light.kind) ?? 0) + 1;
+      numbers.set(light.kind, number);
+      const chip = document.createElement("button");
+      chip.className = `chip${i === selected ? " selected" : ""}${light.on ? "" : " off"}`;
+      chip.dataset.kind = light.kind;
+      const dot = document.createElement("i");
+      dot.style.background = light.color;
+      chip.append(dot, `${KINDS[light.kind]}${lights.filter((other) => other.kind === light.kind).length > 1 ? ` ${number}` : ""}`);
+      chip.setAttribute("aria-pressed", String(i === selected));
+      chip.onclick = () => {
+        this.state.selected = i;
+        this.actions.changed({ panel: true });
+      };
+      return chip;
+    });
+    const add = document.createElement("select");
+    add.className = "chip add";
+    add.setAttribute("aria-label", "Add a light");
+    const kinds = this.facts.hasPositions ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
+    add.append(new Option("+ add", "", true, true), ...kinds.map((kind) => new Option(KINDS[kind as LightState["kind"]], kind)));
+    add.onchange = () => this.add(add.value as LightState["kind"]);
+    add.disabled = lights.length >= MOST_LIGHTS;
+    if (document.activeElement instanceof HTMLSelectElement && this.chips.contains(document.activeElement)) document.activeElement.blur();
+    this.chips.replaceChildren(...chips, add);
+  }
+
+  /** A lamp at a place that hangs `height` above what it lights first. */
+  add(kind: LightState["kind"], at?: Triple, height = 0.5 * this.facts.bounds.radius): void {
+    const { centre } = this.facts.bounds;
+    const place: Triple = at ?? [centre[0], centre[1], centre[2] + height];
+    if (kind === "environment") {
+      this.actions.chooseEnvironment();
+      this.drawChips();
+      return;
+    }
+    const light =
+      kind === "directional" ? directionalState([-0.5, -0.5, 0.70711]) : kind === "point" ? pointState(place, height) : spotState(place, centre, height);
+    this.state.selected = this.state.lights.push(light) - 1;
+    this.actions.changed({ lights: true, panel: true });
+  }
+
+  private light(): void {
+    const light = this.selected;
+    if (!light || !this.gui) return;
+    const folder = this.gui.addFolder("Light");
+    folder.add(light, "on").name("On").onChange(this.relight);
+    folder.addColor(light, "color").name("Colour").onChange(this.relight);
+    folder.add(light, "intensity", 0, 10, 0.01).name("Intensity").onChange(this.relight);
+    if (light.kind === "environment") folder.add(light, "file").name("File").disable();
+    if (isLampState(light)) this.lamp(folder, light);
+    const remove = {
+      remove: () => {
+        this.state.lights.splice(this.state.selected, 1);
+        this.state.selected = Math.min(this.state.selected, this.state.lights.length - 1);
+        this.actions.changed({ lights: true, panel: true });
+      },
+    };
+    folder.add(remove, "remove").name("Remove");
+  }
+
+  private lamp(folder: GUI, light: Extract<LightState, { kind: "point" | "spot" }>): void {
+    const { centre, radius } = this.facts.bounds;
+    const step = 10 ** Math.floor(Math.log10(radius / 100));
+    const coordinates = (name: string, get: () => Triple, set: (place: Triple) => void) => {
+      ["x", "y", "z"].forEach((axis, c) => {
+        const proxy = {
+          get place() {
+            return get()[c];
+          },
+          set place(value: number) {
+            set(rounded(get().map((x, i) => (i === c ? value : x)) as unknown as Triple));
+          },
+        };
+        folder
+          .add(proxy, "place", centre[c] - 3 * radius, centre[c] + 3 * radius, step)
+          .name(`${name} ${axis} (m)`)
+          .onChange(this.relight);
+      });
+    };
+    coordinates("Lamp", () => light.position, (place) => (light.position = place));
+    folder.add(light, "a0", step, 4 * radius, step).name("a₀ (m)").onChange(this.relight);
+    folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
+    folder.add(light, "radius", 0.0001, radius, 0.0001).name("Radius (m)").onChange(this.relight);
+    if (light.kind !== "spot") return;
+    coordinates("Aim", () => light.target, (place) => (light.target = place));
+    folder
+      .add(light, "inner", 0, 89, 0.1)
+      .name("Full within (°)")
+      .onChange(() => {
+        light.outer = Math.max(light.outer, light.inner);
+        this.relight();
+      });
+    folder
+      .add(light, "outer", 0, 89, 0.1)
+      .name("None past (°)")
+      .onChange(() => {
+        light.inner = Math.min(light.inner, light.outer);
+        this.relight();
+      });
+    const target = { on: false };
+    folder.add(target, "on").name("Handles aim it").onChange(this.actions.moveTarget);
+  }
+
+  private picture(): void {
+    const folder = (this.gui as GUI).addFolder("Picture");
+    folder.add(this.state, "exposure", -8, 8, 0.05).name("Exposure (stops)").onChange(this.redraw);
+    folder.add(this.state, "tone", { Linear: TONES[0], AgX: TONES[1], ACES: TONES[2] }).name("Tone").onChange(this.redraw);
+    folder.add(this.state, "show", { Picture: SHOWS[0], "False colour": SHOWS[1], "Negative values": SHOWS[2], "A map": SHOWS[3] }).name("Show").onChange(this.relight);
+    folder
+      .add(this.state, "map", 0, this.facts.maps - 1, 1)
+      .name("Map")
+      .onChange(() => {
+        this.state.show = "map";
+        this.relight();
+      });
+    if (this.facts.hasMesh) folder.add(this.state, "view", { Mesh: "mesh", Texels: "texels" }).name("On").onChange(this.redraw);
+    folder.add(this.actions, "resetCamera").name("Reset view");
+  }
+
+  private compare(): void {
+    const folder = (this.gui as GUI).addFolder("Compare");
+    const names = { Off: COMPARES[0], "Slider: reference | relit": COMPARES[1], Difference: COMPARES[2], Reference: COMPARES[3] };
+    folder.add(this.state, "compare", names).name("With the capture").onChange(this.relight);
+  }
+
+  private path(): void {
+    const folder = (this.gui as GUI).addFolder("Path");
+    folder.add(this.state, "path", { None: PATHS[0], Turn: PATHS[1], Swing: PATHS[2] }).name("Path").onChange(this.relight);
+    folder.add(this.state, "seconds", 1, 60, 0.5).name("Round (s)").onChange(this.redraw);
+    folder
+      .add(this.state, "playing")
+      .name("Play")
+      .onChange(() => {
+        if (this.state.playing && this.state.path === "none") this.state.path = "turn";
+        this.relight();
+      });
+  }
+
+  private save(): void {
+    const folder = (this.gui as GUI).addFolder("Save");
+    folder.add(this.actions, "savePng").name("Picture (PNG)");
+    folder.add(this.actions, "saveFrames").name("Lights (FRAMES.json)");
+    folder.add(this.actions, "savePath").name("Path (FRAMES.json)");
+  }
+}

@@ -1,0 +1,35 @@
+/** Where a light is on its way: a turn about the vertical, or a swing over the zenith and back. */
+import type { Triple } from "../src";
+import { type LightState, rounded } from "./light_state";
+import type { State } from "./state";
+
+const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
+
+/** `light` after `turns` rounds of `path`; lamps turn about `centre`, and swing along x by the scene's `radius`. */
+export function along(light: LightState, path: State["path"], turns: number, centre: Triple, radius: number): LightState {
+  const angle = 2 * Math.PI * turns;
+  if (path === "none" || light.kind === "environment") return light;
+  if (light.kind === "directional") {
+    return { ...light, direction: rounded(path === "turn" ? turned(light.direction, angle) : swung(light.direction, angle)) };
+  }
+  if (path === "turn") {
+    const from: Triple = [light.position[0] - centre[0], light.position[1] - centre[1], light.position[2]];
+    const [x, y, z] = turned(from, angle);
+    return { ...light, position: rounded([x + centre[0], y + centre[1], z]) };
+  }
+  return { ...light, position: rounded([light.position[0] + 0.5 * radius * Math.sin(angle), light.position[1], light.position[2]]) };
+}
+
+function turned([x, y, z]: Triple, angle: number): Triple {
+  const [c, s] = [Math.cos(angle), Math.sin(angle)];
+  return [c * x - s * y, s * x + c * y, z];
+}
+
+/** Along its own azimuth; at angle 0 it is where it is, up to the widest tilt. */
+function swung([x, y, z]: Triple, angle: number): Triple {
+  const azimuth = Math.hypot(x, y) > 1e-9 ? Math.atan2(y, x) : 0;
+  const tilt = Math.acos(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z))));
+  const widest = Math.max(WIDEST, tilt);
+  const now = widest * Math.cos(Math.acos(tilt / widest) + angle);
+  return [Math.sin(now) * Math.cos(azimuth), Math.sin(now) * Math.sin(azimuth), Math.cos(now)];
+}

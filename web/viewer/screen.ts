@@ -1,0 +1,138 @@
+/** What the screen shows of a texel: the relit picture, a map, or how it differs from the reference; exposure, tone, false colour. */
+import { GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
+import type { SrbfTextures } from "../src/three";
+
+export const VALUES = { picture: 0, reference: 1, difference: 2, map: 3, negative: 4 } as const;
+export const COLOURS = { linear: 0, agx: 1, aces: 2, magnitude: 3, signed: 4, negative: 5 } as const;
+
+const FRAGMENT = `precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp sampler2DArray;
+${ShaderChunk.tonemapping_pars_fragment}
+in vec2 vUv;
+uniform sampler2D relit, negative, reference, ambient;
+uniform sampler2DArray layers;
+uniform vec4 layerScale, layerBias;
+uniform int layer, channel, value, colour;
+uniform vec3 referenceColour;
+uniform float split; // in pixels of the drawing buffer; left of it is the reference
+uniform bool nearest;
+out vec4 shown;
+
+vec2 place(ivec2 size) {
+    return nearest ? (floor(vUv * vec2(size)) + 0.5) / vec2(size) : vUv;
+}
+
+vec3 relitAt() { return textureLod(relit, place(textureSize(relit, 0)), 0.0).rgb; }
+vec3 ambientAt() { return textureLod(ambient, place(textureSize(ambient, 0)), 0.0).rgb; }
+vec3 referenceAt() { return textureLod(reference, place(textureSize(reference, 0)), 0.0).rgb * referenceColour + ambientAt(); }
+
+vec3 valueAt() {
+    if (value == ${VALUES.reference} || gl_FragCoord.x < split) return referenceAt();
+    if (value == ${VALUES.difference}) return relitAt() - referenceAt();
+    if (value == ${VALUES.map}) {
+        vec4 stored = textureLod(layers, vec3(place(textureSize(layers, 0).xy), float(layer)), 0.0) * layerScale + layerBias;
+        return channel < 0 ? stored.rgb : vec3(stored[channel]);
+    }
+    return relitAt();
+}
+
+float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+
+// A polynomial of degree five through Turbo [Mikhailov2019].
+vec3 turbo(float x) {
+    x = clamp(x, 0.0, 1.0);
+    vec4 v4 = vec4(1.0, x, x * x, x * x * x);
+    vec2 v2 = v4.zw * v4.z;
+    return clamp(vec3(
+        dot(v4, vec4(0.13572138, 4.61539260, -42.66032258, 132.13108234)) + dot(v2, vec2(-152.94239396, 59.28637943)),
+        dot(v4, vec4(0.09140261, 2.19418839, 4.84296658, -14.18503333)) + dot(v2, vec2(4.27729857, 2.82956604)),
+        dot(v4, vec4(0.10667330, 12.64194608, -60.58204836, 110.36276771)) + dot(v2, vec2(-89.90310912, 27.34824973))), 0.0, 1.0);
+}
+
+// Blue below 0, red above, dark between.
+vec3 signedColour(float x) {
+    float s = clamp(abs(x), 0.0, 1.0);
+    vec3 end = x < 0.0 ? vec3(0.18, 0.50, 1.0) : vec3(1.0, 0.28, 0.16);
+    vec3 light = x < 0.0 ? vec3(0.85, 0.94, 1.0) : vec3(1.0, 0.93, 0.80);
+    return s < 0.5 ? mix(vec3(0.07, 0.075, 0.085), end, s * 2.0) : mix(end, light, s * 2.0 - 1.0);
+}
+
+vec3 srgb(vec3 c) {
+    c = clamp(c, 0.0, 1.0);
+    return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
+}
+
+void main() {
+    vec3 v = valueAt();
+    vec3 c;
+    if (colour == ${COLOURS.magnitude}) c = turbo(luminance(v) * toneMappingExposure);
+    else if (colour == ${COLOURS.signed}) c = signedColour(luminance(v) * toneMappingExposure);
+    else if (colour == ${COLOURS.negative}) {
+        vec3 below = max(textureLod(negative, place(textureSize(negative, 0)), 0.0).rgb - ambientAt(), 0.0);
+        float depth = max(below.r, max(below.g, below.b)) * toneMappingExposure;
+        vec3 grey = vec3(srgb(vec3(luminance(v) * toneMappingExposure)) * 0.55);
+        c = depth > 0.0005 ? mix(vec3(0.35, 0.05, 0.42), vec3(1.0, 0.35, 1.0), clamp(depth * 8.0, 0.0, 1.0)) : grey;
+    }
+    else if (colour == ${COLOURS.agx}) c = srgb(AgXToneMapping(v));
+    else if (colour == ${COLOURS.aces}) c = srgb(ACESFilmicToneMapping(v));
+    else c = srgb(LinearToneMapping(v));
+    shown = vec4(c, 1.0);
+}`;
+
+const MESH = `precision highp float;
+in vec3 position;
+in vec2 lightmapUv;
+uniform mat4 modelViewMatrix, projectionMatrix;
+out vec2 vUv;
+void main() {
+    vUv = lightmapUv;
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+const PICTURE = `precision highp float;
+in vec3 position;
+uniform vec2 pictureScale, pictureOffset;
+out vec2 vUv;
+void main() {
+    vUv = vec2(0.5 + 0.5 * position.x, 0.5 - 0.5 * position.y);
+    gl_Position = vec4(position.xy * pictureScale + pictureOffset, 1.0, 1.0);
+}`;
+
+export type ScreenUniforms = Record<string, IUniform> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
+
+export function screenUniforms(relit: Texture, textures: SrbfTextures): ScreenUniforms {
+  return {
+    relit: { value: relit },
+    negative: { value: textures.ambient },
+    reference: { value: textures.ambient },
+    ambient: { value: textures.ambient },
+    layers: { value: textures.layers },
+    layerScale: { value: new Vector4(1, 1, 1, 1) },
+    layerBias: { value: new Vector4() },
+    layer: { value: 0 },
+    channel: { value: -1 },
+    value: { value: 0 },
+    colour: { value: 0 },
+    referenceColour: { value: [1, 1, 1] },
+    split: { value: 0 },
+    nearest: { value: false },
+    toneMappingExposure: { value: 1 },
+    pictureScale: { value: new Vector2(1, 1) },
+    pictureOffset: { value: new Vector2(0, 0) },
+  };
+}
+
+export function screenMaterial(uniforms: ScreenUniforms, onto: "mesh" | "picture"): RawShaderMaterial {
+  return new RawShaderMaterial({
+    glslVersion: GLSL3,
+    uniforms,
+    vertexShader: onto === "mesh" ? MESH : PICTURE,
+    fragmentShader: FRAGMENT,
+    depthTest: onto === "mesh",
+    depthWrite: onto === "mesh",
+    side: 2,
+    toneMapped: false,
+  });
+}

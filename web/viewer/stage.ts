@@ -1,0 +1,270 @@
+/** The large picture: a mesh under an orbit camera, or texels as a picture that is panned and zoomed; lamps as gizmos on either. */
+import {
+  type BufferGeometry,
+  Color,
+  type Material,
+  Mesh,
+  type Object3D,
+  PerspectiveCamera,
+  PlaneGeometry,
+  Raycaster,
+  Scene,
+  Vector2,
+  WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Triple } from "../src";
+import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
+import { LampGizmos } from "./lamp_gizmos";
+import { rounded } from "./light_state";
+import type { Receivers } from "./receivers";
+import { screenMaterial, type ScreenUniforms } from "./screen";
+import type { Changed, State } from "./state";
+
+const BACKGROUND = new Color(0x0f1114);
+const MOST_PIXEL_RATIO = 2;
+
+export class Stage {
+  readonly gizmos: LampGizmos;
+  private readonly scene = new Scene();
+  private readonly picture = new Scene();
+  private readonly orbit: OrbitControls;
+  private readonly orbitCamera = new PerspectiveCamera(38, 1, 0.01, 100);
+  private camera: PerspectiveCamera | undefined;
+  private readonly quad: Mesh;
+  private lit: Mesh[] = [];
+
+  constructor(
+    readonly renderer: WebGLRenderer,
+    private readonly uniforms: ScreenUniforms,
+    private readonly size: { width: number; height: number },
+    private readonly state: State,
+    private readonly receivers: Receivers,
+    private readonly fitted: FittedCamera | undefined,
+    model: Object3D | undefined,
+    changed: Changed,
+  ) {
+    this.quad = new Mesh(new PlaneGeometry(2, 2), screenMaterial(uniforms, "picture"));
+    this.quad.frustumCulled = false;
+    this.picture.add(this.quad);
+    if (model) this.addModel(model);
+    const canvas = renderer.domElement;
+    this.orbit = new OrbitControls(this.orbitCamera, canvas);
+    this.orbit.enableDamping = false;
+    this.placeCamera();
+    this.orbit.addEventListener("change", () => {
+      this.state.eye = [rounded(fromThree(this.orbitCamera.position)), rounded(fromThree(this.orbit.target))];
+      changed();
+    });
+    this.gizmos = new LampGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
+      this.orbit.enabled = !dragging && this.hasMesh;
+    });
+    this.panByPointer(canvas, changed);
+  }
+
+  /** Whether the mesh is shown, rather than a picture. */
+  get hasMesh(): boolean {
+    return this.lit.length > 0 && this.state.view === "mesh";
+  }
+
+  get canShowMesh(): boolean {
+    return this.lit.length > 0;
+  }
+
+  /** The orbit camera as it is at first. */
+  resetCamera(): void {
+    this.state.eye = undefined;
+    this.state.zoom = 0;
+    this.placeCamera();
+  }
+
+  /** The camera as the state has it. */
+  resetTo(): void {
+    this.placeCamera();
+  }
+
+  resize(): void {
+    const canvas = this.renderer.domElement;
+    const { clientWidth: width, clientHeight: height } = canvas.parentElement as HTMLElement;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXEL_RATIO));
+    this.renderer.setSize(Math.max(1, width), Math.max(1, height));
+    this.orbitCamera.aspect = width / Math.max(1, height);
+    this.orbitCamera.updateProjectionMatrix();
+  }
+
+  draw(): void {
+    this.orbit.enabled = this.hasMesh && !this.gizmos.dragging;
+    this.renderer.setClearColor(BACKGROUND);
+    this.uniforms.split.value *= this.renderer.getPixelRatio();
+    this.aim();
+    this.renderer.autoClear = true;
+    this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
+    if (this.camera) {
+      this.renderer.autoClear = false;
+      this.gizmos.draw(this.renderer, this.camera, this.hasMesh);
+    }
+    this.uniforms.split.value /= this.renderer.getPixelRatio();
+  }
+
+  /** The picture texel for texel, or the mesh as large as the screen has it; RGBA bytes, top row first, nothing drawn over it. */
+  pixels(): { width: number; height: number; data: Uint8Array } {
+    const buffer = this.renderer.getDrawingBufferSize(new Vector2());
+    const { width, height } = this.hasMesh ? { width: buffer.x, height: buffer.y } : this.size;
+    const target = new WebGLRenderTarget(width, height, { samples: this.hasMesh ? 4 : 0 });
+    const kept = { split: this.uniforms.split.value };
+    this.aim();
+    const { left, wide } = this.spread();
+    this.uniforms.split.value = this.hasMesh ? kept.split * this.renderer.getPixelRatio() : ((kept.split - left) / wide) * width;
+    if (!this.hasMesh) {
+      this.uniforms.pictureScale.value.set(1, 1);
+      this.uniforms.pictureOffset.value.set(0, 0);
+      this.uniforms.nearest.value = true;
+    }
+    this.renderer.autoClear = true;
+    this.renderer.setClearColor(BACKGROUND);
+    this.renderer.setRenderTarget(target);
+    this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
+    const upward = new Uint8Array(4 * width * height);
+    this.renderer.readRenderTargetPixels(target, 0, 0, width, height, upward);
+    this.renderer.setRenderTarget(null);
+    target.dispose();
+    this.uniforms.split.value = kept.split;
+    const data = new Uint8Array(upward.length);
+    for (let r = 0; r < height; ++r) data.set(upward.subarray(4 * width * (height - 1 - r), 4 * width * (height - r)), 4 * width * r);
+    return { width, height, data };
+  }
+
+  /** What is seen at a place of the canvas (CSS pixels), in the asset's world. */
+  pick(x: number, y: number): Triple | undefined {
+    if (this.hasMesh) {
+      const { clientWidth, clientHeight } = this.renderer.domElement;
+      const caster = new Raycaster();
+      caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.orbitCamera);
+      const hit = caster.intersectObjects(this.lit)[0];
+      return hit && fromThree(hit.point);
+    }
+    const { left, top, wide, high } = this.spread();
+    return this.receivers.at((x - left) / wide, (y - top) / high);
+  }
+
+  /** From the eye to a place, metres; where no eye is known, as if the whole scene were seen. */
+  distance(place: Triple): number {
+    const eye = this.hasMesh ? fromThree(this.orbitCamera.position) : this.fitted?.position;
+    return eye ? Math.hypot(...place.map((x, i) => x - eye[i])) : 3 * this.receivers.bounds.radius;
+  }
+
+  /** Screen pixels a texel, and the picture's rectangle on the canvas, CSS pixels. */
+  spread(): { zoom: number; left: number; top: number; wide: number; high: number } {
+    const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
+    const { width, height } = this.size;
+    const zoom = this.state.zoom || this.fit();
+    const [mx, my] = this.state.zoom ? this.state.middle : [width / 2, height / 2];
+    const ratio = this.renderer.getPixelRatio();
+    const snapped = (x: number) => Math.round(x * ratio) / ratio;
+    return { zoom, left: snapped(w / 2 - mx * zoom), top: snapped(h / 2 - my * zoom), wide: width * zoom, high: height * zoom };
+  }
+
+  private fit(): number {
+    const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
+    return Math.max(1e-3, Math.min((w - 48) / this.size.width, (h - 112) / this.size.height));
+  }
+
+  /** Place the picture, or nothing of it where the mesh is shown, and the camera that gizmos are seen by. */
+  private aim(): void {
+    if (this.hasMesh) {
+      this.uniforms.nearest.value = false;
+      this.camera = this.orbitCamera;
+      return;
+    }
+    const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
+    const { zoom, left, top, wide, high } = this.spread();
+    const scale: [number, number] = [wide / w, high / h];
+    const offset: [number, number] = [(2 * left + wide) / w - 1, 1 - (2 * top + high) / h];
+    this.uniforms.pictureScale.value.set(...scale);
+    this.uniforms.pictureOffset.value.set(...offset);
+    const device = zoom * this.renderer.getPixelRatio();
+    this.uniforms.nearest.value = device >= 6 || Math.abs(device - Math.round(device)) < 1e-6;
+    const { radius } = this.receivers.bounds;
+    this.camera = this.fitted && viewCamera(this.fitted, scale, offset, radius * 1e-3, radius * 50);
+  }
+
+  private placeCamera(): void {
+    const { centre, radius } = this.receivers.bounds;
+    const around: Triple = [centre[0] - 0.9 * radius, centre[1] - 2.1 * radius, centre[2] + 1.9 * radius];
+    const [eye, target] = this.state.eye ?? [around, centre];
+    this.orbitCamera.near = radius * 0.01;
+    this.orbitCamera.far = radius * 60;
+    this.orbitCamera.position.copy(toThree(eye));
+    this.orbit.target.copy(toThree(target));
+    this.orbitCamera.updateProjectionMatrix();
+    this.orbitCamera.lookAt(this.orbit.target);
+    this.orbitCamera.updateMatrixWorld(true);
+  }
+
+  /** Meshes with the extension take the relit light; what else a file holds is left out. */
+  private addModel(model: Object3D): void {
+    const material = screenMaterial(this.uniforms, "mesh");
+    model.updateMatrixWorld(true);
+    model.traverse((object) => {
+      const mesh = object as Mesh<BufferGeometry, Material>;
+      const extension = mesh.isMesh ? mesh.material.userData.gltfExtensions?.SRBF_relighting_map : undefined;
+      if (!extension) return;
+      const { geometry } = mesh;
+      const uv = geometry.getAttribute(extension.texCoord ? `uv${extension.texCoord}` : "uv");
+      if (!uv) return;
+      geometry.setAttribute("lightmapUv", uv);
+      const shown = new Mesh(geometry, material);
+      shown.applyMatrix4(mesh.matrixWorld);
+      this.scene.add(shown);
+      this.lit.push(shown);
+    });
+    this.scene.updateMatrixWorld(true);
+  }
+
+  private panByPointer(canvas: HTMLCanvasElement, changed: Changed): void {
+    const held = new Map<number, [number, number]>();
+    const begin = () => {
+      if (this.state.zoom) return;
+      this.state.zoom = this.fit();
+      this.state.middle = [this.size.width / 2, this.size.height / 2];
+    };
+    const zoomed = (factor: number, x: number, y: number) => {
+      begin();
+      const { zoom, left, top } = this.spread();
+      const next = Math.min(64, Math.max(0.05, zoom * factor));
+      const [u, v] = [(x - left) / zoom, (y - top) / zoom];
+      this.state.zoom = next;
+      this.state.middle = [u - (x - canvas.clientWidth / 2) / next, v - (y - canvas.clientHeight / 2) / next];
+      changed();
+    };
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        if (this.hasMesh) return;
+        event.preventDefault();
+        zoomed(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
+      },
+      { passive: false },
+    );
+    canvas.addEventListener("pointerdown", (event) => {
+      if (!this.hasMesh) held.set(event.pointerId, [event.offsetX, event.offsetY]);
+    });
+    canvas.addEventListener("pointermove", (event) => {
+      const from = held.get(event.pointerId);
+      if (!from || this.hasMesh || this.gizmos.dragging) return;
+      const to: [number, number] = [event.offsetX, event.offsetY];
+      const other = [...held].find(([id]) => id !== event.pointerId)?.[1];
+      if (other) {
+        const apart = (p: [number, number]) => Math.hypot(p[0] - other[0], p[1] - other[1]);
+        zoomed(apart(to) / Math.max(1, apart(from)), (to[0] + other[0]) / 2, (to[1] + other[1]) / 2);
+      } else if (event.buttons) {
+        begin();
+        this.state.middle = [this.state.middle[0] - (to[0] - from[0]) / this.state.zoom, this.state.middle[1] - (to[1] - from[1]) / this.state.zoom];
+        changed();
+      }
+      held.set(event.pointerId, to);
+    });
+    for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) canvas.addEventListener(end, (event) => held.delete(event.pointerId));
+  }
+}

@@ -1,0 +1,85 @@
+/** All that the page shows, and its URL: `#` and JSON of it. */
+import { SrbfError, type Triple } from "../src";
+import { checkLight, type LightState, round } from "./light_state";
+
+export const TONES = ["linear", "agx", "aces"] as const;
+export const SHOWS = ["picture", "false colour", "negative", "map"] as const;
+export const COMPARES = ["off", "slider", "difference", "reference"] as const;
+export const PATHS = ["none", "turn", "swing"] as const;
+
+export interface State {
+  lights: LightState[];
+  /** Which light the controls are of. */
+  selected: number;
+  /** Stops. */
+  exposure: number;
+  tone: (typeof TONES)[number];
+  show: (typeof SHOWS)[number];
+  /** Which map, or scalar plane, `map` shows. */
+  map: number;
+  compare: (typeof COMPARES)[number];
+  /** Where the slider is, 0 to 1 of the picture's width. */
+  split: number;
+  /** The lit mesh, or the lightmap's texels as a picture. */
+  view: "mesh" | "texels";
+  /** The orbit camera's position and target, in the asset's world. */
+  eye?: [Triple, Triple];
+  /** Of pictures: screen pixels a texel, 0: as large as fits; and the texel in the middle. */
+  zoom: number;
+  middle: [number, number];
+  path: (typeof PATHS)[number];
+  /** Seconds for one round. */
+  seconds: number;
+  playing: boolean;
+}
+
+/** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be drawn anew. */
+export type Changed = (what?: { lights?: boolean; panel?: boolean }) => void;
+
+export function encodeState(state: State): string {
+  const rounding = (_: string, value: unknown) => (typeof value === "number" ? round(value) : value);
+  return `#${encodeURIComponent(JSON.stringify(state, rounding)).replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
+}
+
+/** The state that `hash` says, the rest as in `plain`. @throws SrbfError in one line where it says none. */
+export function decodeState(hash: string, plain: State): State {
+  if (hash.length < 2) return plain;
+  let said: Partial<State>;
+  try {
+    said = JSON.parse(decodeURIComponent(hash.slice(1).replaceAll("'", "%22")));
+  } catch {
+    throw new SrbfError("expected a state that this page wrote in its address, found something else; it starts anew");
+  }
+  const state: State = { ...plain };
+  const one = <K extends keyof State>(key: K, fits: (value: never) => boolean) => {
+    const value = said[key];
+    if (value === undefined) return;
+    if (!fits(value as never)) throw new SrbfError(`expected another ${key} in the page's address, found ${JSON.stringify(value)}; it starts anew`);
+    state[key] = value as State[K];
+  };
+  const number = (least: number, most: number) => (value: number) => typeof value === "number" && value >= least && value <= most;
+  const choice = (names: readonly string[]) => (value: string) => names.includes(value);
+  const triple = (v: unknown) => Array.isArray(v) && v.length === 3 && v.every((x) => Number.isFinite(x));
+  one("exposure", number(-20, 20));
+  one("tone", choice(TONES));
+  one("show", choice(SHOWS));
+  one("map", (value: number) => Number.isInteger(value) && value >= 0);
+  one("compare", choice(COMPARES));
+  one("split", number(0, 1));
+  one("view", choice(["mesh", "texels"]));
+  one("eye", (value: unknown[]) => Array.isArray(value) && value.length === 2 && value.every(triple));
+  one("zoom", number(0, 1e3));
+  one("middle", (value: number[]) => Array.isArray(value) && value.length === 2 && value.every((x) => Number.isFinite(x)));
+  one("path", choice(PATHS));
+  one("seconds", number(0.1, 1e4));
+  one("playing", (value: unknown) => typeof value === "boolean");
+  if (said.lights !== undefined) {
+    if (!Array.isArray(said.lights) || said.lights.length > MOST_LIGHTS) throw new SrbfError("expected a list of lights in the page's address; it starts anew");
+    state.lights = said.lights.map(checkLight);
+  }
+  one("selected", number(-1, state.lights.length - 1));
+  state.selected = Math.min(state.selected, state.lights.length - 1);
+  return state;
+}
+
+export const MOST_LIGHTS = 16;
