@@ -7,7 +7,7 @@ SCENE ?= caustics
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
 
-.PHONY: setup setup-test demo test test-fast test-web test-godot check torture bench extension web clean
+.PHONY: setup setup-test demo test test-fast test-godot check torture bench extension web clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
@@ -32,6 +32,13 @@ test: setup-test
 
 test-fast: setup-test
 	$(BIN)/pytest -m "not blender" -n 2
+
+test-godot: setup-test
+	sh scripts/godot-chroot
+	$(BIN)/python scripts/test_godot.py
+
+web: setup-test
+	cd web && PATH=$(abspath $(BIN)):$$PATH && npm ci --no-audit --no-fund && npm run build
 
 check: setup-test
 	$(BIN)/ruff format --check .

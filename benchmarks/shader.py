@@ -1,14 +1,18 @@
-"""A frame by every method's shaders, side by side in one run: `python benchmarks/shader.py [--sides 256 1024]`.
+"""What the shaders of every method cost beside a bare one that only sums as many layers: `python benchmarks/shader.py`.
 
-Assets of random numbers in half floats, since a shader's time does not depend on what the numbers are: 25 relighting maps, eigen maps of 28
-and 16 scalars, and 64 clusters of 8 scalars. Milliseconds are medians, the methods taking turns; `host` is what the processor spends on
-weights.
+`--sides 1024 4096`: texels a side; `--screen`: frames a second of a lightmapped surface that fills 1920 x 1080; `--formula`: lamps by
+formula too. Assets of random numbers in half floats, since a shader's time does not depend on what the numbers are: 25 relighting maps,
+eigen maps of 28 and 16 scalars, 64 clusters of 8 scalars. All draw into one RGBA32F target, blended; milliseconds are medians, the shaders
+taking turns in one run, weights of far lights folded beforehand: `host` is what that takes the processor. GB/s: the texel's own data over
+the time, against copying a buffer on the same device, each byte read and written counted.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -17,8 +21,12 @@ from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
 from srbf.basis.light_functions import LightFunctions
 from srbf.basis.octahedral_table import octahedral_table
-from srbf.gl.context import create_context
-from srbf.gl.relighter import Relighter
+from srbf.gl.context import Limits, compile_program, create_context
+from srbf.gl.includes import resolve, resolve_text
+from srbf.gl.programs import Programs
+from srbf.gl.relighter import PASSES
+from srbf.gl.textures import AssetTextures
+from srbf.gl.uniforms import packed_lamps, padded
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import folded_weights
 from srbf.model_selection import dense_centers
@@ -26,21 +34,41 @@ from srbf.sphere import point_set
 
 LIGHTS = 400  # of the capture that the light functions are as dense as
 SPREADS = (0.2, 0.4)  # rad
+MAPS = "relighting map, k = 25"
 METHODS: dict[str, dict[str, int]] = {
-    "relighting map, k = 25": {"k": 25},
+    MAPS: {"k": 25},
     "eigen map, 28 scalars": {"scalars": 28},
     "eigen map, 16 scalars": {"scalars": 16},
     "clustered, 64 x 8 scalars": {"clusters": 64, "scalars": 8},
 }
-KINDS: dict[str, list[Light]] = {"directional": [DirectionalLight((0.3, 0.2, 0.9))], "point": [PointLight((0.2, 0.1, 0.7))]}
+BARE = "bare sum of 25 layers"
+SUN: list[Light] = [DirectionalLight((0.3, 0.2, 0.9), (1.0, 0.9, 0.7))]
+LAMPS = [PointLight((0.2 + 0.05 * i, 0.1 - 0.07 * i, 0.7), (0.9, 1.0, 0.8)) for i in range(16)]
+Clock = Callable[[], float]
 PATCH = 16  # texels a side of a patch that is all one cluster
+SCREEN = (1920, 1080)
+COPIED = 256 << 20  # bytes
+
+BARE_SHADER = """#version 330 core
+uniform sampler2DArray maps;
+out vec4 answer;
+void main() {
+    vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 25; ++i) {
+        sum += textureLod(maps, vec3(uv, float(i)), 0.0).rgb;
+    }
+    answer = vec4(sum, 1.0);
+}
+"""
 
 
 def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> Asset:
     """Random layers over a plane, in half floats."""
     rng = np.random.default_rng(0)
     layers, channels = (k, 3) if k else (-(-scalars // 4), 4)
-    stored = rng.normal(size=(layers, side, side, channels)).astype(np.float16)
+    layer = rng.standard_normal((side, side, channels), np.float32).astype(np.float16)
+    stored = np.stack([np.roll(layer, i, axis=0) for i in range(layers)])
     scale, bias = np.ones((layers, channels), np.float32), np.zeros((layers, channels), np.float32)
     x = np.linspace(-1, 1, side, dtype=np.float32)
     images = {"position": np.stack([*np.meshgrid(x, -x), np.zeros((side, side), np.float32)], axis=-1)}
@@ -68,37 +96,210 @@ def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> As
     return Asset(manifest, stored, scale, bias, tables, images)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sides", type=int, nargs="+", default=[256, 1024])
-    parser.add_argument("--runs", type=int, default=15)
-    arguments = parser.parse_args()
-    context = create_context()
-    print(f"{context.info['GL_RENDERER']}; ms, medians of {arguments.runs}\n")
-    print(f"{'side':<6}{'method':<28}{'B / texel':>10}{'table':>7}{'host':>8}" + "".join(f"{kind:>14}" for kind in KINDS))
-    for side in arguments.sides:
-        assets = {name: make_asset(side, **shape) for name, shape in METHODS.items()}
-        relighters = {name: Relighter(asset, context=context) for name, asset in assets.items()}
-        times: dict[tuple[str, str], list[float]] = {}
-        for run in range(-1, arguments.runs):  # the first compiles and uploads
-            for name, relighter in relighters.items():
-                for kind, lights in KINDS.items():
-                    started = time.perf_counter()
-                    relighter.draw(lights)
+class Bench:
+    """Every shader at one size, ready to draw into one target."""
+
+    def __init__(self, context: Any, side: int, counts: list[int], formula: bool, clock: Clock, resources: ExitStack) -> None:
+        self._context, self._resources, self._clock = context, resources, clock
+        self.assets = {name: make_asset(side, **shape) for name, shape in METHODS.items()}
+        limits, programs = Limits.of(context), Programs(context, resources)
+        self._target = self._framebuffer((side, side))
+        self.draws: dict[tuple[str, str], Callable[[], None]] = {}
+        for name, asset in self.assets.items():
+            textures = AssetTextures(context, asset, limits, resources)
+            weights = folded_weights(asset, SUN)
+            for by_formula in (False, True) if formula and name == MAPS else (False,):
+                passes = PASSES[asset.method](asset, programs, textures, limits, by_formula)
+                shown = f"{name}, formula" if by_formula else name
+                if not by_formula:
+                    self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.far(weights, None)
+                for count in counts:
+                    self.draws[shown, f"{count} lamps"] = lambda passes=passes, none=0 * weights, count=count: passes.lamps(
+                        LAMPS[:count], none, None
+                    )
+            if name == MAPS:
+                self.draws[BARE, "directional"] = self._bare(textures)
+
+    def run(self, draw: Callable[[], None]) -> float:
+        """Seconds of one shader, to the end of it."""
+        self._target.use()
+        self._context.enable_only(self._context.BLEND)
+        self._context.blend_func = self._context.ONE, self._context.ONE
+        self._context.finish()
+        started = self._clock()
+        draw()
+        self._context.finish()
+        return self._clock() - started
+
+    def _bare(self, textures: AssetTextures) -> Callable[[], None]:
+        program = compile_program(self._context, resolve("stages/fullscreen.vert"), resolve_text(BARE_SHADER, "bare.frag"))
+        corners = self._kept(self._context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
+        drawn = self._kept(self._context.vertex_array(self._kept(program), [(corners, "2f", "corner")]))
+
+        def draw() -> None:
+            textures.layers().use(0)
+            program["maps"].value = 0
+            drawn.render(vertices=3)
+
+        return draw
+
+    def _framebuffer(self, size: tuple[int, int]) -> Any:
+        return self._kept(self._context.framebuffer([self._kept(self._context.texture(size, 4, dtype="f4"))]))
+
+    def _kept(self, resource: Any) -> Any:
+        self._resources.callback(resource.release)
+        return resource
+
+
+def medians(draws: dict[Any, Callable[[], float]], runs: int) -> dict[Any, float]:
+    """Milliseconds of each, all of them taking turns; the first turn, which compiles and uploads, does not count."""
+    times: dict[Any, list[float]] = {}
+    for run in range(-1, runs):
+        for key, draw in draws.items():
+            taken = draw()
+            if run >= 0:
+                times.setdefault(key, []).append(taken)
+    return {key: 1e3 * float(np.median(taken)) for key, taken in times.items()}
+
+
+def copy_rate(context: Any, runs: int) -> float:
+    """GB/s that copying a buffer moves, read and written."""
+    with ExitStack() as resources:
+        buffers = [context.buffer(reserve=COPIED) for _ in range(2)]
+        for buffer in buffers:
+            resources.callback(buffer.release)
+
+        def copy() -> float:
+            context.finish()
+            started = time.perf_counter()
+            context.copy_buffer(buffers[1], buffers[0])
+            context.finish()
+            return time.perf_counter() - started
+
+        return 2 * COPIED / 1e6 / medians({0: copy}, runs)[0]
+
+
+def host_times(assets: dict[str, Asset], runs: int) -> dict[str, float]:
+    """Milliseconds to fold the weights of one directional light."""
+
+    def fold(asset: Asset) -> float:
+        started = time.perf_counter()
+        folded_weights(asset, SUN)
+        return time.perf_counter() - started
+
+    return medians({name: lambda asset=asset: fold(asset) for name, asset in assets.items()}, runs)
+
+
+def table(context: Any, side: int, runs: int, counts: list[int], formula: bool, clock: Clock, copied: float) -> None:
+    """Print what every shader costs at one size."""
+    with ExitStack() as resources:
+        bench = Bench(context, side, counts, formula, clock, resources)
+        took = medians({key: lambda draw=draw: bench.run(draw) for key, draw in bench.draws.items()}, runs)
+        host = host_times(bench.assets, runs)
+        bare = took[BARE, "directional"]
+        kinds = ["directional", *(f"{count} lamps" for count in counts)]
+        print(f"\n{side:<33}{'B / texel':>9}{'host':>7}" + "".join(f"{kind:>18}" for kind in kinds) + f"{'GB/s':>7}{'of a copy':>11}")
+        for name in dict.fromkeys(name for name, _ in took):
+            size = bench.assets.get(name, bench.assets[MAPS]).bytes_per_texel()["directional"]
+            cells = [f"{took[name, kind]:.2f} = {took[name, kind] / bare:.2f}x" if (name, kind) in took else "" for kind in kinds]
+            row = f"{name:<33}{size:>9}{host.get(name, float('nan')):>7.2f}" + "".join(f"{cell:>18}" for cell in cells)
+            if (name, "directional") in took:
+                rate = size * side**2 / 1e6 / took[name, "directional"]
+                row += f"{rate:>7.1f}{rate / copied:>11.0%}"
+            print(row)
+        maps = took[MAPS, "directional"]
+        print("directional, times faster than 25 maps: " + ", ".join(f"{name} {maps / took[name, 'directional']:.2f}" for name in METHODS))
+
+
+def screen(context: Any, runs: int, counts: list[int], side: int = 1024) -> None:
+    """Print the frames a second of a surface that fills a screen, a sun and none or so many lamps on it."""
+    counts = [0, *counts]
+    print(f"\nframes a second at {SCREEN[0]} x {SCREEN[1]}, lightmap of {side}" + "".join(f"{count:>9} lamps" for count in counts))
+    with ExitStack() as resources:
+        target = context.framebuffer([context.texture(SCREEN, 4, dtype="f2")])
+        square = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
+        corners = context.buffer(np.column_stack([square, np.zeros(6), 0.5 * square + 0.5]).astype(np.float32))
+        draws: dict[tuple[str, int], Callable[[], float]] = {}
+        for name, shape in METHODS.items():
+            asset = make_asset(side, **shape)
+            textures = AssetTextures(context, asset, Limits.of(context), resources)
+            for count in counts:
+                mesh = _surface(context, asset, textures, corners, count)
+
+                def draw(mesh: Callable[[], None] = mesh) -> float:
+                    target.use()
+                    context.enable_only(context.NOTHING)
                     context.finish()
-                    if run >= 0:
-                        times.setdefault((name, kind), []).append(time.perf_counter() - started)
-                started = time.perf_counter()
-                folded_weights(assets[name], KINDS["directional"])
-                if run >= 0:
-                    times.setdefault((name, "host"), []).append(time.perf_counter() - started)
-        for name, asset in assets.items():
-            table = asset.manifest["w_table"]["size"] if "w_table" in asset.manifest else len(asset.table)
-            took = {kind: 1e3 * float(np.median(times[name, kind])) for kind in ("host", *KINDS)}
-            row = f"{side:<6}{name:<28}{asset.bytes_per_texel()['directional']:>10}{table:>7}{took['host']:>8.2f}"
-            print(row + "".join(f"{took[kind]:>14.1f}" for kind in KINDS))
-        for relighter in relighters.values():
-            relighter.close()
+                    started = time.perf_counter()
+                    mesh()
+                    context.finish()
+                    return time.perf_counter() - started
+
+                draws[name, count] = draw
+        took = medians(draws, runs)
+        for name in METHODS:
+            print(f"{name:<50}" + "".join(f"{1e3 / took[name, count]:>15.1f}" for count in counts))
+        target.release()
+        corners.release()
+
+
+def _surface(context: Any, asset: Asset, textures: AssetTextures, corners: Any, count: int) -> Callable[[], None]:
+    maps = asset.method == "relighting-map"
+    stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
+    places = max(count, 1)
+    defines = {"SRBF_LAMPS": places, "SRBF_PLAIN": 1} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_SCALARS": asset.scalars})
+    program = compile_program(context, resolve("stages/lightmap.vert"), resolve(f"stages/{stage}", defines=defines))
+    drawn = context.vertex_array(program, [(corners, "3f 2f", "position", "lightmapUv")])
+    weights = folded_weights(asset, SUN)
+    layers = textures.layers()
+    used = {"maps" if maps else "planes": layers, "ambient": textures.ambient()}
+    arrays = {"lamps": packed_lamps(LAMPS[:count], places)}
+    if maps:
+        layers.filter = (context.LINEAR, context.LINEAR)
+        used["rTable"] = textures.r_pairs()
+        arrays |= {"weights": padded(weights), "centers": padded(asset.basis.centers)}
+    else:
+        if "cluster_index" in asset.tables:
+            used["clusters"] = textures.clusters()
+        else:
+            layers.filter = (context.LINEAR, context.LINEAR)
+        rows = np.pad(weights.reshape(asset.clusters, -1, 3), ((0, 0), (0, 0), (0, 1)))
+        used |= {"wTable": textures.w_table(), "weights": textures.kept(rows.astype(np.float32))}
+        program["tableSize"].value = asset.manifest["w_table"]["size"]
+    for name in ("worldFromObject", "assetFromWorld", "clipFromWorld"):
+        program[name].write(np.eye(4, dtype=np.float32))
+    for name, array in arrays.items():
+        if name in program:
+            program[name].write(np.ascontiguousarray(array, np.float32))
+    program["lampCount"].value = count
+
+    def draw() -> None:
+        for unit, (name, texture) in enumerate(used.items()):
+            texture.use(unit)
+            if name in program:
+                program[name].value = unit
+        drawn.render(vertices=6)
+
+    return draw
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sides", type=int, nargs="+", default=[1024])
+    parser.add_argument("--runs", type=int, default=15)
+    parser.add_argument("--lamps", type=int, nargs="*", default=[1, 4, 16], help="how many at once, 16 at most")
+    parser.add_argument("--formula", action="store_true", help="lamps by formula too: which is faster is for a GPU to say")
+    parser.add_argument("--screen", action="store_true", help="frames a second at 1920 x 1080 too")
+    parser.add_argument("--busy", action="store_true", help="a software renderer's processor time, where others use the machine too")
+    arguments = parser.parse_args()
+    clock = time.process_time if arguments.busy else time.perf_counter
+    context = create_context()
+    copied = copy_rate(context, arguments.runs)
+    print(f"{context.info['GL_RENDERER']}; ms and times the bare shader, medians of {arguments.runs}; copying moves {copied:.1f} GB/s")
+    for side in arguments.sides:
+        table(context, side, arguments.runs, arguments.lamps, arguments.formula, clock, copied)
+    if arguments.screen:
+        screen(context, arguments.runs, arguments.lamps)
     context.release()
 
 

@@ -207,8 +207,7 @@ class Asset:
         write_images(images)
         if self.scene is not None:
             (folder / self.manifest["scene"]).write_bytes(self.scene)
-        written = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file() and p != folder / MANIFEST)
-        self.manifest["sha256"] = {name: files.sha256_of(folder / name) for name in written}
+        self.manifest["sha256"] = files.checksums(folder, MANIFEST)
         schemas.check(self.manifest, "asset", MANIFEST)
         files.write_json(folder / MANIFEST, self.manifest)
 

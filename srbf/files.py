@@ -107,6 +107,12 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def checksums(folder: Path, manifest: str) -> dict[str, str]:
+    """Hex SHA-256 of every file under a folder but its `manifest`, by relative path in order."""
+    found = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file() and p != folder / manifest)
+    return {name: sha256_of(folder / name) for name in found}
+
+
 @contextmanager
 def atomic_folder(path: Path, force: bool, marker: str) -> Iterator[Path]:
     """A temporary folder beside `path` to fill, renamed to it on success.
@@ -141,5 +147,17 @@ def check_replaceable(path: Path, force: bool, marker: str) -> None:
         raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
     if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
         raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")
-    if others := [p.name for p in path.iterdir() if p.is_dir() and p.name not in ("lights", "direct")]:
+    folders = [p for p in path.iterdir() if p.is_dir() and p.name not in ("lights", "direct")]
+    if others := [p.name for p in folders if not _listed(p, path / marker)]:
         raise OutputExistsError(f"--force would delete the folder {others[0]!r} inside {path}; move it, or choose another -o")
+
+
+def _listed(folder: Path, manifest: Path) -> bool:
+    """Whether a manifest beside `folder` knows the checksum of every file in it: an export's own code, say."""
+    try:
+        known = read_json(manifest).get("sha256", {})
+    except ManifestError:
+        return False
+    return isinstance(known, dict) and all(
+        p.relative_to(manifest.parent).as_posix() in known for p in folder.rglob("*") if not p.is_dir() or p.is_symlink()
+    )

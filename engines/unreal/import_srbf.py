@@ -3,12 +3,13 @@
 
 Beside it lie node.json, images/ and Shaders/. It copies Shaders/ into the project's folder of that name, imports the images below
 /Game/Srbf, gathers the layers in a texture array, and makes a parameter collection for the lights and a material whose Custom node
-relights. `follow_lights()` afterwards copies the level's first directional light and first lamp into the collection.
+relights. `py "…/import_srbf.py" follow` afterwards copies the level's first directional light and first lamp into the collection.
 """
 
 import json
 import math
 import shutil
+import sys
 from pathlib import Path
 
 import unreal
@@ -182,8 +183,8 @@ def main():
     for name, file in node["textures"].items():
         textures[name] = import_texture(file, folder, name == "Ambient", {"Table": exact, "Clusters": grey}.get(name, hdr))
     make_material(node, folder, textures, make_collection(node, folder))
-    unreal.log(f"srbf: {folder}/Relit is made; give it to a mesh, then run follow_lights()")
+    unreal.log(f"srbf: {folder}/Relit is made; give it to a mesh, then run this script again with the word follow")
 
 
 if __name__ == "__main__":
-    main()
+    follow_lights() if "follow" in sys.argv[1:] else main()

@@ -12,7 +12,7 @@ precision highp sampler2DArray;
 uniform sampler2D environment;  // row 0 towards +z
 uniform sampler2D centers;      // RGBA32F, one row: center, and 1 / (2 spread^2) in alpha
 uniform sampler2D rTable;
-uniform mat3 assetFromMap;
+uniform vec4 assetFromMap[3];
 uniform int domain;
 
 layout(location = 0) out vec4 part;

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, ktx2, uint8, unity, unreal, web
+from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, web, wgsl
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.facts import folder_bytes
-from srbf.files import atomic_folder, check_replaceable, write_json
+from srbf.files import atomic_folder, check_replaceable, checksums, write_json
 
 __all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
 
@@ -21,8 +21,12 @@ TARGETS: dict[str, Target] = {
     "dds": dds.write,
     "ktx2": ktx2.write,
     "gltf": gltf.write,
+    "godot": godot.write,
     "unity": unity.write,
     "unreal": unreal.write,
+    "hlsl": hlsl.write,
+    "metal": metal.write,
+    "wgsl": wgsl.write,
     "web": web.write,
 }
 
@@ -72,7 +76,9 @@ def export(
                 f"expected at least {min_psnr:g} dB of {target} as {exported.encoding}, found {psnr:.2f}; "
                 "nothing was written: take a larger --encoding, or lower --min-psnr"
             )
-        exported.manifest["source"].setdefault("export", {"target": target})["psnr"] = round(psnr, 3)
+        source = exported.manifest.setdefault("source", {})
+        source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3), "notes": list(written.notes)}
+        exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # what a target has put beside the asset included
         write_json(temporary / MANIFEST, exported.manifest)
         disk = folder_bytes(temporary)
     return Report(

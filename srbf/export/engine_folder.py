@@ -9,7 +9,7 @@ from srbf import files
 from srbf.asset import GEOMETRY, LAYERS, MANIFEST, Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
-from srbf.export.settings import Settings
+from srbf.export.settings import Settings, Target
 
 ENTRIES = ("r_table", "w_table", "light_coefficients", "cluster_index")  # keys of asset.json that hold a file among other things
 
@@ -24,10 +24,10 @@ def engine_root(name: str) -> Path:
     raise ShaderError(f"expected the files for {name} at {candidates[0]} or {candidates[1]}, found neither; install srbf again")
 
 
-def write_asset(asset: Asset, folder: Path, data: str, settings: Settings) -> Asset:
-    """The asset as EXRs below `folder`/`data`, half unless told, its asset.json in `folder`; the asset as it was written is returned."""
+def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, container: Target = exr.write) -> Asset:
+    """The asset by a `container` below `folder`/`data`, its asset.json in `folder`; the asset as it was written is returned."""
     files.make_folder(folder / data)
-    exr.write(asset, folder / data, settings)
+    container(asset, folder / data, settings)
     written = Asset.open(folder / data)
     files.write_json(folder / MANIFEST, below(data, files.read_json(folder / data / MANIFEST)))
     (folder / data / MANIFEST).unlink()

@@ -3,15 +3,38 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
-from srbf.export.asset_shader import asset_shader, rows_of
-from srbf.export.translation import SAMPLERS, VECTORS, Constant, Function, PackFile, Parameter, Writer, guarded, pack_files
+from srbf.export import exr
+from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.dialect import WIDTH, Writer, guarded, wrapped
+from srbf.export.preprocessing import preprocess
+from srbf.export.settings import PLAIN, Settings, Written
+from srbf.export.translation import (
+    MATRICES,
+    SAMPLERS,
+    VECTORS,
+    Constant,
+    Function,
+    Group,
+    Node,
+    PackFile,
+    Parameter,
+    Struct,
+    Token,
+    is_sign,
+    pack_files,
+    render_plain,
+    significant,
+    split,
+)
 
 TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "int"), ("u", "uint"), ("b", "bool")) for n in (2, 3, 4)}
+TYPES |= {f"mat{n}": f"float{n}x{n}" for n in (2, 3, 4)}  # the same rows and columns: a matrix times a vector is mul(matrix, vector)
 TEXTURES = {"sampler2D": "Texture2D", "sampler2DArray": "Texture2DArray"}
 WORDS = {"mix": "lerp", "fract": "frac", "inversesqrt": "rsqrt", "uintBitsToFloat": "asfloat", "floatBitsToUint": "asuint"}
 # Words of HLSL that GLSL leaves free: geometry-shader modifiers, storage classes, and what the engines define.
@@ -48,18 +71,21 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
     What the pack asks for by `#define` (`SRBF_K`, `SRBF_SCALARS`) the including shader defines first.
     Raises ShaderError on GLSL that HLSL has no word for.
     """
-    files = pack_files(paths, root)
-    writer = HlslWriter(files)
-    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in files)])
+    pack = pack_files(paths, root)
+    writer = HlslWriter(pack)
+    return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in pack)])
 
 
-def asset_include(asset: Asset) -> str:
+def asset_include(asset: Asset, pairs: bool = False) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`. One such include a shader.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader. With `pairs`
+    relighting maps take `srbf.gl.textures.pairs_of` their R table in its place.
 
     Raises InputError on an asset that no shader relights.
     """
-    shader = asset_shader(asset)
+    defined = counts(asset, pairs)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
     writer = HlslWriter(shader.files)
     defines = "\n".join(f"#define {name} {value}" for name, value in shader.defines.items())
     arrays = "\n".join(
@@ -70,11 +96,19 @@ def asset_include(asset: Asset) -> str:
     return "\n".join([HEADING, defines + "\n", PRELUDE, *pack, arrays + "\n", writer.file(shader.own).strip() + "\n"])
 
 
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and `srbf.hlsl`, which relights it. Raises what `asset_include` raises."""
+    asset_include(asset)  # refuses before anything is written
+    written = exr.write(asset, folder, settings)
+    files.write_text(folder / "srbf.hlsl", asset_include(Asset.open(folder)))
+    return written
+
+
 class HlslWriter(Writer):
     """HLSL of parsed files."""
 
-    def __init__(self, files: list[PackFile]) -> None:
-        super().__init__(files, TYPES, WORDS, RESERVED)
+    def __init__(self, pack: list[PackFile]) -> None:
+        super().__init__(pack, TYPES, WORDS, RESERVED)
 
     def constant(self, item: Constant) -> str:
         return f"static const {self.type(item.type)} {item.name} = {self.expression(item.value)};"
@@ -84,7 +118,20 @@ class HlslWriter(Writer):
         if parameter.type in SAMPLERS:
             sampler = [f"SamplerState {name}Sampler"] if (function.name, parameter.name) in self.sampled else []
             return [f"{TEXTURES[parameter.type]} {name}", *sampler]
-        return [f"{self.type(parameter.type)} {name}" + (f"[{parameter.size}]" if parameter.size is not None else "")]
+        text = f"{self.type(parameter.type)} {name}" + (f"[{parameter.size}]" if parameter.size is not None else "")
+        return ["out " + text if parameter.out else text]
+
+    def struct(self, item: Struct) -> str:
+        """The struct, and a function that makes one: HLSL has no constructors of structs."""
+        members = [_declared(part) for part in split(item.body.inside, ";") if significant(part)]
+        head = f"{item.name} {_maker(item.name)}("
+        parameters = wrapped([f"{self.type(kind)} {self.name(name)}" for kind, name in members], len(head), WIDTH)
+        lines = [f"    {item.name} made;", *(f"    made.{self.name(name)} = {self.name(name)};" for _, name in members), "    return made;"]
+        return super().struct(item) + f"\n\n{head}{parameters}) {{\n" + "\n".join(lines) + "\n}"
+
+    def body(self, function: Function) -> str:
+        matrices = frozenset(parameter.name for parameter in function.parameters if parameter.type in MATRICES)
+        return self.expression(_multiplied(function.body.inside, matrices) if matrices else function.body.inside)
 
     def call(self, name: str, arguments: list[str]) -> str:
         arguments = [_bare(argument) for argument in arguments]
@@ -106,6 +153,8 @@ class HlslWriter(Writer):
             return f"{trimmed[0]}.SampleGrad({trimmed[0]}Sampler, {', '.join(trimmed[1:])})"
         if name == "atan" and len(arguments) == 2:
             name = "atan2"
+        if name in self.structs:
+            name = _maker(name)
         return super().call(name, arguments)
 
     @staticmethod
@@ -113,6 +162,49 @@ class HlslWriter(Writer):
         """The place and level of a Load; the pack fetches from plain textures alone."""
         parts = re.fullmatch(r"int2\((.+)\)", place)
         return f"int3({parts[1]}, {level})" if parts and _balanced(parts[1]) else f"int3({place}, {level})"
+
+
+def _multiplied(nodes: Sequence[Node], matrices: frozenset[str]) -> list[Node]:
+    """`matrix * vector` as mul(matrix, vector), where a matrix is a parameter; ShaderError on any other use of one."""
+    out: list[Node] = []
+    i = 0
+    while i < len(nodes):
+        node = nodes[i]
+        if isinstance(node, Group):
+            out.append(Group(node.opening, tuple(_multiplied(node.inside, matrices))))
+        elif node.kind == "name" and node.text in matrices:
+            start = next((j for j in range(i + 1, len(nodes)) if not _is_space(nodes[j])), len(nodes))
+            if start == len(nodes) or not is_sign(nodes[start], "*"):
+                raise ShaderError(
+                    f"expected {node.text} times a vector, found another use of the matrix; HLSL's writer knows that one alone"
+                )
+            start = next(j for j in range(start + 1, len(nodes)) if not _is_space(nodes[j]))
+            end = start + 1
+            while end < len(nodes) and (isinstance(nodes[end], Group) or is_sign(nodes[end], ".") or is_sign(nodes[end - 1], ".")):
+                end += 1
+            comma = (Token("sign", ","), Token("space", " "))
+            out += [Token("name", "mul"), Group("(", (node, *comma, *_multiplied(nodes[start:end], matrices)))]
+            i = end - 1
+        else:
+            out.append(node)
+        i += 1
+    return out
+
+
+def _is_space(node: Node) -> bool:
+    return isinstance(node, Token) and node.kind == "space"
+
+
+def _maker(struct: str) -> str:
+    return f"srbfMake{struct.removeprefix('Srbf')}"
+
+
+def _declared(nodes: Sequence[Node]) -> tuple[str, str]:
+    """Type and name of a struct's member; ShaderError on an array."""
+    words = significant(nodes)
+    if not (len(words) == 2 and isinstance(words[0], Token) and isinstance(words[1], Token)):
+        raise ShaderError(f"expected a struct's member as type and name, found {render_plain(nodes).strip()!r}")
+    return words[0].text, words[1].text
 
 
 def _bare(argument: str) -> str:

@@ -28,7 +28,7 @@ def smaller_levels(
     found = [layers]
     for level in range(1, levels):
         across, down = level_size(width, height, level)
-        rows, columns = _shares(height, down), _shares(width, across)
+        rows, columns = shares(height, down), shares(width, across)
         weight = np.asarray(rows @ (columns @ coverage.T).T, np.float32)  # (h, w)
         nearest = nearest_covered(weight)
         smaller = np.empty((len(layers), down, across, layers.shape[3]), np.float32)
@@ -51,7 +51,7 @@ def smaller_levels(
     return found
 
 
-def _shares(size: int, smaller: int) -> sparse.csr_matrix:
+def shares(size: int, smaller: int) -> sparse.csr_matrix:
     """(smaller, size): the share of each texel in each smaller one, which covers size / smaller of them."""
     edges = np.arange(smaller + 1) * (size / smaller)
     rows, columns, shares = [], [], []

@@ -45,12 +45,12 @@ def blocks_together(
     high, wide = -(-height // SIDE), -(-width // SIDE)  # blocks
     padded = np.pad(values, ((0, 0), (0, high * SIDE - height), (0, wide * SIDE - width), (0, 0)), "edge")
     found = np.empty((len(values), high, wide * BLOCK_BYTES[form]), np.uint8)
-    at_a_time = max(1, TEXELS_AT_A_TIME // (SIDE * SIDE * wide))
+    upper, at_a_time = metric(functions), max(1, TEXELS_AT_A_TIME // (SIDE * SIDE * wide))
 
     def work(task: int) -> None:
         rows = slice(task * at_a_time, (task + 1) * at_a_time)
         band = padded[:, rows.start * SIDE : rows.stop * SIDE]
-        found[:, rows] = _band(band, metric(functions), scale, bias, form).reshape(len(values), -1, found.shape[2])
+        found[:, rows] = _band(band, upper, scale, bias, form).reshape(len(values), -1, found.shape[2])
 
     each(work, -(-high // at_a_time))
     return found.reshape(len(values), -1)

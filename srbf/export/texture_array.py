@@ -104,7 +104,8 @@ def _levels(asset: Asset, settings: Settings) -> tuple[int, list[str]]:
     clean = levels_without_bleeding(asset)
     most = max(asset.width, asset.height).bit_length()
     if settings.levels == "auto":
-        return clean, []
+        clustered = "no mip levels: scalars of different clusters have no mean; relight to a texture and filter that"
+        return clean, [clustered] if "cluster_index" in asset.tables else []
     if not 0 <= settings.levels <= most:
         raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found --levels {settings.levels}")
     levels = max(1, settings.levels)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from srbf import files
 from srbf.asset import Asset
+from srbf.export import dds, exr
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.settings import PLAIN, Settings, Written
@@ -21,12 +22,14 @@ IMPORTED = "relit.srbf"
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `relit.srbf`, which Unity imports, `asset.json` with its images, `SrbfAsset.hlsl`, a sample shader, and the
-    code in `Srbf/`, which a project needs once.
+    code in `Srbf/`, which a project needs once. Half floats and floats are EXRs, an image a layer; bytes, BC7 and BC1 a DDS file with mip
+    levels.
 
     InputError on an asset that no shader relights.
     """
     asset_include(asset)  # refuses before anything is written
-    include = unity_include(write_asset(asset, folder, DATA, settings))
+    plain = settings.encoding in (None, "half", "float") and settings.levels in ("auto", 0, 1)
+    include = unity_include(write_asset(asset, folder, DATA, settings, exr.write if plain else dds.write))
     name = hashlib.sha256(include.encode()).hexdigest()[:8]
     shutil.copytree(engine_root("unity") / "Srbf", folder / "Srbf")
     files.write_text(folder / INCLUDE, include)
@@ -44,7 +47,7 @@ def unity_include(asset: Asset) -> str:
     radiance = asset.quantity == "radiance"
     defines = [
         f"#define SRBF_UNITY_SCALE {math.pi if radiance else 1.0}  // {'radiance' if radiance else 'irradiance'} in Unity's units",
-        f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)  // radiance has it' if radiance else '(albedo)'}",
+        f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)' if radiance else '(albedo)'}",
         *(["#define SRBF_CLUSTERED"] if asset.method == "clustered-eigen-map" else []),
     ]
-    return asset_include(asset) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'
+    return asset_include(asset, pairs=True) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'

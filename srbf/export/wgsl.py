@@ -6,36 +6,37 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
-from srbf.export.asset_shader import asset_shader, rows_of
+from srbf.export import exr
+from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.dialect import WIDTH, Writer, wrapped
+from srbf.export.preprocessing import preprocess
+from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     ASSIGNMENTS,
     SAMPLERS,
     SCALARS,
     VECTORS,
-    WIDTH,
     Constant,
     Function,
     Group,
-    Item,
     Node,
     PackFile,
     Parameter,
     Struct,
     Token,
-    Writer,
     is_group,
     is_sign,
     pack_files,
-    parse,
     render_plain,
     significant,
     split,
-    wrapped,
 )
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
+TYPES |= {f"mat{n}": f"mat{n}x{n}f" for n in (2, 3, 4)}
 TYPES |= {"float": "f32", "int": "i32", "uint": "u32", "bool": "bool"}
 TEXTURES = {"sampler2D": "texture_2d<f32>", "sampler2DArray": "texture_2d_array<f32>"}
 WORDS = {"inversesqrt": "inverseSqrt"}
@@ -59,23 +60,31 @@ def module(paths: Iterable[str], defines: Mapping[str, object], root: Path | Non
     Raises ShaderError where a define is missing or WGSL has no word for something.
     """
     known = set(defines)
-    files = [preprocessed(file, known) for file in pack_files(paths, root)]
-    return "\n".join([HEADING + constants(defines), *_texts(WgslWriter(files))])
+    pack = pack_files(paths, root, lambda text, path: preprocess(text, path, known, constant_of))
+    return "\n".join([HEADING + constants(defines), *_texts(WgslWriter(pack))])
 
 
 def asset_module(asset: Asset) -> str:
     """Everything that a WGSL shader needs to relight one asset: its numbers, the pack's functions that it needs, and
     `srbfAssetDirectional`, `srbfAssetPoint`. InputError on an asset that no shader relights.
     """
-    shader = asset_shader(asset)
-    known = set(shader.defines)
-    files = [preprocessed(file, known) for file in shader.files]
+    defined = counts(asset)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, constant_of))
     arrays = "\n".join(
         f"const {name} = array<vec4f, {count}>(\n{rows_of(values, 'vec4f({})'.format)},\n);"
         for name, (count, values) in shader.arrays.items()
     )
-    *pack, own = _texts(WgslWriter(files))
+    *pack, own = _texts(WgslWriter(shader.files))
     return "\n".join([HEADING + constants(shader.defines), *pack, arrays + "\n", own.removeprefix("// from glsl/asset\n")])
+
+
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and `srbf.wgsl`, which relights it. Raises what `asset_module` raises."""
+    asset_module(asset)  # refuses before anything is written
+    written = exr.write(asset, folder, settings)
+    files.write_text(folder / "srbf.wgsl", asset_module(Asset.open(folder)))
+    return written
 
 
 def constants(defines: Mapping[str, object]) -> str:
@@ -83,41 +92,17 @@ def constants(defines: Mapping[str, object]) -> str:
     return "".join(f"const {name}: i32 = {value};\n" for name, value in defines.items())
 
 
-def preprocessed(file: PackFile, known: set[str]) -> PackFile:
-    """A file without directives: conditions taken, `#define` as constants that are `known` from there on, `#error` raised."""
-    items: list[Item] = []
-    taken: list[bool] = []
-    for item in file.items:
-        if not (isinstance(item, Token) and item.kind == "directive"):
-            if all(taken):
-                items.append(item)
-            continue
-        word, _, rest = item.text.strip().removeprefix("#").strip().partition(" ")
-        rest = rest.partition("//")[0].strip()
-        if word in ("ifndef", "ifdef"):
-            taken.append((rest in known) == (word == "ifdef"))
-        elif word == "else":
-            taken[-1] = not taken[-1]
-        elif word == "endif":
-            taken.pop()
-        elif all(taken) and word == "error":
-            raise ShaderError(f"{file.path}: {rest}")
-        elif all(taken) and word == "define":
-            name, _, value = rest.partition(" ")
-            if "(" in name or not value:
-                raise ShaderError(f"{file.path}: expected a define that is a number, found {item.text.strip()!r}")
-            known.add(name)
-            items += parse(f"const int {name} = {value.strip()};", file.path).items
-        elif all(taken):
-            raise ShaderError(f"{file.path}: expected #ifdef, #ifndef, #define or #error, found {item.text.strip()!r}")
-    return PackFile(file.path, tuple(items))
+def constant_of(name: str, value: str) -> str:
+    """What `#define name value` becomes."""
+    return f"const int {name} = {value};"
 
 
 class WgslWriter(Writer):
     """WGSL of files without directives."""
 
-    def __init__(self, files: list[PackFile]) -> None:
-        super().__init__(files, TYPES, WORDS, RESERVED)
+    def __init__(self, pack: list[PackFile]) -> None:
+        super().__init__(pack, TYPES, WORDS, RESERVED)
+        self.pointers: frozenset[str] = frozenset()  # the `out` parameters of the function at hand
 
     def constant(self, item: Constant) -> str:
         return f"const {item.name}: {self.type(item.type)} = {self.expression(item.value)};"
@@ -138,13 +123,20 @@ class WgslWriter(Writer):
             sampler = [f"{name}Sampler: sampler"] if (function.name, parameter.name) in self.sampled else []
             return [f"{name}: {TEXTURES[parameter.type]}", *sampler]
         kind = self.type(parameter.type)
-        return [f"{name}: {kind}" if parameter.size is None else f"{name}: array<{kind}, {parameter.size.strip()}>"]
+        kind = kind if parameter.size is None else f"array<{kind}, {parameter.size.strip()}>"
+        return [f"{name}: ptr<function, {kind}>" if parameter.out else f"{name}: {kind}"]
 
     def body(self, function: Function) -> str:
         changed = _assigned(function.body.inside)
-        if fixed := changed & {parameter.name for parameter in function.parameters}:
+        if fixed := changed & {parameter.name for parameter in function.parameters if not parameter.out}:
             raise ShaderError(f"expected {function.name} to leave its parameters as they are, found {sorted(fixed)[0]} assigned")
-        return self._statements(function.body.inside, changed)
+        self.pointers = frozenset(parameter.name for parameter in function.parameters if parameter.out)
+        text = self._statements(function.body.inside, changed)
+        self.pointers = frozenset()
+        return text
+
+    def name(self, text: str) -> str:
+        return f"(*{super().name(text)})" if text in self.pointers else super().name(text)
 
     def call(self, name: str, arguments: list[str]) -> str:
         trimmed = [argument.strip() for argument in arguments]
@@ -160,6 +152,9 @@ class WgslWriter(Writer):
             return f"textureSampleGrad({image}, {image}Sampler, {self._place(place)}, {', '.join(gradients)})"
         if name == "atan" and len(arguments) == 2:
             name = "atan2"
+        if name in self.functions:
+            pairs = zip(self.functions[name].parameters, arguments, strict=True)
+            arguments = [_pointer(text) if parameter.out else text for parameter, text in pairs]
         return super().call(name, arguments)
 
     def expression(self, nodes: Sequence[Node]) -> str:
@@ -255,6 +250,12 @@ class WgslWriter(Writer):
             raise ShaderError(f"expected one variable a declaration, found {render_plain(nodes).strip()!r}")
         value = nodes[nodes.index(words[2]) + 1 :]
         return f"{word} {self.name(name.text)}: {self.type(kind.text)} ={self.expression(value)}"
+
+
+def _pointer(argument: str) -> str:
+    """A variable as its address; an `out` parameter that is handed on is one already."""
+    text = argument.strip()
+    return argument.replace(text, text[2:-1] if text.startswith("(*") else "&" + text)
 
 
 def _texts(writer: WgslWriter) -> list[str]:

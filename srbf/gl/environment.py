@@ -13,6 +13,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
+from srbf.gl.uniforms import padded
 from srbf.lights import EnvironmentLight
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Sky:
         if self._asset.domain == "hemisphere":
             domain = HEMISPHERE if np.allclose(rotation[2], [0, 0, 1]) else TURNED_HEMISPHERE
         uniforms: dict[str, Any] = {"environment": 0, "centers": 1, "domain": domain}
-        uniforms["assetFromMap"] = np.ascontiguousarray(rotation.T, np.float32)
+        uniforms["assetFromMap"] = padded(rotation)
         with ExitStack() as passing:
             rows = self._context.texture((self._count, len(light.image)), 4, dtype="f4")
             passing.callback(rows.release)
@@ -76,10 +77,10 @@ class Sky:
             passing.enter_context(self._textures.passing(light.image)).use(0)
             self._centers.use(1)
             if self._maps:
-                self._textures.r_table().use(2)
+                self._textures.r_pairs().use(2)
                 uniforms["rTable"] = 2
             self._onto(buffer, blend=False)
-            self._programs.run("environment_rows.frag", {} if self._maps else {"SRBF_FORMULA": 1}, uniforms)
+            self._programs.run("environment_rows.frag", {"SRBF_PAIRS" if self._maps else "SRBF_FORMULA": 1}, uniforms)
             rows.use(0)
             self._onto(self._weights_buffer if self._maps else self._gaussians_buffer, blend=self._maps)
             self._programs.run("environment_weights.frag", {}, {"rows": 0, "color": light.color})

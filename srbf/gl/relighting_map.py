@@ -32,6 +32,8 @@ class MapPasses:
         self._free = vectors_free(limits)
         self._lamps = lamps_a_pass(self._free, VECTORS_A_MAP)
         self._formula = formula
+        self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
+        self._functions = {"SRBF_FORMULA" if formula else "SRBF_PAIRS": 1}
 
     def check_lamps(self) -> None:
         """InputError where the shaders know no formula for the functions of a lamp's direction."""
@@ -67,24 +69,26 @@ class MapPasses:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` maps a pass."""
         self._textures.layers().use(0)
         where, values = self._textures.receivers(1)
-        self._textures.r_table().use(2)
+        self._textures.r_pairs().use(2)
         centers = padded(self._asset.basis.centers)
         if self._formula:
             centers[:, 3] = 0.5 / self._asset.basis.spread**2
         values |= {"maps": 0, "rTable": 2}
         if len(lights) == 1 and not weights.any() and not where:
             values |= {f"lamp.{name}": value for name, value in lamp_uniforms(lights[0]).items()}
-            self._over_maps("point.frag", {}, values, {"centers": centers}, units or self.layers_a_pass(1))
+            self._over_maps("point.frag", self._functions, values, {"centers": centers}, units or self.layers_a_pass(1))
             return
         far = padded(weights)
         for group, places in lamp_groups(lights, self._lamps):
             values |= {"lamps": packed_lamps(group, places), "lampCount": len(group)}
             arrays = {"centers": centers, "weights": far}
-            self._over_maps("lights.frag", {"SRBF_LAMPS": places} | where, values, arrays, units or self.layers_a_pass(places))
+            self._over_maps(
+                "lights.frag", {"SRBF_LAMPS": places} | where | self._functions, values, arrays, units or self.layers_a_pass(places)
+            )
             far = np.zeros_like(far)
 
     def _over_maps(self, stage: str, defines: dict[str, int], values: dict[str, Any], arrays: dict[str, ndarray], size: int) -> None:
-        defines = defines | ({"SRBF_FORMULA": 1} if self._formula else {})
+        defines = defines | self._defines
         for first, count in ranges(self._asset.k, size):
             own = {name: array[first : first + count] for name, array in arrays.items()} | self._decoding(first, count)
             self._programs.run(stage, {"SRBF_K": count} | defines, values | {"firstMap": first} | own)

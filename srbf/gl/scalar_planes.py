@@ -32,6 +32,7 @@ class PlanePasses:
         self._clustered = "cluster_index" in asset.tables
         self._free = vectors_free(limits)
         self._lamps = lamps_a_pass(self._free, VECTORS_A_LAYER)
+        self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
 
     def check_lamps(self) -> None:
         """Scalar planes have light functions for every direction."""
@@ -103,7 +104,7 @@ class PlanePasses:
         for first, count in ranges(len(scale), size):
             own = {"firstLayer": first, "scale": scale[first : first + count], "bias": bias[first : first + count]}
             counts = {"SRBF_SCALARS": self._asset.scalars, "SRBF_LAYERS": count}
-            self._programs.run(f"{self._method}_{lights}", counts | defines, values | own)
+            self._programs.run(f"{self._method}_{lights}", counts | defines | self._defines, values | own)
 
 
 def folded_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[ndarray, "C n 4"]:

@@ -61,9 +61,19 @@ class AssetTextures:
         """Layer i alone as a plain 2D texture, for the article's multi-pass variant."""
         return self._plain(f"layer {i}", self._asset.stored[i])
 
-    def r_table(self) -> moderngl.Texture:
-        """The R table, n x 1."""
-        return self._plain("r_table", self._asset.table[None, :, None])
+    def r_pairs(self) -> moderngl.Texture:
+        """The R table from its end, and the differences of its entries, n x 1, as `srbfWeightPairs` reads it."""
+        return self._plain("r_pairs", pairs_of(self._asset.table)[None])
+
+    def plain(self) -> bool:
+        """Whether what is stored needs no decoding."""
+        scale, bias = self._asset.scale.ravel().copy(), self._asset.bias.ravel()
+        if self._asset.method != "relighting-map":
+            unused = slice(self._asset.scalars, None)
+            if self._asset.stored[-1].reshape(-1, 4)[:, self._asset.scalars % 4 or 4 :].any():
+                return False
+            scale[unused] = 1
+        return bool((scale == 1).all() and not bias.any())
 
     def w_table(self) -> moderngl.Texture:
         """The atlas of light functions over the octahedral square."""
@@ -113,3 +123,9 @@ class AssetTextures:
             self._resources.callback(texture.release)
             self._made[name] = texture
         return self._made[name]
+
+
+def pairs_of(table: Float32[ndarray, " n"]) -> Float32[ndarray, "n 2"]:
+    """An R table from its end, so that it begins where cos theta is 1, each entry with what the next has more; 0 in the last."""
+    turned = table[::-1]
+    return np.stack([turned, np.diff(turned, append=turned[-1])], axis=1).astype(np.float32)

@@ -150,7 +150,9 @@ def test_how_many_levels(make_asset: Callable[..., Asset], make_planes: Callable
     assert chart_gap(corners) == 4  # aslant: the larger of the two distances, less one
     clustered = make_planes(clusters=4, patches=True)
     assert levels_without_bleeding(clustered) == 1
-    assert export(clustered, "ktx2", tmp_path / "clusters").levels == 1
+    told = export(clustered, "ktx2", tmp_path / "clusters")
+    assert told.levels == 1 and any("different clusters have no mean" in note for note in told.notes)
+    assert Asset.open(tmp_path / "clusters").manifest["source"]["export"]["notes"] == list(told.notes)
     vertices = replace(asset, manifest={**asset.manifest, "source": {"receiver": {"kind": "vertices"}}})
     assert levels_without_bleeding(vertices) == 1
     asset.images["coverage"][:, 10:14] = 0

@@ -134,7 +134,7 @@ def test_bad_input_is_one_line(make_asset: Callable[..., Asset], make_planes: Ca
 def test_an_asset_without_coverage_and_one_of_a_single_texel(make_asset: Callable[..., Asset], tmp_path: Path) -> None:
     bare = make_asset(height=1, width=1)
     del bare.images["coverage"]
-    for target in TARGETS:
+    for target in ("exr", "uint8", *ARRAYS):  # a mesh needs three texels
         export(bare, target, tmp_path / target)
         assert Asset.open(tmp_path / target).stored.shape[1:3] == (1, 1)
 
@@ -174,3 +174,27 @@ def test_a_decoded_export_is_saved_as_plain_images(make_asset: Callable[..., Ass
     plain = Asset.open(tmp_path / "plain")
     assert plain.encoding == "uint8" and not list((tmp_path / "plain").glob("*.ktx2"))
     np.testing.assert_array_equal(relight(plain, LIGHTS), relight(found, LIGHTS))
+
+
+def test_code_beside_the_asset_is_the_exports_own(
+    make_asset: Callable[..., Asset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A target may fill folders; --force replaces them with the export, but not what a user has put there."""
+    from srbf.export import exr
+    from srbf.export.settings import PLAIN, Written
+
+    def with_code(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+        exr.write(asset, folder, settings)
+        (folder / "Editor" / "deep").mkdir(parents=True)
+        (folder / "Editor" / "deep" / "Importer.cs").write_text("class Importer {}")
+        return Written(("code beside it",))
+
+    monkeypatch.setitem(TARGETS, "engine", with_code)
+    out = tmp_path / "out"
+    assert export(make_asset(), "engine", out).notes == ("code beside it",)
+    assert "Editor/deep/Importer.cs" in json.loads((out / "asset.json").read_text())["sha256"]
+    export(make_asset(), "engine", out, force=True)
+    (out / "Editor" / "mine.cs").write_text("class Mine {}")
+    with pytest.raises(OutputExistsError, match="'Editor'"):
+        export(make_asset(), "engine", out, force=True)
+    assert (out / "Editor" / "mine.cs").is_file()

@@ -9,19 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pixels import FLOAT, LIGHTS, images_of, lamp_members, magnitude, run, weights_of
+from pixels import ALL, FLOAT, LIGHTS, images_of, lamp_members, magnitude, run, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import hlsl, spirv
+from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.translation import library_paths, pack_files, parse, render_plain, tokens
 from srbf.gl.includes import shader_root
+from srbf.gl.uniforms import packed_lamps
 from srbf.lights import PointLight
 
 pytestmark = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 
-COUNTS = "#define SRBF_K 25\n#define SRBF_SCALARS 9\n"
+COUNTS = "#define SRBF_K 25\n#define SRBF_SCALARS 9\n#define SRBF_LAMPS 4\n"
 ENTRY = "\nfloat4 main() : SV_Target { return 0.0; }\n"
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 STAGE = """
@@ -31,6 +33,7 @@ Texture2D clusters, positions, table, weightRows;
 cbuffer Values {
     float4 weights[COUNT];
     SrbfLamp lamp;
+    float4 lamps[4 * SRBF_LAMPS];
 };
 
 float4 main(float4 at : SV_Position) : SV_Target {
@@ -45,6 +48,9 @@ CALLS = {
     ("clustered-eigen-map", False): "srbfAssetDirectional(layers, layersSampler, clusters, uv, weightRows)",
     ("relighting-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
     ("eigen-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
+    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weights, table, receiver, lamps, 3)",
+    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weightRows, table, receiver, lamps, 3)",
+    ("clustered-eigen-map", None): "srbfAssetLights(layers, layersSampler, clusters, uv, weightRows, table, receiver, lamps, 3)",
     ("clustered-eigen-map", True): "srbfAssetPoint(layers, layersSampler, clusters, uv, table, receiver, lamp)",
 }
 
@@ -94,7 +100,7 @@ def test_what_ships_keeps_names_comments_and_citations(path: str) -> None:
     [
         ("float f(float a) { return mod(a, 2.0); }", "found mod"),
         ("uniform float x;", "found uniform"),
-        ("vec3 f(mat4 m) { return m[0].xyz; }", "found mat4"),
+        ("bvec2 f(vec2 a) { return lessThan(a, a.yx); }", "found lessThan"),
         ("float f(float a) { return (a; }", "brackets in pairs"),
         ("float x;", "a function, a struct or a constant"),
     ],
@@ -102,6 +108,16 @@ def test_what_ships_keeps_names_comments_and_citations(path: str) -> None:
 def test_glsl_past_the_subset_is_refused_by_name(text: str, complaint: str) -> None:
     with pytest.raises(ShaderError, match=complaint):
         parse(text, "mine.glsl")
+
+
+def test_a_matrix_times_a_vector_is_hlsls_mul_and_nothing_else() -> None:
+    file = parse("vec3 f(mat3 m, vec4 v) { return 2.0 * (m * v.xyz) + m * vec3(1.0, v.xy); }", "mine.glsl")
+    text = hlsl.HlslWriter([file]).file(file)
+    assert "return 2.0 * (mul(m, v.xyz)) + mul(m, float3(1.0, v.xy));" in text
+    spirv.compile_hlsl(text + ENTRY)
+    other = parse("vec3 f(mat3 m) { return m[0]; }", "mine.glsl")
+    with pytest.raises(ShaderError, match="expected m times a vector"):
+        hlsl.HlslWriter([other]).file(other)
 
 
 def test_words_that_hlsl_keeps_to_itself_are_renamed() -> None:
@@ -130,9 +146,20 @@ def test_hlsl_gives_the_pixels_of_numpy(make: Callable[..., Asset], method: str,
     assert (np.abs(found - expected) <= FLOAT * magnitude(asset, chosen)).all()
 
 
+@pytest.mark.parametrize("method", NAMES)
+def test_hlsl_gives_the_pixels_of_all_lights_at_once(make: Callable[..., Asset], method: str) -> None:
+    asset = make(method, "half")
+    text = hlsl.asset_include(asset) + STAGE.replace("COUNT", str(asset.k)).replace("CALL", CALLS[method, None])
+    weights = weights_of(asset, ALL[:1])
+    uniforms = {"lamps": packed_lamps(ALL[1:], MOST_LAMPS)} | ({"weights": weights} if method == "relighting-map" else {})  # type: ignore[arg-type]
+    found = run(spirv.cross_compile(spirv.compile_hlsl(text), "glsl"), asset, images_of(asset) | {"weightRows": weights}, uniforms)
+    expected = methods.linear_response(asset, ALL)
+    assert (np.abs(found[..., :3] - expected) <= FLOAT * sum(magnitude(asset, light) for light in ALL)).all()
+
+
 @pytest.mark.parametrize("name", sorted(path.name for path in (shader_root() / "stages").iterdir()))
 def test_every_stage_crosses_to_every_language(name: str, tmp_path: Path) -> None:
-    code = spirv.compile_stage(name, {"SRBF_K": 25, "SRBF_SCALARS": 9})
+    code = spirv.compile_stage(name, {"SRBF_K": 25, "SRBF_SCALARS": 9, "SRBF_LAMPS": 4})
     texts = {language: spirv.cross_compile(code, language) for language in spirv.ARGUMENTS}
     assert texts["es"].startswith("#version 300 es") and texts["glsl"].startswith("#version 330")
     assert "main0" in texts["metal"]  # no Metal compiler runs outside a Mac

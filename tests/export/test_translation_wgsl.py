@@ -8,20 +8,24 @@ from typing import Any
 import numpy as np
 import pytest
 from chromium import ask, browser, encoded
-from pixels import FLOAT, LIGHTS, images_of, magnitude, weights_of
+from pixels import ALL, FLOAT, LIGHTS, images_of, magnitude, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import wgsl
-from srbf.export.translation import library_paths, parse
-from srbf.gl.uniforms import lamp_uniforms
+from srbf.export.preprocessing import preprocess
+from srbf.export.translation import (
+    library_paths,
+    parse,
+)
+from srbf.gl.uniforms import lamp_uniforms, packed_lamps
 from srbf.lights import PointLight
 
 needs_chromium = pytest.mark.skipif(browser() is None, reason="needs chromium (Debian)")
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
-COUNTS = {"SRBF_K": 25, "SRBF_SCALARS": 9}
+COUNTS = {"SRBF_K": 25, "SRBF_SCALARS": 9, "SRBF_LAMPS": 4}
 STAGE = """
 @group(0) @binding(0) var layers: texture_2d_array<f32>;
 @group(0) @binding(1) var positions: texture_2d<f32>;
@@ -45,6 +49,12 @@ LAMP = """let lamp = SrbfLamp(values[0].xyz, values[1].xyz, values[2].xyz, value
                         values[4].x, values[4].y, values[4].z, values[4].w, i32(values[5].x));
     return vec4f(srbfAssetPoint(layers, nearest, CLUSTERS uv, table, receiver, lamp), 1.0);"""
 
+MANY = """var lamps: array<vec4f, 4 * SRBF_LAMPS>;
+    for (var i = 0; i < 12; i++) { lamps[i] = values[i]; }
+    var weights: array<vec4f, WEIGHTS>;
+    for (var i = 0; i < WEIGHTS; i++) { weights[i] = values[12 + i]; }
+    return vec4f(srbfAssetLights(layers, nearest, CLUSTERS uv, LEVEL CHOSEN, table, receiver, lamps, 3), 1.0);"""
+
 
 def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
     """A case of the page: textures in the order of their bindings, and the uniforms as vec4s."""
@@ -52,7 +62,18 @@ def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
     images = images_of(asset)
     values, body = np.zeros((6, 4), np.float32), LAMP.replace("CLUSTERS", clusters)
     rows = np.zeros((1, 1, 4), np.float32)
-    if isinstance(light, PointLight):
+    if light is ALL:
+        rows = weights = weights_of(asset, ALL[:1])
+        chosen = "weights" if method == "relighting-map" else "weightRows"
+        body = (
+            MANY.replace("CLUSTERS", clusters)
+            .replace("LEVEL", "" if clusters else "0.0,")
+            .replace("CHOSEN", chosen)
+            .replace("WEIGHTS", str(len(weights)))
+        )
+        values = np.concatenate([packed_lamps(ALL[1:], 3), weights.reshape(-1, 4)])  # type: ignore[arg-type]
+        rows = np.zeros((1, 1, 4), np.float32) if chosen == "weights" else rows
+    elif isinstance(light, PointLight):
         lamp = lamp_uniforms(light)
         for i, name in enumerate(("position", "positionLow", "color", "axis")):
             values[i, :3] = lamp[name]
@@ -94,6 +115,7 @@ def assets(make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) 
 def answers(assets: dict[str, Asset]) -> dict[str, Any]:
     """Everything that the tests ask of Chromium, in one start of it."""
     pictures = {f"{method} {light}": picture(assets[method], method, LIGHTS[light]) for method in NAMES for light in LIGHTS}
+    pictures |= {f"{method} all": picture(assets[method], method, ALL) for method in NAMES}
     modules = {path: wgsl.module([path], COUNTS) for path in library_paths()} | {"all": wgsl.module(library_paths(), COUNTS)}
     modules["broken"] = modules["all"].replace("-> vec3f {", "-> vec2f {", 1)
     return ask({"pictures": pictures, "modules": modules})
@@ -111,15 +133,16 @@ def test_chromium_tells_of_errors(answers: dict[str, Any]) -> None:
 
 
 @needs_chromium
-@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("light", [*LIGHTS, "all"])
 @pytest.mark.parametrize("method", NAMES)
 def test_wgsl_gives_the_pixels_of_numpy(assets: dict[str, Asset], answers: dict[str, Any], method: str, light: str) -> None:
     asset, answer = assets[method], answers[f"{method} {light}"]
     assert "error" not in answer, answer["error"]
     found = np.array(answer["pixels"], np.float32).reshape(asset.height, asset.width, 4)[..., :3]
-    expected = methods.linear_response(asset, [LIGHTS[light]])
+    lights = ALL if light == "all" else [LIGHTS[light]]
+    expected = methods.linear_response(asset, lights)
     assert np.abs(expected).max() > 0.1
-    assert (np.abs(found - expected) <= FLOAT * magnitude(asset, LIGHTS[light])).all()
+    assert (np.abs(found - expected) <= FLOAT * sum(magnitude(asset, each) for each in lights)).all()
 
 
 @pytest.mark.parametrize(
@@ -134,6 +157,15 @@ def test_glsl_that_wgsl_has_no_form_for_is_refused(text: str, complaint: str) ->
     writer = wgsl.WgslWriter([parse(text, "mine.glsl")])
     with pytest.raises(ShaderError, match=complaint):
         writer.file(writer.files[0])
+
+
+@pytest.mark.parametrize(("known", "answer"), [({}, "3"), ({"A"}, "1"), ({"B"}, "2"), ({"A", "B"}, "1")])
+def test_conditions_are_taken_as_a_compiler_takes_them(known: set[str], answer: str) -> None:
+    text = "#ifdef A\n1\n#elif defined(B)\n2\n#else\n3\n#ifndef A\n#define C 4\n#endif\n#endif\n"
+    seen = set(known)
+    expected = [answer] + (["C is 4"] if answer == "3" else [])
+    assert preprocess(text, "mine.glsl", seen, "{} is {}".format).split("\n")[:-1] == expected
+    assert ("C" in seen) == (answer == "3")
 
 
 def test_a_missing_count_is_told_of_as_the_pack_does() -> None:

@@ -16,18 +16,22 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.containers import read_texture_array
+from srbf.containers.dds_header import DXGI
 from srbf.export import spirv, unity
+from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
-from srbf.gl.uniforms import lamp_uniforms
-from srbf.lights import DirectionalLight, PointLight
+from srbf.gl.textures import pairs_of
+from srbf.gl.uniforms import packed_lamps
+from srbf.lights import DirectionalLight, PointLight, SpotLight
 
 needs_spirv = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono")), reason="needs mono-mcs and mono-runtime (Debian)")
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 HERE = Path(__file__).parent / "unity"
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage")
+ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds")
 AXES = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)  # of the asset from Unity's, written down once more
 OFFSET = np.array([0.2, -0.4, 0.3])  # of the imported scene's root, in the asset's axes
 FARS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)), DirectionalLight((-0.6, 0.1, 0.4), (0.2, 0.5, 0.9))]
@@ -100,7 +104,8 @@ def test_the_custom_function_gives_numpys_pixels(assets: dict[str, Asset], folde
     matrix[:3, :3], matrix[:3, 3] = AXES, -OFFSET
     weights = weights_of(asset, FARS)
     images = images_of(asset)
-    images |= {"_SrbfTable": images["table"], "_SrbfAmbient": asset.images["ambient"], "positions": placed.astype(np.float32)}
+    table = pairs_of(asset.table)[None] if method == "relighting-map" else images["table"]
+    images |= {"_SrbfTable": table, "_SrbfAmbient": asset.images["ambient"], "positions": placed.astype(np.float32)}
     images |= {"_SrbfWeightRows": weights} if method != "relighting-map" else {}
     images |= {"_SrbfClusters": images["clusters"]} if "clusters" in images else {}
     found = run(spirv.cross_compile(spirv.compile_hlsl(text + MAIN), "glsl"), asset, images, uniforms_of(lights, weights, matrix))[..., :3]
@@ -114,15 +119,9 @@ def test_the_custom_function_gives_numpys_pixels(assets: dict[str, Asset], folde
 
 def uniforms_of(lights: list[Any], weights: np.ndarray, matrix: np.ndarray) -> dict[str, Any]:
     """What SrbfRelitRenderer sets, by its own layout; the matrix by rows, as spirv-cross hands HLSL's to GLSL."""
-    lamps = [lamp_uniforms(light) for light in lights if isinstance(light, PointLight)]
-    rows = {name: np.zeros((8, 4), np.float32) for name in ("Position", "Color", "Axis", "Cone")}
-    for i, lamp in enumerate(lamps):
-        rows["Position"][i] = [*lamp["position"], lamp["a0"]]
-        rows["Color"][i] = [*lamp["color"], lamp["radius"]]
-        rows["Axis"][i] = [*lamp["axis"], lamp["falloff"]]
-        rows["Cone"][i, :2] = lamp["versineInner"], lamp["versineOuter"]
-    uniforms: dict[str, Any] = {f"_SrbfLamp{name}": values for name, values in rows.items()}
-    return uniforms | {"_SrbfWeights": weights, "_SrbfLampCount": len(lamps), "_SrbfAssetFromWorld": matrix.astype(np.float32)}
+    lamps = [light for light in lights if isinstance(light, PointLight)]
+    packed = packed_lamps(lamps, MOST_LAMPS)
+    return {"_SrbfWeights": weights, "_SrbfLampCount": len(lamps), "_SrbfLamps": packed, "_SrbfAssetFromWorld": matrix.astype(np.float32)}
 
 
 @needs_spirv
@@ -183,6 +182,8 @@ def test_c_sharp_reads_the_files_and_weighs_lights_as_numpy(folders: dict[str, P
         np.testing.assert_array_equal(np.array(said[f"layer{i}"][0]).reshape(layer.shape), layer)
     table = asset.table[None, :, None] if maps else asset.tables["w_table"]
     np.testing.assert_array_equal(np.array(said["table"][0]).reshape(table.shape).astype(np.float32), table)
+    if maps:
+        np.testing.assert_array_equal(np.array(said["pairs"][0]).reshape(-1, 2).astype(np.float32), pairs_of(asset.table))
     if asset.clusters > 1:
         np.testing.assert_array_equal(np.array(said["clusters"][0]).reshape(asset.height, asset.width), asset.tables["cluster_index"])
     expected = methods.folded_weights(asset, FARS)
@@ -200,6 +201,12 @@ def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], answers:
     assert np.linalg.det(AXES) == -1  # left-handed to right-handed
     np.testing.assert_array_equal(np.array(said["axes"]).reshape(4, 4)[:3, :3], AXES)
     np.testing.assert_allclose(said["versines"][0], [5e-7, 1 - math.cos(0.3), 1 - math.cos(2)], rtol=1e-6)
+    spot = SpotLight(
+        (0.4, -0.3, 1.1), (0.5, 1, 2), a0=0.8, radius=0.05, falloff="inverse-square", direction=(0, 0.6, -0.8),
+        inner=math.radians(20), outer=math.radians(35),
+    )  # fmt: skip
+    point = PointLight((0.4, -0.3, 1.1), (0.5, 1, 2), a0=0.7, radius=0.01)
+    np.testing.assert_allclose(np.reshape(said["lamp"], (8, 4)), packed_lamps([spot, point], 2), rtol=2e-7)
     assert said["wronghalves"] == [[]]
     values = np.array([1.00048828125, 1.0009766, -0.3333333, 65519, 65520, 3e-8, 0.99999], np.float32)
     with np.errstate(over="ignore"):
@@ -216,6 +223,28 @@ def test_c_sharp_reads_large_images_of_either_kind(
     layer = Asset.open(tmp_path).stored[1]
     found = np.array(answers(tmp_path)["layer1"][0]).reshape(layer.shape)
     np.testing.assert_array_equal(found.astype(np.float32), layer.astype(np.float32))
+
+
+@needs_mono
+@pytest.mark.parametrize("encoding", ["bc7", "bc1", "uint8"])
+def test_c_sharp_reads_texture_arrays_level_by_level(
+    make_asset: Callable[..., Asset], answers: Callable[..., Any], encoding: Any, tmp_path: Path
+) -> None:
+    unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding=encoding, levels=3))
+    texture = read_texture_array(tmp_path / "images~" / "maps.dds")
+    said = answers(tmp_path)
+    assert said["blocks"] == [[36, 20, 3, 3, DXGI[encoding]]]
+    for level, data in enumerate(texture.levels):
+        np.testing.assert_array_equal(said[f"level{level}"], data)
+
+
+@needs_mono
+def test_c_sharp_tells_of_a_file_that_is_cut_short(make_asset: Callable[..., Asset], answers: Callable[..., Any], tmp_path: Path) -> None:
+    unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding="bc7"))
+    path = tmp_path / "images~" / "maps.dds"
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(AssertionError, match=r"expected \d+ bytes in .*maps.dds, found \d+"):
+        answers(tmp_path)
 
 
 @needs_mono
@@ -252,7 +281,6 @@ def test_the_files_that_use_unity_compile_against_its_interfaces(tmp_path: Path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_shader_declares_as_many_lamps_as_the_component_sets() -> None:
-    root = engine_root("unity") / "Srbf"
-    assert "#define SRBF_LAMPS 8 " in (root / "Shaders/SrbfUnity.hlsl").read_text()
-    assert "MostLamps = 8;" in (root / "Runtime/SrbfRelitRenderer.cs").read_text()
+def test_the_component_sets_as_many_lamps_as_the_shader_has() -> None:
+    code = (engine_root("unity") / "Srbf" / "Runtime/SrbfRelitRenderer.cs").read_text()
+    assert f"MostLamps = {MOST_LAMPS};" in code

@@ -8,7 +8,7 @@ import runpy
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -223,9 +223,10 @@ def stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[StandI
 
 @pytest.mark.parametrize("method", NAMES)
 def test_the_script_imports_every_file_and_connects_every_input(
-    folders: dict[str, Path], stand_in: StandIn, tmp_path: Path, method: str
+    folders: dict[str, Path], stand_in: StandIn, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
     node = json.loads((folders[method] / "node.json").read_text())
+    monkeypatch.setattr(sys, "argv", ["import_srbf.py"])
     runpy.run_path(str(folders[method] / "import_srbf.py"), run_name="__main__")
     assert (tmp_path / "Project/Shaders" / Path(node["include"]).name).is_file()
     tasks = [call[1][0] for call in stand_in.calls if call[0] == "AssetTools.import_asset_tasks"]
@@ -242,3 +243,48 @@ def test_the_script_imports_every_file_and_connects_every_input(
     assert custom.properties["code"] == node["code"] and custom.properties["include_file_paths"] == [node["include"]]
     connected = [call[4] for call in stand_in.calls if call[0].endswith("connect_material_expressions") and call[3] is custom]
     assert connected == node["inputs"] == [entry.properties["input_name"] for entry in custom.properties["inputs"]]
+
+
+class Actor:
+    """A light of a level: where it stands, where it shines (Unreal's frame), and its component's properties."""
+
+    def __init__(self, place: tuple[float, ...], forward: tuple[float, ...], color: tuple[float, ...], **properties: float) -> None:
+        self.place, self.forward, self.color, self.properties = place, forward, color, properties
+
+    def get_actor_location(self) -> SimpleNamespace:
+        return SimpleNamespace(**dict(zip("xyz", self.place, strict=True)))
+
+    def get_actor_forward_vector(self) -> SimpleNamespace:
+        return SimpleNamespace(**dict(zip("xyz", self.forward, strict=True)))
+
+    def get_component_by_class(self, _: Any) -> Actor:
+        return self
+
+    def get_light_color(self) -> SimpleNamespace:
+        return SimpleNamespace(**dict(zip("rgb", self.color, strict=True)))
+
+    def get_editor_property(self, name: str) -> float:
+        return self.properties[name]
+
+
+def test_the_script_copies_a_levels_lights(folders: dict[str, Path], stand_in: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:
+    kinds = {name: type(name, (Actor,), {}) for name in ("DirectionalLight", "PointLight", "SpotLight")}
+    sun = kinds["DirectionalLight"]((0, 0, 500), (0.6, 0, -0.8), (1, 0.5, 0.25), intensity=8)
+    spot = kinds["SpotLight"]((10, 20, 30), (0, 1, 0), (0.2, 0.4, 1), intensity=5, inner_cone_angle=20, outer_cone_angle=35)
+    for name, kind in kinds.items():
+        setattr(stand_in, name, kind)
+    stand_in.get_editor_subsystem = lambda _: SimpleNamespace(get_all_level_actors=lambda: [object(), sun, spot])
+    collection = stand_in.make("collection")
+    vectors = [stand_in.make("vector") for _ in unreal.LIGHTS]
+    for vector, name in zip(vectors, unreal.LIGHTS, strict=True):
+        vector.set_editor_property("parameter_name", name)
+    collection.set_editor_property("vector_parameters", vectors)
+    stand_in.load_asset = lambda _: collection
+    monkeypatch.setattr(sys, "argv", ["import_srbf.py", "follow"])
+    runpy.run_path(str(folders["eigen-map"] / "import_srbf.py"), run_name="__main__")
+    values = {vector.properties["parameter_name"]: vector.properties["default_value"] for vector in vectors}
+    assert values["SunDirection"] == (-0.6, 0, 0.8, 0)
+    assert values["SunColor"] == (8, 4, 2, 0)
+    assert values["LampPosition"] == (10, 20, 30, 0) and values["LampAxis"] == (0, 1, 0, 0)
+    assert values["LampColor"] == (1, 2, 5, 0)
+    np.testing.assert_allclose(values["LampShape"], [1, 0.05, versine(math.radians(20)), versine(math.radians(35))])

@@ -14,6 +14,7 @@ from srbf.asset import Asset
 from srbf.basis import gaussian, octahedral_table
 from srbf.depth import DepthCamera, depth_terms
 from srbf.gl.scalar_planes import folded_rows
+from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import lamp_uniforms, packed_lamps, padded
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
 from srbf.methods.relighting_map import basis_weights, folded_weights, linear_response
@@ -42,6 +43,18 @@ def _(evaluate: Evaluate) -> None:
         np.testing.assert_allclose(found, gaussian.weight(1 - np.clip(versine.astype(float), 0, 2), spread), atol=4 * UNIT)
         near = np.abs(versine) < 1e-7
         assert near.sum() > 20 and (np.abs(found[near] - 1) <= 1.1e-7 / spread**2 + UNIT).all()
+
+
+@twin("basis/weight_pairs.glsl")
+def _(evaluate: Evaluate) -> None:
+    for spread in (0.12, 0.45, 1.0):
+        table = gaussian.r_table(spread)
+        ends = np.geomspace(1e-9, 1e-2, 40)
+        versine = np.concatenate([np.linspace(0, 2, 500), ends, 2 - ends, [0, 1, 2, 2.0000002]]).astype(np.float32)
+        pairs = {"pairs": pairs_of(table)[None]}
+        found = evaluate("basis/weight_pairs.glsl", "vec4(srbfWeightPairs(pairs, a.x))", vec4(versine), images=pairs)[:, 0]
+        slope = np.abs(np.diff(table)).max() * (len(table) - 1) / 2  # steepest change with the versine
+        np.testing.assert_allclose(found, gaussian.lookup(table, 1 - versine.astype(float)), atol=UNIT + slope * EPS)
 
 
 @twin("basis/octahedral_node.glsl")
@@ -84,6 +97,8 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     exact = {"table": basis_weights(asset, directions.astype(float)), "formula": asset.basis.evaluate(directions.astype(float))}
     centers = padded(asset.basis.centers)
     centers[:, 3] = 0.5 / asset.basis.spread**2
+    exact["pairs"] = exact["table"]
+    defines = {"table": {}, "formula": {"SRBF_FORMULA": 1}, "pairs": {"SRBF_PAIRS": 1}}
     for by, expected in exact.items():
         for i in (0, 7, 24):
             found = evaluate(
@@ -91,8 +106,8 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
                 "vec4(srbfCenterWeight(rTable, a.xyz, b))",
                 vec4(directions),
                 np.broadcast_to(centers[i], (N + 1, 4)),
-                images={"rTable": asset.table[None, :, None]},
-                defines={"SRBF_FORMULA": 1} if by == "formula" else {},
+                images={"rTable": pairs_of(asset.table)[None] if by == "pairs" else asset.table[None, :, None]},
+                defines=defines[by],
             )[:, 0]
             np.testing.assert_allclose(found, expected[:, i], atol=SUM)
     assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that each is told from the other
@@ -270,15 +285,16 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
             asset.manifest["domain"] = domain
             asset.manifest["asset_from_world"] = [[*row, 0.0] for row in turn.tolist()] + [[0, 0, 0, 1.0]]
             kind = 0 if domain == "sphere" else 1 if turn[2, 2] == 1 else 2
-            matrix = ", ".join(map(repr, turn.T.ravel().tolist()))
             for i in range(K):
                 center = ", ".join(map(repr, asset.basis.centers[i].tolist()))
-                row = f"environment, int(a.x), rTable, vec4({center}, 0.0), mat3({matrix}), {kind}"
+                row = f"environment, int(a.x), rTable, vec4({center}, 0.0), assetFromMap, {kind}"
                 found = evaluate(
                     "combine/environment_row.glsl",
                     f"vec4(srbfCombineEnvironmentRow({row}), 0.0)",
                     vec4(rows),
                     images={"environment": ENVIRONMENT.image, "rTable": asset.table[None, :, None]},
+                    arrays={"assetFromMap": padded(turn)},
+                    declarations="uniform vec4 assetFromMap[3];",
                 )[:, :3]
                 expected = folded_weights(asset, [ENVIRONMENT])[i]
                 np.testing.assert_allclose(found.sum(axis=0), expected, atol=SUM * (expected.max() + 1))

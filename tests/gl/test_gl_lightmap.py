@@ -71,7 +71,7 @@ def draw(context: Any, asset: Asset) -> np.ndarray:
     lamps = [light for light in inside if isinstance(light, PointLight)]
     weights = folded_weights(asset, LIGHTS)
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
-    defines = {"SRBF_LAMPS": PLACES} | ({"SRBF_K": asset.k} if maps else {"SRBF_SCALARS": asset.scalars})
+    defines = {"SRBF_LAMPS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_SCALARS": asset.scalars})
     with context, ExitStack() as resources:
         textures = AssetTextures(context, asset, Limits.of(context), resources)
         program = compile_program(context, resolve("stages/lightmap.vert"), resolve(f"stages/{stage}", defines=defines))
@@ -79,7 +79,7 @@ def draw(context: Any, asset: Asset) -> np.ndarray:
         used = {"maps" if maps else "planes": textures.layers(), "ambient": textures.ambient()}
         arrays = {"lamps": packed_lamps(lamps, PLACES)}
         if maps:
-            used["rTable"] = textures.r_table()
+            used["rTable"] = textures.r_pairs()
             arrays |= {"weights": padded(weights), "centers": padded(asset.basis.centers)}
             arrays |= {"scale": padded(asset.scale), "bias": padded(asset.bias)}
         else:

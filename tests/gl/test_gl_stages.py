@@ -23,12 +23,13 @@ FOLDED: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 288)]  # 
 # 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
 LAMPS: list[dict[str, object]] = [{"SRBF_LAMPS": 1}, {"SRBF_LAMPS": 16}, {"SRBF_LAMPS": 16, "SRBF_DEPTH": 1}]
 LIT_MAPS = [{"SRBF_K": k} | lamps for k in (1, 25, 32) for lamps in LAMPS] + [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_FORMULA": 1}]
-LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS]
+LIT_MAPS += [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
+LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS] + [{"SRBF_SCALARS": 9, "SRBF_LAMPS": 4, "SRBF_PLAIN": 1}]
 UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range(1, 9))]
 METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
-    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1})],
+    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1}, {"SRBF_PAIRS": 1, "SRBF_PLAIN": 1})],
     "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
     "weighted.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
@@ -112,10 +113,30 @@ def test_the_readme_lists_every_file() -> None:
     assert sorted(re.findall(r"^\| `(\w+/\w+\.\w+)` \|", (ROOT / "README.md").read_text(), re.MULTILINE)) == FILES
 
 
+def test_the_readme_says_what_every_stage_and_define_takes() -> None:
+    """Every fragment stage of a method has a row, and every uniform and define that a stage names is explained."""
+    text = (ROOT / "README.md").read_text()
+    after = text[text.index("## Defines") :]
+    for name in STAGES:
+        source = (ROOT / "stages" / name).read_text()
+        if name.split(".")[0] in ("direct", "shadow", "shadow_height", "shadow_tint", "add", "finish", "fullscreen"):
+            continue
+        kind = name.split("_")[-1]
+        assert f"`{name}`" in after or (f"`…{kind}`" in after), name
+        for uniform in re.findall(r"^uniform (?:highp )?\w+ (\w+)", source, re.MULTILINE):
+            if not name.startswith("environment_"):
+                assert f"`{uniform}`" in after or f"`{uniform}[" in after, f"{name}: {uniform}"
+    for file in FILES:
+        for define in re.findall(r"\bSRBF_(?:K|SCALARS|LAYERS|LAMPS|UNITS|PLAIN|PAIRS|FORMULA|DEPTH)\b", (ROOT / file).read_text()):
+            assert f"| `{define}` |" in after
+
+
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
-@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("which", range(4))
 def test_the_readme_snippets_compile(context: Any, version: str, which: int) -> None:
-    snippet = re.findall(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)[which]
+    snippets = re.findall(r"```glsl\n(.+?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert len(snippets) == 4
+    snippet = snippets[which]
     head = "precision highp float; precision highp int;\n"
     tail = "out vec4 o;\nvoid main() { o = relitLightmap(vec2(0.5), vec3(1.0)).rgbr; }\n"
     vertex = resolve("stages/fullscreen.vert", version=version)

@@ -94,6 +94,7 @@ class Browser:
     def answer(self, run: str, **job: Any) -> dict[str, Any]:
         """What the page says to a job, errors included."""
         job = {"run": run, **job, "lights": [as_json(light) for light in job.get("lights", [])]}
+        job["lightSets"] = [[as_json(light) for light in lights] for lights in job.get("lightSets", [])]
         assert self._process.stdin is not None and self._process.stdout is not None
         self._process.stdin.write(json.dumps(job) + "\n")
         self._process.stdin.flush()
@@ -105,8 +106,13 @@ class Browser:
         """The picture of a job, (H, W, 3) float32, row 0 at the top."""
         answer = self.answer(run, **job)
         assert "error" not in answer, answer
-        pixels = np.frombuffer(base64.b64decode(answer["pixels"]), np.float32)
-        return pixels.reshape(answer["height"], answer["width"], 4)[..., :3]
+        return decoded(answer)
+
+    def lightmaps(self, run: str, asset: str, light_sets: list[list[Light]], **job: Any) -> list[np.ndarray]:
+        """The pictures of a job under one set of lights after the other, each (H, W, 3) float32."""
+        answer = self.answer(run, asset=asset, lightSets=light_sets, **job)
+        assert "error" not in answer, answer
+        return [decoded(one) for one in answer["pictures"]]
 
 
 @pytest.fixture(scope="session")
@@ -140,6 +146,12 @@ def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
         except subprocess.TimeoutExpired:
             process.kill()
         log.close()
+
+
+def decoded(picture: dict[str, Any]) -> np.ndarray:
+    """(H, W, 3) float32 of what the page says of a picture."""
+    pixels = np.frombuffer(base64.b64decode(picture["pixels"]), np.float32)
+    return pixels.reshape(picture["height"], picture["width"], 4)[..., :3]
 
 
 def as_json(light: Light) -> dict[str, Any]:

@@ -34,15 +34,16 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
     return out
 
 
-@pytest.mark.parametrize("kind", LIGHTS)
+@pytest.mark.parametrize("encoding", ENCODINGS)
 @pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
-def test_the_lightmap_that_three_draws_is_numpys(browser: Any, served: dict, method: str, kind: str) -> None:
-    for encoding in ENCODINGS if kind in ("point", "several") else ("half",):
-        asset, url = served[method, encoding]
-        expected = relight(asset, LIGHTS[kind])
-        for target in ("float", "half"):
-            drawn = browser.picture("three-lightmap", asset=url, lights=LIGHTS[kind], target=target)
-            assert (np.abs(drawn - expected) <= tolerance(asset, LIGHTS[kind], target)).all(), (encoding, target)
+def test_the_lightmap_that_three_draws_is_numpys(browser: Any, served: dict, method: str, encoding: str) -> None:
+    asset, url = served[method, encoding]
+    kinds = list(LIGHTS) if encoding == "half" else ["directional", "several"]
+    for target in ("float", "half"):
+        drawn = browser.lightmaps("three-lightmap", url, [LIGHTS[kind] for kind in kinds], target=target)
+        for picture, kind in zip(drawn, kinds, strict=True):
+            error = np.abs(picture - relight(asset, LIGHTS[kind]))
+            assert (error <= tolerance(asset, LIGHTS[kind], target)).all(), (kind, target)
 
 
 @pytest.mark.parametrize("source", ["maps", "lightmap"])
@@ -114,7 +115,7 @@ def test_lights_are_moved_into_a_moved_asset(browser: Any, make_asset: Callable[
     turn[:3, :3] = scale * np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, 0.28, -0.96], [0, 0.96, 0.28]])
     turn[:3, 3] = 0.3, -0.2, 0.1
     asset = complete(make_asset(k=6, encoding="half"), asset_from_world=turn.tolist())
-    drawn = browser.picture("three-lightmap", asset=browser.serve(asset), lights=LIGHTS["several"])
+    drawn = browser.lightmaps("three-lightmap", browser.serve(asset), [LIGHTS["several"]])[0]
     assert (np.abs(drawn - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
 
 
@@ -173,7 +174,7 @@ def test_texture_arrays_are_relit_as_they_are_read_by_numpy(
     for asset in map(complete, made):
         url = browser.place(lambda folder, asset=asset: export(asset, target, folder, Settings(encoding=form)))
         exported = Asset.open(browser.folder(url))
-        drawn = browser.picture("three-lightmap", asset=url, lights=LIGHTS["several"])
+        drawn = browser.lightmaps("three-lightmap", url, [LIGHTS["several"]])[0]
         error = np.abs(drawn - relight(exported, LIGHTS["several"]))
         step = replace(exported, stored=np.ones_like(exported.stored), bias=np.zeros_like(exported.bias))
         allowed = tolerance(exported, LIGHTS["several"]) + (relight(step, LIGHTS["several"]) if form == "bc1" else 0)

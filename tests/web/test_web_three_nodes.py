@@ -29,9 +29,41 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
 @pytest.mark.parametrize("method", METHODS)
 def test_the_lightmap_that_nodes_draw_is_numpys(browser: Any, served: dict, method: str, backend: str) -> None:
     asset, url = served[method]
-    for kind, lights in LIGHTS.items():
-        for target in ("float", "half") if kind == "several" else ("float",):
-            drawn = browser.picture("nodes-lightmap", asset=url, lights=lights, target=target, backend=backend)
-            error = np.abs(drawn - relight(asset, lights)) / tolerance(asset, lights, target)
-            print(method, backend, kind, target, error.max())
-            assert error.max() <= 1, (kind, target)
+    drawn = browser.lightmaps("nodes-lightmap", url, list(LIGHTS.values()), backend=backend)
+    for picture, lights in zip(drawn, LIGHTS.values(), strict=True):
+        assert (np.abs(picture - relight(asset, lights)) <= tolerance(asset, lights)).all(), lights
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("material", ["MeshStandardMaterial", "MeshLambertMaterial", "MeshBasicMaterial"])
+def test_node_materials_show_the_asset(browser: Any, served: dict, material: str, backend: str) -> None:
+    """Albedo E / pi; a standard material keeps a share for its highlights, everywhere the same here."""
+    asset, url = served["relighting-map"]
+    job = {"asset": url, "lights": LIGHTS["several"], "material": material, "color": ALBEDO, "half": HALF_EXTENT, "source": "maps"}
+    shown = browser.picture("nodes-material", **job, backend=backend) * np.pi / ALBEDO
+    expected, allowed = relight(asset, LIGHTS["several"]), tolerance(asset, LIGHTS["several"])
+    if material == "MeshStandardMaterial":
+        share = (shown / expected)[expected > 0.1]
+        assert 0.9 < share.min() and share.max() < 1 and np.ptp(share) < 1e-4
+    else:
+        assert (np.abs(shown - expected) <= allowed).all()
+        half = browser.picture("nodes-material", **job, backend=backend, target="half") * np.pi / ALBEDO
+        assert (np.abs(half - expected) <= tolerance(asset, LIGHTS["several"], "half")).all()
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_nodes_follow_three_s_lights_in_place_of_its_diffuse_light(browser: Any, served: dict, backend: str) -> None:
+    asset, url = served["relighting-map"]
+    followed, lights = FOLLOWED["several"]
+    job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "follow": followed, "backend": backend}
+    for source in ("maps", "lightmap"):
+        shown = browser.picture("nodes-material", **job, source=source) * np.pi / ALBEDO
+        assert (np.abs(shown - relight(asset, lights)) <= tolerance(asset, lights)).all(), source
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_radiance_replaces_what_a_node_material_shows(browser: Any, make_asset: Callable[..., Asset], backend: str) -> None:
+    asset = complete(make_asset(k=5, encoding="half"), quantity="radiance", source={"receiver": {"kind": "view"}})
+    job = {"lights": LIGHTS["several"], "material": "MeshBasicMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps"}
+    shown = browser.picture("nodes-material", asset=browser.serve(asset), **job, backend=backend, apply={"uvOrigin": "bottom"})
+    assert (np.abs(shown[::-1] - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()

@@ -13,14 +13,19 @@ export interface ResolvedShader {
 
 /**
  * A shader with its includes in place, sought under `root` and then beside the including file; `#version` is left out, since every engine
- * writes its own. Block comments that head a file are dropped.
+ * writes its own. Comments are dropped: they are for readers of the pack, and some engines split them at semicolons.
  *
  * @throws Error on a missing file or a cycle, named as a.glsl -> b.glsl -> a.glsl.
  */
 export function resolveIncludes(path: string, root: string): ResolvedShader {
   const seen = new Set<string>();
   const text = expand(resolve(path), root, seen, []);
-  return { text: text.replace(/\/\*[\s\S]*?\*\/\n?/g, ""), files: [...seen] };
+  return { text: withoutComments(text), files: [...seen] };
+}
+
+function withoutComments(text: string): string {
+  const lines = text.replace(/\/\*[\s\S]*?\*\//g, "").split("\n");
+  return lines.map((line) => line.replace(/\s*\/\/.*$/, "")).filter((line) => line.trim() !== "").join("\n");
 }
 
 function expand(path: string, root: string, seen: Set<string>, chain: string[]): string {

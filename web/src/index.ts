@@ -1,7 +1,7 @@
 export { type Asset, type Basis, type LoadOptions, loadAsset } from "./asset";
 export { SrbfError } from "./errors";
 export type { ByteImage, FloatImage, HalfImage } from "./image";
-export { type LampUniforms, lampUniforms, versine } from "./lamp";
+export { type LampUniforms, lampRoom, lampUniforms, packedLamps, versine } from "./lamp";
 export type { LayerStack } from "./layers";
 export {
   type DirectionalLight,
@@ -18,5 +18,5 @@ export {
 } from "./lights";
 export { checkManifest, type Encoding, type LayerEntry, type Manifest, type Method } from "./manifest";
 export { IDENTITY, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "./matrix";
-export { type FrameValues, frameValues, shaderDefines, shaderText, uniformVectors } from "./shader";
+export { type FrameValues, frameValues, paddedCenters, shaderBody, shaderDefines, shaderText, uniformVectors } from "./shader";
 export { foldedWeights } from "./weights";

@@ -33,6 +33,25 @@ export function lampUniforms(light: LampLight): LampUniforms {
   };
 }
 
+/**
+ * Lamps as the shaders' arrays hold them, four vec4 each, zeros up to `room` lamps: (position, radius), (positionLow, falloff), (colour at 1 m,
+ * versineInner), (axis, versineOuter).
+ */
+export function packedLamps(lamps: readonly LampUniforms[], room: number): Float32Array {
+  const out = new Float32Array(16 * room);
+  lamps.forEach((lamp, i) => {
+    const atOne = lamp.falloff === 1 ? lamp.a0 ** 2 : lamp.a0;
+    const color = lamp.color.map((component) => component * atOne);
+    out.set([...lamp.position, lamp.radius, ...lamp.positionLow, lamp.falloff, ...color, lamp.versineInner, ...lamp.axis, lamp.versineOuter], 16 * i);
+  });
+  return out;
+}
+
+/** Room for `count` lamps in a program: a power of two, so that few programs serve any number. */
+export function lampRoom(count: number): number {
+  return 2 ** Math.ceil(Math.log2(Math.max(count, 1)));
+}
+
 /** 1 - cos of an angle (rad), precise for small ones. */
 export function versine(angle: number): number {
   return 2 * Math.sin(angle / 2) ** 2;

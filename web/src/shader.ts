@@ -37,25 +37,30 @@ export function needPositions(asset: Asset, lamps: number): void {
   }
 }
 
-/** GLSL that declares an asset's uniforms and `vec3 srbfRelit(vec2 uv, vec3 receiver)`: uv with v downwards, receiver in the asset's frame, metres. */
-export function shaderText(asset: Asset, lamps: number): string {
-  const lines = Object.entries(shaderDefines(asset, lamps)).map(([name, value]) => `#define ${name} ${value}`);
-  return [...lines, SOURCES[asset.manifest.method]].join("\n");
+/**
+ * GLSL that declares an asset's uniforms and `vec3 srbfRelit(vec2 uv, float level, vec3 receiver)`: uv with v downwards, receiver in the asset's frame,
+ * metres, `room` for lamps. `srbfRelitSurface(uv, receiver)` finds the level of mip maps itself.
+ */
+export function shaderText(asset: Asset, room: number): string {
+  const lines = Object.entries(shaderDefines(asset, room)).map(([name, value]) => `#define ${name} ${value}`);
+  return [...lines, shaderBody(asset)].join("\n");
 }
 
-export function shaderDefines(asset: Asset, lamps: number): Record<string, number> {
+/** `shaderText` without its defines, for engines that write those themselves. */
+export function shaderBody(asset: Asset): string {
+  return SOURCES[asset.manifest.method];
+}
+
+export function shaderDefines(asset: Asset, room: number): Record<string, number> {
   const own: Record<string, number> =
-    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_SCALARS: asset.basis.scalars };
-  return { ...own, SRBF_LAMPS: lamps };
+    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_SCALARS: asset.basis.scalars, SRBF_LAYERS: asset.layers.count };
+  return { ...own, SRBF_LAMPS: room };
 }
 
 /** vec4 of uniforms that the fragment shader of an asset needs, without the engine's own. */
-export function uniformVectors(asset: Asset, lamps: number): number {
-  const perLayer = asset.basis.kind === "gaussian" ? (lamps > 0 ? 4 : 3) : 2;
-  return perLayer * asset.layers.count + LAMP_VECTORS * lamps;
+export function uniformVectors(asset: Asset, room: number): number {
+  return (asset.basis.kind === "gaussian" ? 4 : 2) * asset.layers.count + 4 * room;
 }
-
-const LAMP_VECTORS = 9; // a member of SrbfLamp takes one whole
 
 /** Centers as vec4, w = 0. */
 export function paddedCenters(asset: Asset): Float32Array {

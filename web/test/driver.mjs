@@ -6,6 +6,7 @@ import { createInterface } from "node:readline";
 import { chromium } from "playwright-core";
 
 const [executablePath, pages, assets] = process.argv.slice(2);
+const PATIENCE = 60_000;
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".json": "application/json", ".wasm": "application/wasm", ".png": "image/png" };
 
 const server = createServer((request, response) => {
@@ -51,7 +52,8 @@ for await (const line of createInterface({ input: process.stdin })) {
   said.length = 0;
   let answer;
   try {
-    answer = await page.evaluate((job) => window.runJob(job), JSON.parse(line));
+    const late = new Promise((_, reject) => setTimeout(() => reject(new Error(`no answer within ${PATIENCE} ms`)), PATIENCE).unref());
+    answer = await Promise.race([page.evaluate((job) => window.runJob(job), JSON.parse(line)), late]);
   } catch (error) {
     answer = { error: String(error) };
   }

@@ -17,7 +17,12 @@ static class Answers
         catch (FormatException error) { Console.WriteLine("refused " + error.Message); return; }
         Print("size", manifest.Width, manifest.Height, manifest.LayerFiles.Length, manifest.Scalars, manifest.Clusters, manifest.TableSize);
         Print("centers", manifest.Centers);
-        for (int i = 0; i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
+        string first = Path.Combine(folder, manifest.LayerFiles[0]);
+        SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
+        if (blocks != null) Print("blocks", blocks.Width, blocks.Height, blocks.Layers, blocks.Levels, blocks.Format);
+        for (int i = 0; blocks != null && i < blocks.Layers; i++)
+            for (int level = 0; level < blocks.Levels; level++) Print("level" + level, Array.ConvertAll(blocks.Data(i, level), b => (double)b));
+        for (int i = 0; blocks == null && i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
         SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
         Show("table", table);
         if (manifest.ClusterFile != null) Show("clusters", SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)));
@@ -28,6 +33,7 @@ static class Answers
             for (int j = 0; j < 6; j++) n[j] = double.Parse(arguments[i + j], CultureInfo.InvariantCulture);
             lights.Add(new FarLight { ToLight = new Vector(n[0], n[1], n[2]).Normalized(), Color = new Vector(n[3], n[4], n[5]) });
         }
+        Print("pairs", SrbfMath.Pairs(table.Values));
         if (manifest.Method == "relighting-map") Print("weights", SrbfMath.MapWeights(manifest.Centers, table.Values, lights));
         else Print("weights", SrbfMath.PlaneWeights(manifest.Centers, manifest.Spreads, SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values, lights));
         foreach (Vector axis in new[] { new Vector(1, 0, 0), new Vector(0, 1, 0), new Vector(0, 0, 1) })
@@ -37,6 +43,8 @@ static class Answers
         }
         Print("axes", SrbfMath.Axes);
         Print("versines", SrbfMath.Versine(0.001), SrbfMath.Versine(0.3), SrbfMath.Versine(2));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0.6, -0.8), 0.8, 0.05, false, 40, 70));
+        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0, 1), 0.7, 0.01, true, -1, -1));
         var halves = new List<double>();
         for (int bits = 0; bits < 65536; bits++)
             if ((bits & 0x7C00) != 0x7C00 && SrbfImage.ToHalf(SrbfImage.FromHalf((ushort)bits)) != bits) halves.Add(bits);

@@ -16,9 +16,9 @@ namespace UnityEngine
     public class Light : Behaviour { public Color color; public float intensity, colorTemperature, spotAngle, innerSpotAngle; public bool useColorTemperature; public LightType type; }
     public enum LightType { Spot, Directional, Point }
     public class Texture : Object { public FilterMode filterMode; public TextureWrapMode wrapMode; public int width, height; }
-    public enum FilterMode { Point, Bilinear }
+    public enum FilterMode { Point, Bilinear, Trilinear }
     public enum TextureWrapMode { Clamp }
-    public enum TextureFormat { RGBAHalf, RGBAFloat, RFloat, R8 }
+    public enum TextureFormat { RGBAHalf, RGBAFloat, RGFloat, R8, RGBA32, BC7, DXT1 }
     public class Texture2D : Texture
     {
         public Texture2D(int width, int height, TextureFormat format, bool mipChain, bool linear) { }
@@ -27,7 +27,7 @@ namespace UnityEngine
     }
     public class Texture2DArray : Texture
     {
-        public Texture2DArray(int width, int height, int depth, TextureFormat format, bool mipChain, bool linear) { }
+        public Texture2DArray(int width, int height, int depth, TextureFormat format, int mipCount, bool linear) { }
         public void SetPixelData<T>(T[] data, int mipLevel, int element, int sourceDataStartIndex = 0) { }
         public void Apply(bool updateMipmaps = true, bool makeNoLongerReadable = false) { }
     }

@@ -1,1 +1,1 @@
-export {};
+export { type ShowOptions, SrbfRelightingMap } from "./relighting_map";

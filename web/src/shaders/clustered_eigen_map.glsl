@@ -1,27 +1,30 @@
 // SPDX-License-Identifier: MIT
-// Clustered eigen maps: uniforms, and srbfRelit at a texel's centre. A scalar means something else in the next cluster, so this is for drawing the
-// lightmap anew, never for a place between texels.
-#include "methods/clustered_eigen_map.glsl"
+// What an engine's material says of clustered eigen maps: its uniforms, and srbfRelit, the light of all lamps and far lights together.
+// A scalar means something else in the next cluster: srbfRelit is the light of the texel that uv lies in, for drawing the lightmap anew, and
+// level must be 0.
+#include "combine/mip_level.glsl"
+#include "methods/clustered_eigen_map_lights.glsl"
 
 uniform highp sampler2DArray srbfLayers;
 uniform highp sampler2D srbfAmbient;
-uniform highp sampler2D srbfClusters;
+uniform highp sampler2D srbfTable;
 uniform highp sampler2D srbfWeights;
+uniform highp sampler2D srbfClusters;
+uniform int srbfTableSize;
 uniform vec4 srbfScale[SRBF_LAYERS];
 uniform vec4 srbfBias[SRBF_LAYERS];
-#if SRBF_LAMPS > 0
-uniform highp sampler2D srbfTable;
-uniform int srbfTableSize;
-uniform SrbfLamp srbfLamps[SRBF_LAMPS];
-#endif
+uniform vec4 srbfLamps[4 * SRBF_LAMPS];
+uniform int srbfLampCount;
 
-vec3 srbfRelit(vec2 uv, vec3 receiver) {
+vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
     ivec2 texel = ivec2(uv * vec2(textureSize(srbfLayers, 0).xy));
-    vec3 sum = srbfClusteredDirectional(srbfLayers, srbfClusters, texel, 0, srbfWeights, srbfScale, srbfBias);
-#if SRBF_LAMPS > 0
-    for (int i = 0; i < SRBF_LAMPS; ++i) {
-        sum += srbfClusteredPoint(srbfLayers, srbfClusters, texel, 0, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver, srbfLamps[i]);
-    }
-#endif
+    vec3 sum = srbfClusteredLights(srbfLayers, srbfClusters, texel, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
+                                   srbfLamps, srbfLampCount);
     return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+}
+
+// At a place on a surface: the level of mip maps that fits the pixel.
+vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
+    vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
+    return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);
 }

@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: MIT
 // What an engine's material says of eigen maps: its uniforms, and srbfRelit, the light of all lamps and far lights together.
-#include "methods/eigen_map.glsl"
+#include "combine/mip_level.glsl"
+#include "methods/eigen_map_lights.glsl"
 
 uniform highp sampler2DArray srbfLayers;
 uniform highp sampler2D srbfAmbient;
+uniform highp sampler2D srbfTable;
 uniform highp sampler2D srbfWeights;
+uniform int srbfTableSize;
 uniform vec4 srbfScale[SRBF_LAYERS];
 uniform vec4 srbfBias[SRBF_LAYERS];
-#if SRBF_LAMPS > 0
-uniform highp sampler2D srbfTable;
-uniform int srbfTableSize;
-uniform SrbfLamp srbfLamps[SRBF_LAMPS];
-#endif
+uniform vec4 srbfLamps[4 * SRBF_LAMPS];
+uniform int srbfLampCount;
 
-vec3 srbfRelit(vec2 uv, vec3 receiver) {
-    vec3 sum = srbfEigenMapDirectional(srbfLayers, uv, 0, srbfWeights, srbfScale, srbfBias);
-#if SRBF_LAMPS > 0
-    for (int i = 0; i < SRBF_LAMPS; ++i) {
-        sum += srbfEigenMapPoint(srbfLayers, uv, 0, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver, srbfLamps[i]);
-    }
-#endif
+vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
+    vec3 sum = srbfEigenMapLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
+                                  srbfLamps, srbfLampCount);
     return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+}
+
+// At a place on a surface: the level of mip maps that fits the pixel.
+vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
+    vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
+    return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);
 }

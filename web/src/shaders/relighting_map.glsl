@@ -1,24 +1,26 @@
 // SPDX-License-Identifier: MIT
 // What an engine's material says of relighting maps: its uniforms, and srbfRelit, the light of all lamps and far lights together.
-#include "methods/relighting_map.glsl"
+#include "combine/mip_level.glsl"
+#include "methods/relighting_map_lights.glsl"
 
 uniform highp sampler2DArray srbfLayers;
 uniform highp sampler2D srbfAmbient;
+uniform highp sampler2D srbfTable;
 uniform vec4 srbfWeights[SRBF_K];
+uniform vec4 srbfCenters[SRBF_K];
 uniform vec4 srbfScale[SRBF_K];
 uniform vec4 srbfBias[SRBF_K];
-#if SRBF_LAMPS > 0
-uniform highp sampler2D srbfTable;
-uniform vec4 srbfCenters[SRBF_K];
-uniform SrbfLamp srbfLamps[SRBF_LAMPS];
-#endif
+uniform vec4 srbfLamps[4 * SRBF_LAMPS];
+uniform int srbfLampCount;
 
-vec3 srbfRelit(vec2 uv, vec3 receiver) {
-    vec3 sum = srbfRelightDirectional(srbfLayers, uv, 0, srbfWeights, srbfScale, srbfBias);
-#if SRBF_LAMPS > 0
-    for (int i = 0; i < SRBF_LAMPS; ++i) {
-        sum += srbfRelightPoint(srbfLayers, uv, 0, srbfTable, srbfCenters, srbfScale, srbfBias, receiver, srbfLamps[i]);
-    }
-#endif
+vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
+    vec3 sum = srbfRelightLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfCenters, srbfScale, srbfBias, receiver,
+                                 srbfLamps, srbfLampCount);
     return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+}
+
+// At a place on a surface: the level of mip maps that fits the pixel.
+vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
+    vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
+    return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);
 }

@@ -42,7 +42,7 @@ export class LightmapPass {
   readonly target: WebGLRenderTarget;
   private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly camera = new Camera();
-  private lamps = -1;
+  private room = 0;
 
   constructor(
     private readonly asset: Asset,
@@ -68,8 +68,8 @@ export class LightmapPass {
 
   /** Draw it with the numbers that the uniforms hold; the renderer is left as it was. */
   draw(renderer: WebGLRenderer): void {
-    const lamps = (this.uniforms.srbfLamps.value as unknown[]).length;
-    if (lamps !== this.lamps) this.compile(lamps);
+    const room = (this.uniforms.srbfLamps.value as Float32Array).length / 16;
+    if (room !== this.room) this.compile(room);
     const kept = { target: renderer.getRenderTarget(), autoClear: renderer.autoClear, xr: renderer.xr.enabled, shadows: renderer.shadowMap.autoUpdate };
     renderer.autoClear = false;
     renderer.xr.enabled = false;
@@ -88,9 +88,10 @@ export class LightmapPass {
     this.mesh.material.dispose();
   }
 
-  private compile(lamps: number): void {
+  private compile(room: number): void {
     this.mesh.material.dispose();
-    const receiver = lamps > 0 ? "texelFetch(srbfPositions, ivec2(gl_FragCoord.xy), 0).xyz" : "vec3(0.0)";
+    const { srbfPositions } = this.uniforms;
+    const receiver = srbfPositions ? "texelFetch(srbfPositions, ivec2(gl_FragCoord.xy), 0).xyz" : "vec3(0.0)";
     this.mesh.material = new RawShaderMaterial({
       glslVersion: GLSL3,
       uniforms: this.uniforms,
@@ -99,17 +100,17 @@ export class LightmapPass {
 precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
-${shaderText(this.asset, lamps)}
-${lamps > 0 ? "uniform highp sampler2D srbfPositions;" : ""}
+${shaderText(this.asset, room)}
+${srbfPositions ? "uniform highp sampler2D srbfPositions;" : ""}
 out vec4 relit;
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(srbfLayers, 0).xy);
-    relit = vec4(srbfRelit(uv, ${receiver}), 1.0);
+    relit = vec4(srbfRelit(uv, 0.0, ${receiver}), 1.0);
 }`,
       blending: NoBlending,
       depthTest: false,
       depthWrite: false,
     });
-    this.lamps = lamps;
+    this.room = room;
   }
 }

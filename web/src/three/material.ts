@@ -24,7 +24,8 @@ export interface Patch {
   uniforms: Uniforms;
   /** `maps`: the layers are summed in the material; `lightmap`: a lightmap that was drawn before is sampled. */
   source: "maps" | "lightmap";
-  lamps: number;
+  /** For so many lamps. */
+  room: number;
   options: Required<MaterialOptions>;
 }
 
@@ -39,8 +40,8 @@ export function checkMaterial(material: Material): void {
 
 /** What tells one patched program from another. */
 export function patchKey(patch: Patch): string {
-  const { asset, source, lamps, options } = patch;
-  return ["srbf", asset.manifest.method, asset.manifest.quantity, asset.layers.count, source, lamps, ...Object.values(options)].join(" ");
+  const { asset, source, room, options } = patch;
+  return ["srbf", asset.manifest.method, asset.manifest.quantity, asset.layers.count, source, room, ...Object.values(options)].join(" ");
 }
 
 /** Irradiance adds to a material's as a lightMap does (outgoing = albedo * E / pi); radiance replaces its outgoing light. */
@@ -66,9 +67,9 @@ export function patchShader(shader: WebGLProgramParametersWithUniforms, material
       vSrbfUv = ${place};`,
     ],
   ]);
-  const light = source === "maps" ? `srbfRelit(vSrbfUv, ${receiver(options)})` : "texture(srbfLightmap, vSrbfUv).rgb";
+  const light = source === "maps" ? `srbfRelitSurface(vSrbfUv, ${receiver(options)})` : "texture(srbfLightmap, vSrbfUv).rgb";
   const declarations = ["varying vec2 vSrbfUv;", "varying vec3 vSrbfReceiver;"];
-  declarations.push(source === "maps" ? shaderText(asset, patch.lamps) : "uniform sampler2D srbfLightmap;");
+  declarations.push(source === "maps" ? shaderText(asset, patch.room) : "uniform sampler2D srbfLightmap;");
   if (source === "maps" && options.receivers === "map") declarations.push("uniform highp sampler2D srbfPositions;");
   shader.fragmentShader = replaced(shader.fragmentShader, [
     ["#include <common>", `#include <common>\n${declarations.join("\n")}`],

@@ -2,6 +2,7 @@
 import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
+import { lampRoom } from "../lamp";
 import type { Encoding } from "../manifest";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { LightmapPass, type TargetOptions } from "./lightmap_pass";
@@ -30,7 +31,7 @@ export class SrbfRelightingMap extends SceneAsset {
   private readonly uniforms: Uniforms;
   private readonly pass?: LightmapPass;
   private readonly patched = new Map<Material, Patch>();
-  private lamps = 0;
+  private room = 1;
   private drawn = "";
 
   /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
@@ -68,7 +69,7 @@ export class SrbfRelightingMap extends SceneAsset {
       asset: this.asset,
       uniforms: this.uniforms,
       source: this.source,
-      lamps: this.lamps,
+      room: this.room,
       options: {
         channel: options.channel ?? 1,
         uvOrigin: options.uvOrigin ?? "top",
@@ -99,11 +100,12 @@ export class SrbfRelightingMap extends SceneAsset {
     if (this.pass) needPositions(this.asset, frame.lamps.length);
     if (renderer) {
       checkCompression(renderer, this.asset);
-      this.checkUniforms(renderer, frame.lamps.length);
+      this.checkUniforms(renderer, lampRoom(frame.lamps.length));
     }
     setFrame(this.uniforms, this.textures, frame);
     (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(this.assetFromScene());
-    if (frame.lamps.length !== this.lamps) this.recompile(frame.lamps.length);
+    const room = lampRoom(frame.lamps.length);
+    if (room !== this.room) this.recompile(room);
     if (this.pass) this.redraw(frame, renderer);
   }
 
@@ -120,20 +122,20 @@ export class SrbfRelightingMap extends SceneAsset {
     this.drawn = state;
   }
 
-  private recompile(lamps: number): void {
-    this.lamps = lamps;
+  private recompile(room: number): void {
+    this.room = room;
     for (const [material, patch] of this.patched) {
-      patch.lamps = lamps;
+      patch.room = room;
       if (this.source === "maps") material.needsUpdate = true;
     }
   }
 
-  private checkUniforms(renderer: WebGLRenderer, lamps: number): void {
+  private checkUniforms(renderer: WebGLRenderer, room: number): void {
     const most = renderer.capabilities.maxFragmentUniforms - (this.pass ? 0 : VECTORS_KEPT_FREE);
-    const needed = uniformVectors(this.asset, lamps);
+    const needed = uniformVectors(this.asset, room);
     if (needed > most) {
       throw new SrbfError(
-        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${lamps} lamps; ` +
+        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} lamps; ` +
           (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
       );
     }

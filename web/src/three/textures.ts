@@ -8,6 +8,7 @@ import {
   FloatType,
   HalfFloatType,
   LinearFilter,
+  LinearMipmapLinearFilter,
   NearestFilter,
   NoColorSpace,
   type PixelFormat,
@@ -36,7 +37,7 @@ export class SrbfTextures {
   readonly clusters?: DataTexture;
   readonly positions?: DataTexture;
 
-  /** Layers and ambient are filtered as asked: never linearly where there are clusters. */
+  /** Layers and ambient are filtered as asked, compressed layers by their mip levels too; clustered ones must be `nearest`. */
   constructor(asset: Asset, filter: Filter) {
     const { basis } = asset;
     this.layers = layersTexture(asset, filter);
@@ -61,7 +62,7 @@ function layersTexture(asset: Asset, filter: Filter): DataArrayTexture | Compres
   const { width, height, count, encoding, levels } = asset.layers;
   let texture: DataArrayTexture | CompressedArrayTexture;
   if (encoding === "bc7" || encoding === "bc1") {
-    const mipmaps = [{ data: levels[0] as Uint8Array, width, height }];
+    const mipmaps = levels.map((data, l) => ({ data: data as Uint8Array, width: Math.max(1, width >> l), height: Math.max(1, height >> l) }));
     const format = encoding === "bc7" ? RGBA_BPTC_Format : RGB_S3TC_DXT1_Format;
     texture = new CompressedArrayTexture(mipmaps as never, width, height, count, format as never, UnsignedByteType);
   } else {
@@ -69,7 +70,9 @@ function layersTexture(asset: Asset, filter: Filter): DataArrayTexture | Compres
     texture.format = RGBAFormat;
     texture.type = TYPES[encoding];
   }
-  return finished(texture, filter);
+  finished(texture, filter);
+  if (filter === "linear" && texture.mipmaps && texture.mipmaps.length > 1) texture.minFilter = LinearMipmapLinearFilter;
+  return texture;
 }
 
 function ambientTexture(ambient: FloatImage | undefined, filter: Filter): DataTexture {

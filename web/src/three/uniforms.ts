@@ -1,7 +1,7 @@
 /** The uniforms of `shaderText` as three.js has them; every material and pass of an asset shares these objects. */
-import { Color, type IUniform, Matrix4, Vector3 } from "three";
+import { type IUniform, Matrix4 } from "three";
 import type { Asset } from "../asset";
-import type { LampUniforms } from "../lamp";
+import { lampRoom, packedLamps } from "../lamp";
 import { type FrameValues, paddedCenters } from "../shader";
 import type { SrbfTextures } from "./textures";
 
@@ -15,7 +15,8 @@ export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
     srbfTable: { value: textures.table },
     srbfScale: { value: asset.scale },
     srbfBias: { value: asset.bias },
-    srbfLamps: { value: [] },
+    srbfLamps: { value: packedLamps([], 1) },
+    srbfLampCount: { value: 0 },
     srbfAssetFromScene: { value: new Matrix4() },
   };
   if (textures.positions) uniforms.srbfPositions = { value: textures.positions };
@@ -38,15 +39,6 @@ export function setFrame(uniforms: Uniforms, textures: SrbfTextures, frame: Fram
   } else {
     (uniforms.srbfWeights.value as Float32Array).set(frame.weights);
   }
-  uniforms.srbfLamps.value = frame.lamps.map(threeLamp);
-}
-
-function threeLamp(lamp: LampUniforms) {
-  return {
-    ...lamp,
-    position: new Vector3(...lamp.position),
-    positionLow: new Vector3(...lamp.positionLow),
-    color: new Color(...lamp.color),
-    axis: new Vector3(...lamp.axis),
-  };
+  uniforms.srbfLamps.value = packedLamps(frame.lamps, lampRoom(frame.lamps.length));
+  uniforms.srbfLampCount.value = frame.lamps.length;
 }

@@ -6,6 +6,7 @@ export interface Job {
   /** Where the asset is served. */
   asset: string;
   lights: LightJson[];
+  lightSets: LightJson[][];
   target?: "float" | "half";
   [option: string]: unknown;
 }

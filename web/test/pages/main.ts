@@ -1,13 +1,17 @@
 /** Runs jobs one after the other; every job makes what it needs and disposes of it. */
+import { babylonMaterial } from "./babylon";
 import { host, layers, load } from "./host";
 import type { Job } from "./job";
+import { playcanvasMaterial } from "./playcanvas";
 import { nodesLightmap, nodesMaterial } from "./three_nodes";
 import { threeLightmap, threeMaterial } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
+  "babylon-material": babylonMaterial,
   host,
   layers,
   load,
+  "playcanvas-material": playcanvasMaterial,
   "nodes-lightmap": nodesLightmap,
   "nodes-material": nodesMaterial,
   "three-lightmap": threeLightmap,

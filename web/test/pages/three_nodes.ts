@@ -22,16 +22,19 @@ async function rendererOf(job: Job): Promise<WebGPURenderer> {
   return renderer;
 }
 
-/** The lightmap that the asset draws into its own target. */
+/** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function nodesLightmap(job: Job) {
   const renderer = await rendererOf(job);
   const map = await SrbfRelightingNodes.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest" });
-  map.lights.push(...job.lights.map(lightOfJson));
-  map.update(renderer);
   const { width, height } = map.asset.manifest;
-  const pixels = await read(renderer, map.target as RenderTarget, width, height);
+  const pictures = [];
+  for (const lights of job.lightSets) {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(renderer);
+    pictures.push(picture(width, height, await read(renderer, map.target as RenderTarget, width, height)));
+  }
   map.dispose();
-  return picture(width, height, pixels);
+  return { pictures };
 }
 
 /** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */

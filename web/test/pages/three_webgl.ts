@@ -9,22 +9,24 @@ let renderer: THREE.WebGLRenderer | undefined;
 function shared(): THREE.WebGLRenderer {
   renderer ??= new THREE.WebGLRenderer({ antialias: false });
   renderer.toneMapping = THREE.NoToneMapping;
-  renderer.debug.onShaderError = (gl, program, vertex, fragment) => {
+  renderer.debug.onShaderError = ((gl: WebGL2RenderingContext, program: never, vertex: never, fragment: never) => {
     throw new Error(`${gl.getProgramInfoLog(program)} ${gl.getShaderInfoLog(vertex)} ${gl.getShaderInfoLog(fragment)}`);
-  };
+  }) as never; // other engines add to the DOM's types
   return renderer;
 }
 
-/** The lightmap that the asset draws into its own target. */
+/** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function threeLightmap(job: Job) {
   const map = await SrbfRelightingMap.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true });
-  map.lights.push(...job.lights.map(lightOfJson));
-  map.update(shared());
   const { width, height } = map.asset.manifest;
   const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
-  const pixels = read(target, width, height);
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(shared());
+    return picture(width, height, read(target, width, height));
+  });
   map.dispose();
-  return picture(width, height, pixels);
+  return { pictures };
 }
 
 /** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */

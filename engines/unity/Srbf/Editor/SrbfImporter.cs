@@ -30,9 +30,13 @@ namespace Srbf
             context.SetMainObject(asset);
             asset.layers = Add(context, "layers", Layers(manifest, folder));
             SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
-            asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RFloat : TextureFormat.RGBAHalf, FilterMode.Point));
-            if (asset.IsMaps) asset.rTable = table.Values;
-            else asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
+            if (asset.IsMaps)
+            {
+                asset.rTable = table.Values;
+                table = new SrbfImage { Width = table.Width, Height = 1, Channels = 2, Values = SrbfMath.Pairs(table.Values) };
+            }
+            asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RGFloat : TextureFormat.RGBAHalf, FilterMode.Point));
+            if (!asset.IsMaps) asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
             if (manifest.ClusterFile != null)
                 asset.clusters = Add(context, "clusters", Texture(SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)), TextureFormat.R8, FilterMode.Point));
             SrbfImage ambient = manifest.AmbientFile != null
@@ -44,26 +48,43 @@ namespace Srbf
 
         static Texture2DArray Layers(SrbfManifest manifest, string folder)
         {
-            // A scalar means something else in the next cluster: its planes are never mixed by the sampler.
-            var layers = new Texture2DArray(manifest.Width, manifest.Height, manifest.LayerFiles.Length, TextureFormat.RGBAHalf, false, true)
+            string first = Path.Combine(folder, manifest.LayerFiles[0]);
+            SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
+            int levels = blocks == null ? 1 : blocks.Levels;
+            var layers = new Texture2DArray(manifest.Width, manifest.Height, manifest.LayerFiles.Length, FormatOf(blocks), levels, true)
             {
-                filterMode = manifest.ClusterFile != null ? FilterMode.Point : FilterMode.Bilinear,
+                // A scalar means something else in the next cluster: its planes are never mixed by the sampler.
+                filterMode = manifest.ClusterFile != null ? FilterMode.Point : levels > 1 ? FilterMode.Trilinear : FilterMode.Bilinear,
                 wrapMode = TextureWrapMode.Clamp,
             };
             for (int i = 0; i < manifest.LayerFiles.Length; i++)
-                layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
-            layers.Apply(false, true);
+            {
+                for (int level = 0; blocks != null && level < levels; level++) layers.SetPixelData(blocks.Data(i, level), level, i);
+                if (blocks == null) layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
+            }
+            layers.Apply(false);  // kept readable: the imported asset is written from the host's copy
             return layers;
+        }
+
+        static TextureFormat FormatOf(SrbfDds blocks)
+        {
+            switch (blocks == null ? SrbfDds.RgbaHalf : blocks.Format)
+            {
+                case SrbfDds.Bc7: return TextureFormat.BC7;
+                case SrbfDds.Bc1: return TextureFormat.DXT1;
+                case SrbfDds.Rgba8: return TextureFormat.RGBA32;
+                default: return TextureFormat.RGBAHalf;
+            }
         }
 
         /// <summary>Rows go up as they are: the image's top becomes v = 0, and the shader turns v over.</summary>
         static Texture2D Texture(SrbfImage image, TextureFormat format, FilterMode filter)
         {
             var texture = new Texture2D(image.Width, image.Height, format, false, true) { filterMode = filter, wrapMode = TextureWrapMode.Clamp };
-            if (format == TextureFormat.RFloat) texture.SetPixelData(image.Values, 0);
+            if (format == TextureFormat.RGFloat) texture.SetPixelData(image.Values, 0);
             else if (format == TextureFormat.R8) texture.SetPixelData(System.Array.ConvertAll(image.Values, value => (byte)value), 0);
             else texture.SetPixelData(Halves(image.Rgba()), 0);
-            texture.Apply(false, true);
+            texture.Apply(false);
             return texture;
         }
 

@@ -48,6 +48,19 @@ namespace Srbf
             return table[j] + (table[j + 1] - table[j]) * (place - j);
         }
 
+        /// <summary>The R table from its end, and what the next entry has more, 0 in the last: what the shader reads by one fetch.</summary>
+        public static float[] Pairs(float[] table)
+        {
+            var pairs = new float[2 * table.Length];
+            for (int j = 0; j < table.Length; j++)
+            {
+                int at = table.Length - 1 - j;
+                pairs[2 * j] = table[at];
+                pairs[2 * j + 1] = at > 0 ? table[at - 1] - table[at] : 0;
+            }
+            return pairs;
+        }
+
         /// <summary>The sum over far lights of colour times R_i, RGBA a map with A = 1: what _SrbfWeights holds.</summary>
         public static float[] MapWeights(double[] centers, float[] table, IList<FarLight> lights)
         {
@@ -103,6 +116,24 @@ namespace Srbf
 
         /// <summary>1 - cos of a spot's half-angle, precise for narrow ones; the shader's versineInner and versineOuter.</summary>
         public static double Versine(double halfAngle) { return 2 * Math.Sin(halfAngle / 2) * Math.Sin(halfAngle / 2); }
+
+        /// <summary>
+        /// Sixteen floats of a lamp in the asset's frame, as srbfUnpackLamp takes them: its colour becomes the irradiance at 1 m. Angles are
+        /// Unity's, whole and in degrees; below 0 for a point light.
+        /// </summary>
+        public static float[] PackedLamp(Vector place, Vector color, Vector axis, double a0, double radius, bool linear, double innerDegrees, double outerDegrees)
+        {
+            double atOne = linear ? a0 : a0 * a0;
+            double inner = outerDegrees < 0 ? 3 : Versine(innerDegrees * 0.5 * Math.PI / 180), outer = outerDegrees < 0 ? 4 : Versine(outerDegrees * 0.5 * Math.PI / 180);
+            Func<double, float> low = value => (float)(value - (float)value);
+            return Array.ConvertAll(new[]
+            {
+                place.X, place.Y, place.Z, radius,
+                low(place.X), low(place.Y), low(place.Z), linear ? 0 : 1,
+                color.X * atOne, color.Y * atOne, color.Z * atOne, inner,
+                axis.X, axis.Y, axis.Z, outer,
+            }, value => (float)value);
+        }
 
         static void Add(double[] sums, int i, Vector color, double weight)
         {

@@ -6,13 +6,13 @@ namespace Srbf
 {
     /// <summary>
     /// Follows Unity's lights and tells a renderer's material the weights of the frame. Directional lights cost one weight a map together;
-    /// the first eight point and spot lights are relit one by one. Areas, cookies, ranges and skies are not looked at.
+    /// the first eight point and spot lights a weight a map and pixel each. Areas, cookies, ranges and skies are not looked at.
     /// </summary>
     [ExecuteAlways]
     [RequireComponent(typeof(Renderer))]
     public sealed class SrbfRelitRenderer : MonoBehaviour
     {
-        public const int MostLamps = 8;  // SRBF_LAMPS of SrbfUnity.hlsl
+        public const int MostLamps = 8;  // SRBF_LAMPS of SrbfAsset.hlsl
 
         public SrbfAsset asset;
         [Tooltip("The imported scene's root, whose space is Blender's world turned to Unity's axes; none: Unity's world.")]
@@ -28,7 +28,7 @@ namespace Srbf
 
         readonly List<FarLight> far = new List<FarLight>();
         readonly List<FarLight> known = new List<FarLight>();
-        readonly Vector4[] positions = new Vector4[MostLamps], colors = new Vector4[MostLamps], axes = new Vector4[MostLamps], cones = new Vector4[MostLamps];
+        readonly Vector4[] lamps = new Vector4[4 * MostLamps];
         MaterialPropertyBlock block;
         Vector4[] weights;
         Texture2D rows;
@@ -40,15 +40,16 @@ namespace Srbf
             if (block == null) block = new MaterialPropertyBlock();
             Matrix4x4 assetFromUnity = AssetFromUnity();
             far.Clear();
-            int lamps = 0;
+            int count = 0;
             foreach (Light lamp in lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
             {
                 if (lamp == null || !lamp.isActiveAndEnabled) continue;
                 Color color = lamp.color.linear * lamp.intensity;
                 if (lamp.useColorTemperature) color *= Mathf.CorrelatedColorTemperatureToRGB(lamp.colorTemperature);
                 if (lamp.type == LightType.Directional) far.Add(Far(assetFromUnity, lamp, color));
-                else if ((lamp.type == LightType.Point || lamp.type == LightType.Spot) && lamps < MostLamps) SetLamp(assetFromUnity, lamp, color, lamps++);
+                else if ((lamp.type == LightType.Point || lamp.type == LightType.Spot) && count < MostLamps) SetLamp(assetFromUnity, lamp, color, count++);
             }
+            if (weighed != asset) GetComponent<Renderer>().SetPropertyBlock(null);  // arrays of a block never grow
             if (weighed != asset || Changed()) Weigh();
             GetComponent<Renderer>().GetPropertyBlock(block);
             block.SetTexture("_SrbfLayers", asset.layers);
@@ -58,11 +59,8 @@ namespace Srbf
             if (asset.IsMaps) block.SetVectorArray("_SrbfWeights", weights);
             else block.SetTexture("_SrbfWeightRows", rows);
             block.SetMatrix("_SrbfAssetFromWorld", assetFromUnity);
-            block.SetFloat("_SrbfLampCount", lamps);
-            block.SetVectorArray("_SrbfLampPosition", positions);
-            block.SetVectorArray("_SrbfLampColor", colors);
-            block.SetVectorArray("_SrbfLampAxis", axes);
-            block.SetVectorArray("_SrbfLampCone", cones);
+            block.SetFloat("_SrbfLampCount", count);
+            block.SetVectorArray("_SrbfLamps", lamps);
             GetComponent<Renderer>().SetPropertyBlock(block);
         }
 
@@ -95,12 +93,10 @@ namespace Srbf
         {
             Vector3 place = assetFromUnity.MultiplyPoint3x4(lamp.transform.position), axis = assetFromUnity.MultiplyVector(lamp.transform.forward).normalized;
             bool spot = lamp.type == LightType.Spot;
-            positions[i] = new Vector4(place.x, place.y, place.z, falloffDistance);
-            colors[i] = new Vector4(color.r, color.g, color.b, Mathf.Max(lampRadius, 1e-4f));
-            axes[i] = new Vector4(axis.x, axis.y, axis.z, linearFalloff ? 0 : 1);
-            cones[i] = new Vector4(
-                spot ? (float)SrbfMath.Versine(lamp.innerSpotAngle * 0.5 * System.Math.PI / 180) : 3,
-                spot ? (float)SrbfMath.Versine(lamp.spotAngle * 0.5 * System.Math.PI / 180) : 4, 0, 0);
+            float[] packed = SrbfMath.PackedLamp(
+                new Vector(place.x, place.y, place.z), new Vector(color.r, color.g, color.b), new Vector(axis.x, axis.y, axis.z), falloffDistance,
+                Mathf.Max(lampRadius, 1e-4f), linearFalloff, spot ? lamp.innerSpotAngle : -1, spot ? lamp.spotAngle : -1);
+            for (int row = 0; row < 4; row++) lamps[4 * i + row] = new Vector4(packed[4 * row], packed[4 * row + 1], packed[4 * row + 2], packed[4 * row + 3]);
         }
 
         bool Changed()

@@ -4,7 +4,6 @@
 #ifndef SRBF_UNITY
 #define SRBF_UNITY
 
-#define SRBF_LAMPS 8  // SrbfRelitRenderer.MostLamps
 
 Texture2DArray _SrbfLayers;
 SamplerState sampler_SrbfLayers;
@@ -20,48 +19,26 @@ float4 _SrbfWeights[SRBF_K];
 Texture2D _SrbfWeightRows;
 #endif
 float4x4 _SrbfAssetFromWorld;
+float4 _SrbfLamps[4 * SRBF_LAMPS];  // four a lamp, as srbfUnpackLamp takes them, in the asset's frame
 float _SrbfLampCount;
-float4 _SrbfLampPosition[SRBF_LAMPS];  // metres, the asset's frame; a0
-float4 _SrbfLampColor[SRBF_LAMPS];     // linear irradiance at a0; radius
-float4 _SrbfLampAxis[SRBF_LAMPS];      // where a spot shines; falloff
-float4 _SrbfLampCone[SRBF_LAMPS];      // versineInner, versineOuter
-
-SrbfLamp SrbfUnityLamp(int i)
-{
-    SrbfLamp lamp;
-    lamp.position = _SrbfLampPosition[i].xyz;
-    lamp.positionLow = float3(0.0, 0.0, 0.0);
-    lamp.color = _SrbfLampColor[i].xyz;
-    lamp.axis = _SrbfLampAxis[i].xyz;
-    lamp.a0 = _SrbfLampPosition[i].w;
-    lamp.radius = _SrbfLampColor[i].w;
-    lamp.versineInner = _SrbfLampCone[i].x;
-    lamp.versineOuter = _SrbfLampCone[i].y;
-    lamp.falloff = int(_SrbfLampAxis[i].w);
-    return lamp;
-}
 
 // The light that leaves a white surface, in Unity's units: a white Lambert surface that faces a light of intensity 1 gives 1.
-// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, metres.
+// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, metres. In fragment shaders: it takes derivatives.
 float3 SrbfRelitFrom(Texture2DArray layers, SamplerState layersSampler, float2 uv, float3 worldPosition)
 {
     float2 place = float2(uv.x, 1.0 - uv.y);
     float3 receiver = mul(_SrbfAssetFromWorld, float4(worldPosition, 1.0)).xyz;
+#ifndef SRBF_CLUSTERED  // a cluster's scalars mean nothing in a coarser level
+    float2 size = float2(srbfTextureSize(layers).xy);
+    float level = srbfMipLevel(ddx(place) * size, ddy(place) * size);
+#endif
 #if defined(SRBF_K)
-    float3 sum = srbfAssetDirectional(layers, layersSampler, place, _SrbfWeights);
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeights, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #elif defined(SRBF_CLUSTERED)
-    float3 sum = srbfAssetDirectional(layers, layersSampler, _SrbfClusters, place, _SrbfWeightRows);
+    float3 sum = srbfAssetLights(layers, layersSampler, _SrbfClusters, place, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #else
-    float3 sum = srbfAssetDirectional(layers, layersSampler, place, _SrbfWeightRows);
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
 #endif
-    for (int i = 0; i < int(_SrbfLampCount); ++i)
-    {
-#ifdef SRBF_CLUSTERED
-        sum += srbfAssetPoint(layers, layersSampler, _SrbfClusters, place, _SrbfTable, receiver, SrbfUnityLamp(i));
-#else
-        sum += srbfAssetPoint(layers, layersSampler, place, _SrbfTable, receiver, SrbfUnityLamp(i));
-#endif
-    }
     float3 ambient = _SrbfAmbient.SampleLevel(sampler_SrbfAmbient, place, 0.0).rgb / 3.14159265;  // in Blender's units
     return srbfFinish(sum, ambient) * SRBF_UNITY_SCALE;
 }

@@ -1,8 +1,9 @@
 /** An asset's numbers as nodes: textures, constant arrays, and the arrays that change with the lights. */
 import { Matrix4, Vector4 } from "three";
-import { int, ivec2, texture, uniform, uniformArray } from "three/tsl";
+import { int, ivec2, texture, textureLoad, uniform, uniformArray } from "three/tsl";
 import type { Asset } from "../../asset";
 import { SrbfError } from "../../errors";
+import { packedLamps } from "../../lamp";
 import { type FrameValues, paddedCenters } from "../../shader";
 import type { Filter, SrbfTextures } from "../textures";
 import { LAMP_ROWS, type N, texelAt } from "./nodes";
@@ -39,7 +40,7 @@ export class NodeInputs {
   /** Four channels of layer `i`, as stored, at a place with v downwards. */
   layer(uv: N, i: N): N {
     const { width, height } = this.asset.manifest;
-    if (this.filter === "nearest") return (texture(this.textures.layers) as N).load(texelAt(uv, width, height)).depth(i);
+    if (this.filter === "nearest") return (textureLoad(this.textures.layers, texelAt(uv, width, height)) as N).depth(i);
     return (texture(this.textures.layers, uv) as N).depth(i).level(int(0));
   }
 
@@ -49,10 +50,10 @@ export class NodeInputs {
   }
 
   ambient(uv: N): N {
-    const ambient = texture(this.textures.ambient) as N;
-    if (!this.asset.ambient) return ambient.load(ivec2(0, 0)).rgb;
-    if (this.filter === "linear") return (texture(this.textures.ambient, uv) as N).level(int(0)).rgb;
-    return ambient.load(texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)).rgb;
+    const { ambient } = this.textures;
+    if (!this.asset.ambient) return (textureLoad(ambient, ivec2(0, 0)) as N).rgb;
+    if (this.filter === "linear") return (texture(ambient, uv) as N).level(int(0)).rgb;
+    return (textureLoad(ambient, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).rgb;
   }
 
   /** Write the numbers of a frame. @throws SrbfError on more lamps than there is room for. */
@@ -66,14 +67,8 @@ export class NodeInputs {
       (weights.image.data as Float32Array).set(frame.weights);
       weights.needsUpdate = true;
     }
-    frame.lamps.forEach((lamp, i) => {
-      const rows = this.lampVectors.slice(LAMP_ROWS * i, LAMP_ROWS * (i + 1));
-      rows[0].set(...lamp.position, lamp.a0);
-      rows[1].set(...lamp.positionLow, lamp.radius);
-      rows[2].set(...lamp.color, lamp.falloff);
-      rows[3].set(...lamp.axis, lamp.versineInner);
-      rows[4].set(lamp.versineOuter, 0, 0, 0);
-    });
+    const packed = packedLamps(frame.lamps, this.maxLamps);
+    this.lampVectors.forEach((vector, i) => vector.fromArray(packed, 4 * i));
     this.lampCount.value = frame.lamps.length;
   }
 }

@@ -7,7 +7,7 @@ import * as tsl from "three/tsl";
 /** A node, or what becomes one: three's types of nodes know no clamped integers, and change with every release. */
 export type N = any; // eslint-disable-line
 
-const { abs, clamp, dot, float, floor, int, ivec2, length, max, min, mix, select, vec2, vec3 } = tsl as Record<string, N>;
+const { Fn, abs, clamp, dot, float, floor, int, ivec2, length, max, min, mix, select, textureLoad, vec2, vec3 } = tsl as Record<string, N>;
 
 /** 1 - a.b of unit vectors, precise where they nearly agree; 1 where a is zero. */
 export function versine(a: N, b: N): N {
@@ -27,7 +27,7 @@ export function weight(table: N, n: number, cosTheta: N): N {
   const fromMiddle = clamp(cosTheta, -1, 1).mul(middle).toVar();
   const j = clamp(int(fromMiddle.add(middle)), 0, n - 2).toVar();
   const fraction = fromMiddle.sub(float(j).sub(middle));
-  return mix(table.load(ivec2(j, 0)).r, table.load(ivec2(j.add(1), 0)).r, fraction);
+  return mix(textureLoad(table, ivec2(j, 0)).r, textureLoad(table, ivec2(j.add(1), 0)).r, fraction);
 }
 
 /** A direction's place on the octahedral square, in [-1, 1]. */
@@ -37,30 +37,44 @@ export function octahedralEncode(direction: N): N {
   return select(d.z.lessThan(0), vec2(abs(d.y).oneMinus(), abs(d.x).oneMinus()).mul(side), d.xy);
 }
 
-/** One light function at a place of the octahedral square, by four fetches from its tile of `size` nodes a side, `columns` tiles in a row. */
-export function octahedralLookup(table: N, size: number, columns: number, index: N, place: N): N {
+/**
+ * One light function at a place of the octahedral square, by four fetches from its tile of `size` nodes a side, `columns` tiles in a row: a function
+ * (index, place) of the shader's own, since it is called five times.
+ */
+export function octahedralLookup(table: N, size: number, columns: number): (index: N, place: N) => N {
+  return Fn(([index, place]: N[]) => lookup(table, size, columns, index, place)).setLayout({
+    name: "srbfOctahedralLookup",
+    type: "vec3",
+    inputs: [
+      { name: "index", type: "int" },
+      { name: "place", type: "vec2" },
+    ],
+  });
+}
+
+function lookup(table: N, size: number, columns: number, index: N, place: N): N {
   const middle = 0.5 * (size - 1);
   const fromMiddle = place.mul(middle).toVar();
   const node = clamp(ivec2(floor(fromMiddle.add(middle))), ivec2(0, 0), ivec2(size - 2, size - 2)).toVar();
   const fraction = fromMiddle.sub(vec2(node).sub(middle)).toVar();
   const row = int(float(index).add(0.5).div(columns)).toVar();
   const at = ivec2(index.sub(row.mul(columns)).mul(size).add(node.x), row.mul(size).add(node.y)).toVar();
-  const fetch = (x: number, y: number) => table.load(at.add(ivec2(x, y))).rgb;
+  const fetch = (x: number, y: number) => textureLoad(table, at.add(ivec2(x, y))).rgb;
   return mix(mix(fetch(0, 0), fetch(1, 0), fraction.x), mix(fetch(0, 1), fetch(1, 1), fraction.x), fraction.y);
 }
 
-/** Where lamps lie in their uniform array: five vec4 each. */
-export const LAMP_ROWS = 5;
+/** Where lamps lie in their uniform array: four vec4 each, as `packedLamps` writes them. */
+export const LAMP_ROWS = 4;
 
 /** A lamp's strength times its colour, and the unit direction to it, at a receiver (metres, the asset's frame). */
 export function lampAt(lamps: N, lamp: N, receiver: N): { light: N; direction: N } {
   const row = (i: number) => lamps.element(lamp.mul(LAMP_ROWS).add(i));
-  const [place, low, color, axis, cone] = [0, 1, 2, 3, 4].map(row);
+  const [place, low, color, axis] = [0, 1, 2, 3].map(row);
   const lightVector = place.xyz.sub(receiver).add(low.xyz).toVar();
   const direction = lightDirection(lightVector).toVar();
-  const ratio = place.w.div(max(length(lightVector), low.w)).toVar();
-  const attenuation = select(color.w.greaterThan(0.5), ratio.mul(ratio), ratio);
-  const t = clamp(cone.x.sub(versine(direction.negate(), axis.xyz)).div(max(cone.x.sub(axis.w), 1e-6)), 0, 1).toVar();
+  const inverse = max(length(lightVector), place.w).reciprocal().toVar();
+  const attenuation = select(low.w.greaterThan(0.5), inverse.mul(inverse), inverse);
+  const t = clamp(axis.w.sub(versine(direction.negate(), axis.xyz)).div(max(axis.w.sub(color.w), 1e-6)), 0, 1).toVar();
   const smooth = t.mul(t).mul(float(3).sub(t.mul(2)));
   return { light: color.xyz.mul(attenuation.mul(smooth)), direction };
 }

@@ -1,6 +1,6 @@
 /** An asset for three.js' WebGPURenderer, on WebGPU and on its WebGL2 backend. */
 import { FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, NearestFilter, RenderTarget } from "three";
-import { attribute, Fn, positionWorld, screenCoordinate, texture, vec2, vec4 } from "three/tsl";
+import { attribute, Fn, positionWorld, screenCoordinate, texture, textureLoad, vec2, vec4 } from "three/tsl";
 import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
 import { SrbfError } from "../../errors";
@@ -112,7 +112,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   private mapped(uv: N): N {
     const { positions } = this.textures;
     if (!positions) return vec4(0).xyz;
-    return (texture(positions) as N).load(texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)).xyz;
+    return (textureLoad(positions, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).xyz;
   }
 }
 

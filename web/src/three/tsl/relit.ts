@@ -1,5 +1,6 @@
 /** The light of all lamps and far lights at a place, after the clamp and with the ambient light: `srbfRelit` in nodes. */
-import { Fn, If, int, ivec2, Loop, max, texture, vec3 } from "three/tsl";
+import type { DataTexture } from "three";
+import { Fn, If, int, ivec2, Loop, max, textureLoad, vec3 } from "three/tsl";
 import type { NodeInputs } from "./inputs";
 import { lampAt, least, type N, octahedralEncode, octahedralLookup, texelAt, versine, weight } from "./nodes";
 
@@ -18,7 +19,7 @@ export function relit(inputs: NodeInputs, uv: N, receiver: N): N {
 function relightingMap(inputs: NodeInputs, uv: N, receiver: N, sum: N): void {
   const { basis, layers } = inputs.asset;
   if (basis.kind !== "gaussian") return;
-  const table = texture(inputs.textures.table) as N;
+  const { table } = inputs.textures;
   each(layers.count, "k", (k) => sum.addAssign(inputs.decoded(uv, k).rgb.mul(inputs.weights.element(k).rgb)));
   each(inputs.lampCount, "l", (l) => {
     const { light, direction } = lampAt(inputs.lamps, l, receiver);
@@ -39,10 +40,10 @@ function scalarPlanes(inputs: NodeInputs, uv: N, receiver: N, sum: N): void {
   if (basis.kind === "gaussian") return;
   const { scalars, tableSize, wTable } = basis;
   const columns = wTable.width / tableSize;
-  const table = texture(inputs.textures.table) as N;
-  const weights = texture(inputs.textures.weights as never) as N;
+  const lookup = octahedralLookup(inputs.textures.table, tableSize, columns);
+  const weights = inputs.textures.weights as DataTexture;
   const texel = texelAt(uv, manifest.width, manifest.height);
-  const cluster = inputs.textures.clusters ? int((texture(inputs.textures.clusters) as N).load(texel).r.mul(255).add(0.5)).toVar() : int(0).toVar();
+  const cluster = inputs.textures.clusters ? int((textureLoad(inputs.textures.clusters, texel) as N).r.mul(255).add(0.5)).toVar() : int(0).toVar();
   /** w_0 plus the sum over scalars of a_j w_j, `function_` giving w_j. */
   const combined = (function_: (j: N) => N, loop: string) => {
     const answer = function_(int(0)).toVar();
@@ -54,14 +55,14 @@ function scalarPlanes(inputs: NodeInputs, uv: N, receiver: N, sum: N): void {
     });
     return answer;
   };
-  sum.addAssign(combined((j) => weights.load(ivec2(j, cluster)).rgb, "k"));
+  sum.addAssign(combined((j) => (textureLoad(weights, ivec2(j, cluster)) as N).rgb, "k"));
   each(inputs.lampCount, "l", (l) => {
     const { light, direction } = lampAt(inputs.lamps, l, receiver);
     const color = light.toVar();
     If(color.length().greaterThan(0), () => {
       const place = octahedralEncode(direction).toVar();
       const first = cluster.mul(scalars + 1).toVar();
-      sum.addAssign(color.mul(combined((j) => octahedralLookup(table, tableSize, columns, first.add(j), place), "m")));
+      sum.addAssign(color.mul(combined((j) => lookup(first.add(j), place), "m")));
     });
   });
 }

@@ -1,0 +1,362 @@
+# SPDX-License-Identifier: MIT
+@tool
+class_name SrbfAsset
+extends Resource
+## An asset of srbf in one resource: layers, tables, geometry, and the weights that far lights give the layers.
+##
+## Directions and positions here are in the asset's own frame, z up; SrbfRelight turns Godot's y-up world into it.
+
+@export var method: String
+@export var quantity: String
+## Whether direct light is left out, to be added by the engine.
+@export var is_indirect: bool
+## Whether the texels are the pixels of a fixed camera.
+@export var is_view: bool
+@export_enum("sphere", "hemisphere") var domain := "sphere"
+@export var width: int
+@export var height: int
+## World to the frame that the asset was captured in, both z up.
+@export var asset_from_world: Transform3D
+@export var layer_images: Array[Image]
+## Mip levels of the layers, the full size included.
+@export var levels := 1
+@export var scale: PackedVector4Array
+@export var bias: PackedVector4Array
+@export var position: Image
+@export var normal: Image
+@export var coverage: Image
+@export var ambient: Image
+## Unit centers of the Gaussians: of the maps themselves, or of the light functions.
+@export var centers: PackedVector3Array
+## Relighting maps: R at cos θ = -1 + 2 j / (n - 1).
+@export var r_table: Image
+@export var scalars: int
+@export var clusters: int
+@export var spreads: PackedFloat64Array
+## Scalar planes: red, green, blue of center b in function f at 3 (f B + b).
+@export var light_coefficients: PackedFloat32Array
+@export var w_table: Image
+@export var w_table_size: int
+@export var cluster_index: Image
+
+var _textures := {}
+var _table := PackedFloat32Array()  # red, green, blue of w_table
+
+
+## The asset that an asset.json describes; null, and an error in the log, where something is missing.
+static func read(manifest_path: String) -> SrbfAsset:
+	var manifest = JSON.parse_string(FileAccess.get_file_as_string(manifest_path))
+	if not manifest is Dictionary or manifest.get("format") != "srbf-asset" or manifest.get("version") != 1:
+		push_error("expected an asset of srbf, version 1, at %s, found none" % manifest_path)
+		return null
+	var folder := manifest_path.get_base_dir()
+	var asset := SrbfAsset.new()
+	asset.method = manifest.method
+	asset.quantity = manifest.quantity
+	asset.domain = manifest.domain
+	asset.is_indirect = manifest.get("transport") == "indirect"
+	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
+	asset.width = int(manifest.width)
+	asset.height = int(manifest.height)
+	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
+	var layers: Array = manifest.maps if asset.method == "relighting-map" else manifest.planes
+	asset.levels = int(layers[0].get("levels", 1))
+	var arrays := {}  # layers in one file, by its name
+	for layer in layers:
+		if layer.has("layer"):
+			if not arrays.has(layer.file):
+				arrays[layer.file] = SrbfDds.read(folder.path_join(layer.file))
+			asset.layer_images.append(arrays[layer.file][layer.layer] if layer.layer < arrays[layer.file].size() else null)
+		else:
+			asset.layer_images.append(_image(folder, layer.file))
+		asset.scale.append(_vector4(layer.scale))
+		asset.bias.append(_vector4(layer.bias))
+	for name in ["position", "normal", "coverage", "ambient"]:
+		if manifest.has(name):
+			asset.set(name, _image(folder, manifest[name]))
+	if asset.method == "relighting-map":
+		asset.centers = _vectors(manifest.basis.centers)
+		asset.r_table = _image(folder, manifest.r_table.file)
+		asset.r_table.convert(Image.FORMAT_RF)
+	else:
+		asset.scalars = int(manifest.scalars)
+		asset.clusters = int(manifest.get("clusters", 1))
+		asset.centers = _vectors(manifest.light_basis.centers)
+		asset.spreads = PackedFloat64Array(manifest.light_basis.spreads)
+		var coefficients := _image(folder, manifest.light_coefficients.file)
+		coefficients.convert(Image.FORMAT_RGBF)
+		asset.light_coefficients = coefficients.get_data().to_float32_array()
+		asset.w_table = _image(folder, manifest.w_table.file)
+		asset.w_table_size = int(manifest.w_table.size)
+		if manifest.has("cluster_index"):
+			asset.cluster_index = _image(folder, manifest.cluster_index.file)
+			asset.cluster_index.convert(Image.FORMAT_R8)
+	if asset.layer_images.has(null):
+		return null
+	return asset
+
+
+## All stored layers, one texture.
+func layers() -> Texture2DArray:
+	if not _textures.has("layers"):
+		var texture := Texture2DArray.new()
+		texture.create_from_images(layer_images)
+		_textures.layers = texture
+	return _textures.layers
+
+
+## One of the images as a texture; null where the asset has none.
+func texture(name: StringName) -> ImageTexture:
+	var image: Image = get(name)
+	if image == null:
+		return null
+	if not _textures.has(name):
+		_textures[name] = ImageTexture.create_from_image(image)
+	return _textures[name]
+
+
+## The first lines of a shader for this asset.
+func defines() -> String:
+	var kind := ("#define SRBF_IRRADIANCE\n" if quantity == "irradiance" else "") + ("#define SRBF_INDIRECT\n" if is_indirect and quantity == "irradiance" else "")
+	if method == "relighting-map":
+		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
+	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
+	return kind + "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+
+
+## One weight a map, or a light function of every cluster, for all far lights together: the sum of color w(direction), w = 1.
+## `by_table`: scalar planes by the table that lamps use, off by w_table.error of asset.json, in a fraction of the time.
+func weights(directions: PackedVector3Array, colors: PackedVector3Array, by_table := false) -> PackedVector4Array:
+	if method == "relighting-map":
+		return _map_weights(directions, colors)
+	return _table_weights(directions, colors) if by_table else _plane_weights(directions, colors)
+
+
+## `weights` of a panorama, Godot's, in linear radiance; `rotation` turns Godot's world into the asset's frame.
+func sky_weights(sky: Image, rotation: Basis) -> PackedVector4Array:
+	var upright := rotation.y.is_equal_approx(Vector3(0.0, 0.0, 1.0))
+	var directions := PackedVector3Array()
+	var colors := PackedVector3Array()
+	for row in sky.get_height():
+		var top := PI / 2.0 - row * PI / sky.get_height()
+		var bottom := PI / 2.0 - (row + 1) * PI / sky.get_height()
+		if domain == "hemisphere" and upright:  # a row that straddles the horizon ends there
+			top = maxf(top, 0.0)
+			bottom = maxf(bottom, 0.0)
+		var solid_angle := (sin(top) - sin(bottom)) * TAU / sky.get_width()
+		var height_angle := (top + bottom) / 2.0
+		for column in sky.get_width():
+			var azimuth := (column + 0.5) / sky.get_width() * TAU
+			var direction := Vector3(cos(height_angle) * sin(azimuth), sin(height_angle), -cos(height_angle) * cos(azimuth))
+			direction = rotation * direction
+			if solid_angle > 0.0 and (domain == "sphere" or upright or direction.z > 0.0):
+				var color := sky.get_pixel(column, row)
+				directions.append(direction)
+				colors.append(Vector3(color.r, color.g, color.b) * solid_angle)
+	return weights(directions, colors)
+
+
+func _map_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+	var table := r_table.get_data().to_float32_array()
+	var middle := 0.5 * (table.size() - 1)
+	var sums := PackedVector4Array()
+	for center in centers:
+		var sum := Vector3.ZERO
+		for n in directions.size():
+			var place := (clampf(directions[n].dot(center), -1.0, 1.0) + 1.0) * middle
+			var entry := mini(int(place), table.size() - 2)
+			sum += colors[n] * lerpf(table[entry], table[entry + 1], place - entry)
+		sums.append(Vector4(sum.x, sum.y, sum.z, 1.0))
+	return sums
+
+
+func _plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+	var gaussians := {}  # by spread, of which there are few
+	for spread in spreads:
+		if not gaussians.has(spread):
+			gaussians[spread] = _gaussians(spread, directions, colors)
+	var sums := PackedVector4Array()
+	var at := 0
+	for spread in spreads:
+		var gaussian: PackedFloat64Array = gaussians[spread]
+		var red := 0.0
+		var green := 0.0
+		var blue := 0.0
+		for b in range(0, gaussian.size(), 3):
+			red += light_coefficients[at] * gaussian[b]
+			green += light_coefficients[at + 1] * gaussian[b + 1]
+			blue += light_coefficients[at + 2] * gaussian[b + 2]
+			at += 3
+		sums.append(Vector4(red, green, blue, 1.0))
+	return sums
+
+
+func _table_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+	if _table.is_empty():
+		var table: Image = w_table.duplicate()
+		table.convert(Image.FORMAT_RGBF)
+		_table = table.get_data().to_float32_array()
+	var row := w_table.get_width()
+	var columns := row / w_table_size
+	var sums := PackedVector3Array()
+	sums.resize(spreads.size())
+	for n in directions.size():
+		var place := (_octahedral(directions[n]) + Vector2.ONE) * (0.5 * (w_table_size - 1))
+		var node := Vector2i(place).clampi(0, w_table_size - 2)
+		var part := place - Vector2(node)
+		for f in sums.size():
+			var at := ((f / columns) * w_table_size + node.y) * row + (f % columns) * w_table_size + node.x
+			var top := _entry(at).lerp(_entry(at + 1), part.x)
+			var bottom := _entry(at + row).lerp(_entry(at + row + 1), part.x)
+			sums[f] += colors[n] * top.lerp(bottom, part.y)
+	var padded := PackedVector4Array()
+	for sum in sums:
+		padded.append(Vector4(sum.x, sum.y, sum.z, 1.0))
+	return padded
+
+
+## Where a texel is, in Godot's frame, y up.
+func point(texel: Vector2i) -> Vector3:
+	return _to_godot(position.get_pixel(texel.x, texel.y))
+
+
+## Where nine in ten of the covered texels are, by each axis, in Godot's frame: what a view sees far away is no part of it.
+func bounds() -> AABB:
+	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
+	for row in height:
+		for column in width:
+			if not coverage or coverage.get_pixel(column, row).r >= 0.5:
+				var place := point(Vector2i(column, row))
+				for axis in 3:
+					sides[axis].append(place[axis])
+	var low := Vector3.ZERO
+	var high := Vector3.ZERO
+	for axis in 3:
+		sides[axis].sort()
+		var count := sides[axis].size()
+		low[axis] = sides[axis][count / 20] if count else 0.0
+		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
+	return AABB(low, high - low)
+
+
+## A mesh through the position map's covered texels, of at most some `most` vertices: second UV layer, normals, triangles; Godot's frame.
+## What is longer than `longest` times the middle length of an edge spans two charts, and is left out.
+func texel_mesh(longest := 4.0, most := 65536) -> ArrayMesh:
+	if position == null:
+		push_error("expected a position map in the asset, found none: it has no mesh")
+		return null
+	var step := maxi(1, ceili(sqrt(float(width) * height / most)))
+	var columns := _steps(width, step)
+	var rows := _steps(height, step)
+	var across := columns.size()
+	var points := PackedVector3Array()
+	var normals := PackedVector3Array()
+	var places := PackedVector2Array()
+	var covered := PackedByteArray()
+	for row in rows:
+		for column in columns:
+			points.append(point(Vector2i(column, row)))
+			normals.append(_to_godot(normal.get_pixel(column, row)) if normal else Vector3.UP)
+			places.append(Vector2((column + 0.5) / width, (row + 0.5) / height))
+			covered.append(1 if not coverage or coverage.get_pixel(column, row).r >= 0.5 else 0)
+	var lengths := PackedFloat32Array()
+	for corner in points.size() - 1:
+		if covered[corner] and covered[corner + 1] and (corner + 1) % across:
+			lengths.append(points[corner].distance_to(points[corner + 1]))
+	lengths.sort()
+	var limit := longest * lengths[lengths.size() / 2] if lengths else INF
+	var indices := PackedInt32Array()
+	for row in rows.size() - 1:
+		for column in across - 1:
+			var corner := row * across + column
+			for triangle in [[corner, corner + 1, corner + across], [corner + 1, corner + across + 1, corner + across]]:
+				if _belongs(triangle, points, covered, limit):
+					if _faces_away(triangle, points, normals):
+						triangle.reverse()
+					indices.append_array(PackedInt32Array(triangle))
+	var arrays := []
+	arrays.resize(Mesh.ARRAY_MAX)
+	arrays[Mesh.ARRAY_VERTEX] = points
+	arrays[Mesh.ARRAY_NORMAL] = normals
+	arrays[Mesh.ARRAY_TEX_UV2] = places
+	arrays[Mesh.ARRAY_INDEX] = indices
+	var mesh := ArrayMesh.new()
+	if indices:
+		mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
+	return mesh
+
+
+## Every so many texels of a side, the last one always.
+static func _steps(size: int, step: int) -> PackedInt32Array:
+	var chosen := PackedInt32Array(range(0, size, step))
+	if chosen[-1] != size - 1:
+		chosen.append(size - 1)
+	return chosen
+
+
+static func _belongs(triangle: Array, points: PackedVector3Array, covered: PackedByteArray, limit: float) -> bool:
+	for n in 3:
+		if not covered[triangle[n]] or points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
+			return false
+	return true
+
+
+## Godot's front faces turn clockwise.
+static func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
+	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
+	return across.dot(normals[triangle[0]]) > 0.0
+
+
+func _entry(texel: int) -> Vector3:
+	return Vector3(_table[3 * texel], _table[3 * texel + 1], _table[3 * texel + 2])
+
+
+## A direction's place on the octahedral square, -1 to 1 [Cigolle2014].
+static func _octahedral(direction: Vector3) -> Vector2:
+	var d := direction / (absf(direction.x) + absf(direction.y) + absf(direction.z))
+	if d.z >= 0.0:
+		return Vector2(d.x, d.y)
+	return Vector2((1.0 - absf(d.y)) * (-1.0 if d.x < 0.0 else 1.0), (1.0 - absf(d.x)) * (-1.0 if d.y < 0.0 else 1.0))
+
+
+func _gaussians(spread: float, directions: PackedVector3Array, colors: PackedVector3Array) -> PackedFloat64Array:
+	var sums := PackedFloat64Array()
+	for center in centers:
+		var sum := Vector3.ZERO
+		for n in directions.size():
+			var angle := acos(clampf(directions[n].dot(center), -1.0, 1.0)) / spread
+			sum += colors[n] * exp(-0.5 * angle * angle)
+		sums.append_array([sum.x, sum.y, sum.z])
+	return sums
+
+
+static func _image(folder: String, file: String) -> Image:
+	var path := folder.path_join(file)
+	var image := Image.load_from_file(ProjectSettings.globalize_path(path))
+	if image == null:
+		push_error("expected an image at %s, found none" % path)
+	return image
+
+
+static func _transform(rows: Variant) -> Transform3D:
+	if rows == null:
+		return Transform3D.IDENTITY
+	var columns: Array[Vector3] = []
+	for column in 4:
+		columns.append(Vector3(rows[0][column], rows[1][column], rows[2][column]))
+	return Transform3D(columns[0], columns[1], columns[2], columns[3])
+
+
+static func _vectors(listed: Array) -> PackedVector3Array:
+	var vectors := PackedVector3Array()
+	for numbers in listed:
+		vectors.append(Vector3(numbers[0], numbers[1], numbers[2]).normalized())
+	return vectors
+
+
+static func _vector4(numbers: Array) -> Vector4:
+	return Vector4(numbers[0], numbers[1], numbers[2], numbers[3] if numbers.size() > 3 else 0.0)
+
+
+static func _to_godot(color: Color) -> Vector3:
+	return Vector3(color.r, color.b, -color.g)

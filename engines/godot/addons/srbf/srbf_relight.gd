@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: MIT
+class_name SrbfRelight
+extends Node3D
+## Lights its surfaces by an asset, and follows Godot's lights.
+##
+## The node stands where the asset's origin is, turned and scaled alike. A light of energy 1 gives a white diffuse surface what Godot's
+## own light gives it: π times its linear colour as irradiance, from an omni or spot light at 1 m.
+
+const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
+const RADIUS := 1e-4  # metres: no receiver is nearer to a lamp, as in Godot
+const SKY_WIDTH := 32
+const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
+
+@export var asset: SrbfAsset
+## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children where none are named.
+@export var surfaces: Array[Node]
+## Those to follow; all of the scene where none are named.
+@export var lights: Array[Light3D]
+## A panorama to light by, as Godot's PanoramaSky takes it; it is averaged down to 32 texels of width. Bytes are sRGB.
+@export var sky: Texture2D
+@export var sky_energy := 1.0
+## How many omni and spot lights a shader has room for.
+@export_range(1, 64) var most_lamps := 4
+## Eigen maps: weigh directional lights by the table, as omni and spot lights are, where they move every frame.
+@export var suns_by_table := false
+## For canvas items, in stops.
+@export var exposure := 0.0
+
+var _materials: Array[ShaderMaterial] = []
+var _weights: ImageTexture
+var _sky_weights: PackedVector4Array
+var _sky_of := []
+var _last := []
+
+
+func _ready() -> void:
+	if asset:
+		apply()
+
+
+## Give the surfaces their materials: again after another asset or other surfaces were set.
+func apply() -> void:
+	_materials.clear()
+	_last = []
+	_weights = null
+	var made := {}
+	for surface in surfaces if surfaces else get_children():
+		if surface is CanvasItem:
+			if not made.has("canvas_item"):
+				made.canvas_item = _material("canvas_item", "canvas")
+			surface.material = made.canvas_item
+		elif surface is GeometryInstance3D:
+			if not made.has("spatial"):
+				made.spatial = _material("spatial", "spatial")
+			surface.material_override = made.spatial
+
+
+## The materials in use: the albedo of meshes is theirs.
+func materials() -> Array[ShaderMaterial]:
+	return _materials
+
+
+func _process(_delta: float) -> void:
+	if _materials.is_empty():
+		return
+	var found: Array[Light3D] = lights
+	if lights.is_empty():
+		found.assign(get_tree().root.find_children("*", "Light3D", true, false))
+	found = found.filter(func(light: Light3D) -> bool: return light.is_visible_in_tree())
+	var asset_from_godot := asset.asset_from_world * Z_UP * global_transform.affine_inverse()
+	var now := [asset_from_godot, exposure, suns_by_table, sky, sky_energy, get_viewport().use_hdr_2d]
+	for light in found:
+		now.append_array([light.global_transform, light.light_color, light.light_energy, light.light_negative])
+		if not light is DirectionalLight3D:
+			now.append(_cone_of(light))
+			now.append(_decay(light))
+	if now == _last:
+		return
+	_last = now
+	_set_far(found, asset_from_godot)
+	_set_lamps(found, asset_from_godot)
+	for material in _materials:
+		material.set_shader_parameter("srbf_asset_from_world", asset_from_godot)
+		material.set_shader_parameter("srbf_exposure", exposure)
+		material.set_shader_parameter("srbf_encode", not get_viewport().use_hdr_2d)
+
+
+func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
+	var directions := PackedVector3Array()
+	var colors := PackedVector3Array()
+	for light in found:
+		if light is DirectionalLight3D:
+			directions.append((asset_from_godot.basis * light.global_basis.z).normalized())
+			colors.append(irradiance(light))
+	var sums := asset.weights(directions, colors, suns_by_table)
+	if sky:
+		_follow_sky(asset_from_godot)
+		for i in sums.size():
+			sums[i] += _sky_weights[i] * sky_energy
+	if asset.method == "relighting-map":
+		_give("srbf_weights", sums)
+		return
+	var image := Image.create_from_data(asset.scalars + 1, asset.clusters, false, Image.FORMAT_RGBAF, sums.to_byte_array())
+	if _weights == null:
+		_weights = ImageTexture.create_from_image(image)
+		_give("srbf_weights", _weights)
+	else:
+		_weights.update(image)
+
+
+## The sky's weights cost more than all others, and change with the sky alone.
+func _follow_sky(asset_from_godot: Transform3D) -> void:
+	var now := [asset, sky, asset_from_godot.basis]
+	if now == _sky_of:
+		return
+	_sky_of = now
+	var image := sky.get_image().duplicate() as Image
+	if image.is_compressed():
+		image.decompress()
+	var encoded := image.get_format() <= Image.FORMAT_RGBA8
+	image.convert(Image.FORMAT_RGBF)
+	if encoded:
+		for row in image.get_height():
+			for column in image.get_width():
+				image.set_pixel(column, row, image.get_pixel(column, row).srgb_to_linear())
+	while image.get_width() > SKY_WIDTH and image.get_height() > 1:
+		image.shrink_x2()
+	_sky_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
+
+
+func _set_lamps(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
+	var lamps := PackedVector4Array()
+	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # of the asset's metres a metre of Godot's
+	for light in found:
+		if light is DirectionalLight3D or not asset.position:
+			continue
+		if lamps.size() == 4 * most_lamps:
+			push_warning("expected at most %d omni and spot lights, found more; raise most_lamps" % most_lamps)
+			break
+		var squared := _decay(light) >= 1.5
+		var place := asset_from_godot * light.global_position
+		var color := irradiance(light) * (unit * unit if squared else unit)
+		var axis := -(asset_from_godot.basis * light.global_basis.z).normalized()
+		var cone := _cone_of(light)
+		lamps.append(Vector4(place.x, place.y, place.z, RADIUS * unit))
+		lamps.append(Vector4(0.0, 0.0, 0.0, 1.0 if squared else 0.0))
+		lamps.append(Vector4(color.x, color.y, color.z, cone.x))
+		lamps.append(Vector4(axis.x, axis.y, axis.z, cone.y))
+	_give("srbf_lamp_count", lamps.size() / 4)
+	lamps.resize(4 * most_lamps)
+	_give("srbf_lamps", lamps)
+
+
+## What a light gives a surface that faces it, of an omni or spot light at 1 m: linear, in Godot's unit times π.
+static func irradiance(light: Light3D) -> Vector3:
+	var color := light.light_color.srgb_to_linear()
+	var sign := -1.0 if light.light_negative else 1.0
+	return Vector3(color.r, color.g, color.b) * (sign * light.light_energy * PI)
+
+
+## 1 - cos of a spot's inner and outer half-angles. Godot's 1 - t^a, t = (1 - cos) / (1 - cos outer), and the smooth step are ½ at one angle.
+static func _cone_of(light: Light3D) -> Vector2:
+	if not light is SpotLight3D:
+		return NO_CONE
+	var half_sine := sin(deg_to_rad(light.spot_angle) / 2.0)
+	var outer := 2.0 * half_sine * half_sine
+	var inner := outer * maxf(0.0, 2.0 * pow(0.5, 1.0 / maxf(light.spot_angle_attenuation, 1e-3)) - 1.0)
+	return Vector2(inner, outer)
+
+
+static func _decay(light: Light3D) -> float:
+	return light.spot_attenuation if light is SpotLight3D else (light as OmniLight3D).omni_attenuation
+
+
+func _material(type: String, file: String) -> ShaderMaterial:
+	var shader := Shader.new()
+	shader.code = "shader_type %s;\n%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+		type, asset.defines(), most_lamps, file
+	]
+	var material := ShaderMaterial.new()
+	material.shader = shader
+	_materials.append(material)
+	var constants := {
+		"srbf_layers": asset.layers(),
+		"srbf_scale": asset.scale,
+		"srbf_bias": asset.bias,
+		"srbf_last_level": float(asset.levels - 1),
+		"srbf_positions": asset.texture("position"),
+		"srbf_ambient": asset.texture("ambient"),
+	}
+	if asset.method == "relighting-map":
+		var centers := PackedVector4Array()
+		for center in asset.centers:
+			centers.append(Vector4(center.x, center.y, center.z, 0.0))
+		constants.srbf_centers = centers
+		constants.srbf_table = asset.texture("r_table")
+	else:
+		constants.srbf_table = asset.texture("w_table")
+		constants.srbf_table_size = asset.w_table_size
+		constants.srbf_clusters = asset.texture("cluster_index")
+	for name in constants:
+		if constants[name] != null:
+			material.set_shader_parameter(name, constants[name])
+	return material
+
+
+func _give(name: StringName, value: Variant) -> void:
+	for material in _materials:
+		material.set_shader_parameter(name, value)

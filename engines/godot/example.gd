@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+extends Node3D
+## A lamp to drag over the asset: on model.glb or a mesh through its texels, or in its picture laid flat.
+
+const HELP := "drag: move the lamp    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
+const MODEL := "res://model.glb"  # second UV layer: the asset's
+const TURN := 0.03  # radians a key press
+
+var _dragged := false
+var _middle := Vector3.ZERO
+var _size := 1.0
+var _model: Node3D
+
+@onready var _asset: SrbfAsset = $Relight.asset
+@onready var _picture: ColorRect = $Canvas/Picture
+
+
+func _ready() -> void:
+	if _asset.position:
+		if ResourceLoader.exists(MODEL):
+			_show_model()
+		else:
+			$Surface.mesh = _asset.texel_mesh()
+		var box := _asset.bounds()
+		_middle = box.get_center()
+		_size = maxf(box.get_longest_axis_size(), 1e-3)
+	else:
+		$Lamp.visible = false
+	$Camera.look_at_from_position(_middle + Vector3(0.0, 0.65, 0.8) * _size, _middle)
+	$Camera.far = maxf(1000.0, 10.0 * _size)
+	$Lamp.position = _middle + Vector3(-0.2, 0.3, 0.1) * _size
+	$Lamp.light_energy *= 0.4 * _size  # its answer falls with the distance
+	if _asset.is_view:
+		$Sun.light_energy = 1.0
+		$Relight.exposure = 0.5
+	$Lamp/Bulb.scale = Vector3.ONE * 0.03 * _size
+	get_viewport().size_changed.connect(_fit_picture)
+	_fit_picture()
+	_show_picture(_asset.is_view or not _asset.position)
+
+
+func _unhandled_input(event: InputEvent) -> void:
+	if event is InputEventMouseButton:
+		if event.button_index == MOUSE_BUTTON_LEFT:
+			_dragged = event.pressed
+		elif event.pressed and event.button_index == MOUSE_BUTTON_WHEEL_UP:
+			$Lamp.position.y += 0.02 * _size
+		elif event.pressed and event.button_index == MOUSE_BUTTON_WHEEL_DOWN:
+			$Lamp.position.y -= 0.02 * _size
+	if _dragged and event is InputEventMouse:
+		move_lamp(event.position)
+	if event is InputEventKey and event.pressed:
+		match event.keycode:
+			KEY_TAB:
+				_show_picture(not _picture.visible)
+			KEY_S:
+				$Sun.visible = not $Sun.visible
+			KEY_PLUS, KEY_EQUAL, KEY_KP_ADD:
+				$Relight.exposure += 0.5
+			KEY_MINUS, KEY_KP_SUBTRACT:
+				$Relight.exposure -= 0.5
+			KEY_LEFT:
+				$Sun.rotate_y(-TURN)
+			KEY_RIGHT:
+				$Sun.rotate_y(TURN)
+			KEY_UP:
+				$Sun.rotate_object_local(Vector3.RIGHT, -TURN)
+			KEY_DOWN:
+				$Sun.rotate_object_local(Vector3.RIGHT, TURN)
+
+
+## Put the lamp under the mouse, its height kept: over the surface's plane, or over the picture's texel.
+func move_lamp(mouse: Vector2) -> void:
+	if not _asset.position:
+		return
+	if _picture.visible:
+		var place := (mouse - _picture.position) / _picture.size
+		var texel := Vector2i(place * Vector2(_asset.width, _asset.height)).clamp(Vector2i.ZERO, Vector2i(_asset.width - 1, _asset.height - 1))
+		var point := _asset.point(texel)
+		$Lamp.position = Vector3(point.x, $Lamp.position.y, point.z)
+		return
+	var plane := Plane(Vector3.UP, $Lamp.position)
+	var hit = plane.intersects_ray($Camera.project_ray_origin(mouse), $Camera.project_ray_normal(mouse))
+	if hit != null:
+		$Lamp.position = hit
+
+
+func _show_model() -> void:
+	_model = load(MODEL).instantiate()
+	add_child(_model)
+	var surfaces: Array[Node] = [_picture]
+	surfaces.append_array(_model.find_children("*", "MeshInstance3D", true, false))
+	$Relight.surfaces = surfaces
+	$Relight.apply()
+
+
+func _show_picture(flat: bool) -> void:
+	_picture.visible = flat
+	$Surface.visible = not flat
+	if _model:
+		_model.visible = not flat
+	$Canvas/Help.text = HELP % ("mesh" if flat else "picture")
+
+
+func _fit_picture() -> void:
+	var room := get_viewport().get_visible_rect().size
+	var zoom := minf(room.x / _asset.width, room.y / _asset.height)
+	_picture.size = Vector2(_asset.width, _asset.height) * zoom
+	_picture.position = (room - _picture.size) / 2.0

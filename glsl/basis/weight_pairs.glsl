@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT
+/* srbfWeightPairs: R_i for one light direction from a table of values and differences: one fetch where srbfWeight takes two.
+   use:    float srbfWeightPairs(sampler2D pairs, float versine)
+   domain: versine = 1 - cos theta in [0, 2]; pairs n x 1 texels, RG32F: R at versine 2 j / (n - 1), which is the R
+           table from its end, and what the next entry has more than it, 0 in the last; result in [0, 1]
+   twin:   srbf.basis.gaussian.lookup
+   cite:   Wong2005, fig. 9 */
+float srbfWeightPairs(highp sampler2D pairs, float versine) {
+    // Never the hardware's filter: its fractions have 8 bits. Counted from the center, where R changes with every digit of the versine.
+    float place = versine * (0.5 * float(textureSize(pairs, 0).x - 1));
+    int entry = int(place);
+    vec2 pair = texelFetch(pairs, ivec2(entry, 0), 0).rg;
+    return pair.x + pair.y * (place - float(entry));
+}

@@ -1,0 +1,301 @@
+"""Compare Godot's pixels with numpy's, on both renderers, in the chroot that scripts/godot-chroot makes; exits 1 where they differ.
+
+Every method, as a picture (canvas) and on a mesh (spatial), lit by Godot's own directional, omni and spot lights. CI does not run it.
+    python scripts/test_godot.py [--keep]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+
+from made_assets import build_asset, build_planes  # noqa: E402
+
+from srbf.asset import Asset  # noqa: E402
+from srbf.export.godot import write  # noqa: E402
+from srbf.export.settings import PLAIN, Settings  # noqa: E402
+from srbf.image import decode_srgb, encode_srgb  # noqa: E402
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
+from srbf.methods import relight  # noqa: E402
+
+RENDERERS = {
+    "gl_compatibility": ["--rendering-method", "gl_compatibility", "--rendering-driver", "opengl3"],
+    "forward_plus": ["--rendering-method", "forward_plus", "--rendering-driver", "vulkan"],
+}
+HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may cut instead of rounding
+STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's
+FLOAT_ERROR = 1e-4  # single precision, of sums whose terms reach 10
+BYTE_STEP = 1.5 / 255
+RANGE = 20.0  # metres: where Godot's own omni and spot lights end
+FAR = 1e6  # metres
+SECONDS = 300  # of one Godot
+
+Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)  # Godot's (x, y, z) to (x, -z, y)
+COLOR = (0.9, 0.5, 0.7)  # as Godot's inspector shows it: sRGB
+STRAIGHT = np.eye(4)
+ASKEW = np.array([[0, 0, 1.25, 0.3], [1.25, 0, 0, -0.1], [0, 1.25, 0, 0.2], [0, 0, 0, 1]], np.float64)  # turned, scaled and moved
+TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon is not the sky's
+PLACE = np.array([0.4, 1.3, -0.2])
+TOWARDS = np.array([0.3, 0.8, 0.4]) / np.linalg.norm([0.3, 0.8, 0.4])
+
+
+@dataclass(frozen=True)
+class Lit:
+    """A light as Godot's node, by property, and what the documentation says it is here, in Godot's frame."""
+
+    node: dict[str, Any]
+    direction: ndarray
+    position: ndarray
+    energy: float
+    decay: float = 1.0
+    spot: tuple[float, float] | None = None  # half-angle (rad), exponent of its edge
+
+    def light(self) -> Light:
+        """The same light of ours, in the world, z up."""
+        color = tuple((np.pi * self.energy * decode_srgb(np.array(COLOR))).tolist())
+        towards, place = Z_UP[:3, :3] @ self.direction, tuple(Z_UP[:3, :3] @ self.position)
+        falloff = "inverse-square" if self.decay >= 1.5 else "linear"
+        if self.node["kind"] == "DirectionalLight3D":
+            return DirectionalLight(tuple(towards), color)
+        if self.spot is None:
+            return PointLight(place, color, falloff=falloff)
+        outer, exponent = self.spot
+        share = max(0.0, 2 * 0.5 ** (1 / exponent) - 1)
+        inner = float(np.arccos(1 - share * (1 - np.cos(outer))))
+        return SpotLight(place, color, falloff=falloff, direction=tuple(-towards), inner=inner, outer=outer)
+
+
+def node(kind: str, energy: float, **properties: float) -> dict[str, Any]:
+    across = np.cross([0.3, 1.0, 0.2], TOWARDS)
+    across /= np.linalg.norm(across)
+    frame = np.eye(4)
+    frame[:3] = np.stack([across, np.cross(TOWARDS, across), TOWARDS, PLACE], axis=1)
+    color = "Color({}, {}, {}, 1)".format(*COLOR)
+    numbers = {name: repr(float(value)) for name, value in {"light_energy": energy, **properties}.items()}
+    return {"kind": kind, "transform": transform(frame), "light_color": color, **numbers}
+
+
+def transform(matrix: ndarray) -> str:
+    return "Transform3D({})".format(", ".join(repr(float(v)) for v in [*matrix[:3, :3].ravel(), *matrix[:3, 3]]))
+
+
+SUN = Lit(node("DirectionalLight3D", 0.3), TOWARDS, PLACE, 0.3)
+OMNI = Lit(node("OmniLight3D", 0.5, omni_range=RANGE), TOWARDS, PLACE, 0.5)
+SQUARED = Lit(node("OmniLight3D", 0.4, omni_range=RANGE, omni_attenuation=2), TOWARDS, PLACE, 0.4, 2.0)
+SPOT = Lit(
+    node("SpotLight3D", 0.7, spot_range=RANGE, spot_angle=50, spot_attenuation=2, spot_angle_attenuation=2),
+    TOWARDS,
+    PLACE,
+    0.7,
+    2.0,
+    (np.radians(50), 2.0),
+)
+LIGHTS = {
+    "directional": [SUN],
+    "point": [OMNI],
+    "squared": [SQUARED],
+    "spot": [SPOT],
+    "all": [SUN, OMNI, SPOT],
+    "by table": [SUN],
+    "sky": [SUN],
+}
+SKY = (
+    np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
+)  # a panorama of Godot's, which begins where x is 0 and -z is ahead
+SKY_ENERGY = 0.7
+
+
+def affine(asset: Asset) -> Asset:
+    """The asset on a slanted plane whose texels are the pixels of a camera above."""
+    x = (np.arange(asset.width) + 0.5) * 0.2 - 0.1 * asset.width
+    y = 0.1 * asset.height - (np.arange(asset.height) + 0.5) * 0.2
+    position = np.empty((asset.height, asset.width, 3), np.float32)
+    position[..., 0], position[..., 1] = x, y[:, None]
+    position[..., 2] = 0.1 * position[..., 0] + 0.2 * position[..., 1]
+    return replace(asset, images={**asset.images, "position": position})
+
+
+def assets() -> Iterator[tuple[str, Asset, Settings]]:
+    """Each method and encoding, of 14 x 9 random texels, none symmetric; what is compressed has whole blocks of 4 x 4."""
+    makers: dict[str, Callable[[], Asset]] = {
+        "relighting map, half": lambda: build_asset(25, "half", ambient=True),
+        "relighting map, uint8": lambda: build_asset(7, "uint8"),
+        "relighting map, bc7": lambda: build_asset(7, "float", 12, 16),
+        "eigen map, half": lambda: build_planes(9, None, "half", ambient=True),
+        "eigen map, indirect": lambda: build_planes(9, None, "half"),
+        "eigen map, bc7, mips": lambda: build_planes(9, None, "float", 12, 16),
+        "clustered eigen map, half": lambda: build_planes(9, 5, "half", ambient=True),
+        "clustered eigen map, uint8": lambda: build_planes(6, 4, "uint8"),
+    }
+    for name, make in makers.items():
+        asset = make()
+        asset.manifest["quantity"] = "irradiance" if asset.method == "eigen-map" else "radiance"
+        if name.endswith("uint8"):
+            asset.manifest["asset_from_world"] = [[0, 1.5, 0, 0.2], [-1.5, 0, 0, 0.1], [0, 0, 1.5, -0.3], [0, 0, 0, 1]]
+        else:
+            asset = affine(asset)
+        if name.endswith("indirect"):
+            asset.manifest["transport"] = "indirect"
+        yield name, asset, Settings("bc7", 3 if name.endswith("mips") else 1) if "bc7" in name else PLAIN
+
+
+def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
+    """What compare.gd is to render: name, mode, whether the viewport is linear, where the asset stands, lights."""
+    every = [name for name in LIGHTS if name not in ("by table", "sky")]
+    for name in every:
+        placed = ASKEW if name == "all" else STRAIGHT
+        yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
+    yield {"name": "all", "mode": "canvas", "hdr": False, "placed": STRAIGHT}
+    for placed in (STRAIGHT, ASKEW, TIPPED):
+        yield {"name": "sky", "mode": "canvas", "hdr": True, "placed": placed}
+    if asset.method != "relighting-map":
+        yield {"name": "by table", "mode": "canvas", "hdr": True, "placed": STRAIGHT, "by_table": True}
+    if np.array_equal(asset.asset_from_world, np.eye(4)):
+        for name in every if asset.transport == "combined" else ("directional", "point", "squared"):
+            yield {"name": name, "mode": "spatial", "hdr": True, "placed": STRAIGHT}
+            yield {"name": name, "mode": "spatial", "hdr": False, "placed": STRAIGHT}
+        for name in ("directional", "point", "squared"):
+            yield {"name": name, "mode": "white", "hdr": True, "placed": STRAIGHT}
+
+
+def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
+    """What srbf.methods.relight says; of irradiance what white sends out."""
+    world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
+    moved = asset.asset_from_world @ np.linalg.inv(world_from_asset)
+    instance = replace(asset, manifest={**asset.manifest, "asset_from_world": moved.tolist()})
+    lights: list[Light] = [lit.light() for lit in LIGHTS[job["name"]]]
+    if job["name"] == "sky":
+        lights.append(EnvironmentLight(np.roll(SKY, 4, axis=1), (SKY_ENERGY,) * 3))  # ours begins a quarter turn further
+    picture = far_lamp(instance, SUN) if job.get("by_table") else relight(instance, lights)
+    if asset.quantity == "irradiance":
+        picture = picture / np.pi
+    if asset.transport == "indirect" and job["mode"] == "spatial":
+        picture = picture + white(asset, *LIGHTS[job["name"]])  # Godot's own direct light
+    return picture
+
+
+def far_lamp(asset: Asset, sun: Lit) -> ndarray:
+    """A directional light read from the table: a lamp so far away that all receivers see it from one direction."""
+    far = sun.light()
+    assert isinstance(far, DirectionalLight)
+    place = tuple((np.array(far.direction) * FAR).tolist())
+    return relight(asset, [PointLight(place, far.color, a0=FAR)])
+
+
+def white(asset: Asset, lit: Lit) -> ndarray:
+    """What the documentation says that Godot's own light leaves on a white diffuse plane, the asset's: its irradiance over pi."""
+    light = lit.light()
+    if isinstance(light, DirectionalLight):
+        towards, strength = np.array(light.direction), np.ones((asset.height, asset.width))
+    else:
+        assert isinstance(light, PointLight)
+        vector = np.array(light.position) - asset.images["position"]
+        distance = np.linalg.norm(vector, axis=2)
+        towards, strength = vector / distance[..., None], attenuation(distance, light) * (1 - (distance / RANGE) ** 4) ** 2
+    normal = np.array([-0.1, -0.2, 1.0]) / np.linalg.norm([-0.1, -0.2, 1.0])
+    cosine = np.maximum(towards @ normal, 0) * strength
+    return cosine[..., None] * np.array(light.color) / np.pi
+
+
+def held(picture: ndarray, job: dict[str, Any], renderer: str) -> ndarray:
+    """The picture as that target holds it. Compatibility encodes 3D, in half floats too, by a curve without sRGB's straight toe."""
+    if job["mode"] != "canvas" and renderer == "gl_compatibility":
+        encoded = np.maximum(1.055 * picture ** (1 / 2.4) - 0.055, 0)
+        return encoded if job["hdr"] else np.minimum(encoded, 1)
+    return picture if job["hdr"] else encode_srgb(np.clip(picture, 0, 1))
+
+
+def run(folder: Path, chroot: Path, *arguments: str, display: bool = False) -> str:
+    """Godot in the chroot on a project below its /tmp; what it said."""
+    inside = "/" + folder.relative_to(chroot).as_posix()
+    screen = ["xvfb-run", "-a"] if display else []
+    command = ["chroot", str(chroot), "env", "HOME=/tmp", *screen, "godot", "--audio-driver", "Dummy", "--path", inside, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS)
+    said = done.stdout + done.stderr
+    if done.returncode or "SCRIPT ERROR" in said or "SHADER ERROR" in said:
+        sys.exit(f"expected Godot to run {folder.name} {' '.join(arguments)}, found\n{said}")
+    return said
+
+
+def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: bool) -> int:
+    """Print a line for each renderer and job; how many differ."""
+    folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
+    write(made, folder, settings)
+    asset = Asset.open(folder)  # blocks decoded
+    shutil.copy(ROOT / "tests" / "export" / "godot_compare.gd", folder)
+    asked = list(jobs(asset))
+    camera = np.array([[1, 0, 0, 0], [0, 0, 1, 5], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)  # looks down, north up
+    written = [
+        {
+            **{key: job[key] for key in ("name", "mode", "hdr")},
+            "sky": SKY.ravel().tolist() if job["name"] == "sky" else None,
+            "by_table": job.get("by_table", False),
+            "transform": transform(job["placed"]),
+            "lights": [lit.node for lit in LIGHTS[job["name"]]],
+            "camera": transform(camera),
+            "size": 0.2 * asset.height,
+            "output": f"{i}.raw",
+        }
+        for i, job in enumerate(asked)
+    ]
+    (folder / "jobs.json").write_text(json.dumps(written))
+    run(folder, chroot, "--headless", "--import")
+    missed = 0
+    for renderer, arguments in RENDERERS.items():
+        run(folder, chroot, *arguments, "--script", "res://godot_compare.gd", display=True)
+        for i, job in enumerate(asked):
+            found = np.frombuffer((folder / f"{i}.raw").read_bytes(), np.float32).reshape(asset.height, asset.width, 4)[..., :3]
+            wanted = held(white(asset, *LIGHTS[job["name"]]) if job["mode"] == "white" else expected(asset, job), job, renderer)
+            allowed = wanted * STEPS[job["mode"]] * HALF_STEP + FLOAT_ERROR if job["hdr"] else np.full_like(wanted, BYTE_STEP)
+            error = np.abs(found - wanted)
+            steps = float((error / allowed).max())
+            missed += steps > 1
+            target = "half" if job["hdr"] else "8 bit"
+            verdict = "" if steps <= 1 else "  MISSED"
+            say(
+                f"{title:28}{renderer:18}{job['mode']:9}{target:7}{job['name']:13}"
+                f"{float(wanted.max()):7.2f}{float(error.max()):11.6f}{steps:7.2f}{verdict}"
+            )
+    if keep:
+        say(f"kept {folder}")
+    else:
+        shutil.rmtree(folder)
+    return missed
+
+
+def say(line: str) -> None:
+    sys.stdout.write(line + "\n")
+    sys.stdout.flush()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--keep", action="store_true", help="leave the projects in the chroot's /tmp")
+    keep = parser.parse_args().keep
+    chroot = Path(os.environ.get("SRBF_GODOT_CHROOT", Path.home() / ".cache" / "srbf" / "godot")).resolve()
+    if not (chroot / "srbf-ready").exists():
+        sys.exit(f"expected a chroot with Godot at {chroot}, found none; scripts/godot-chroot makes it, or set SRBF_GODOT_CHROOT")
+    say(f"{'asset':28}{'renderer':18}{'mode':9}{'target':7}{'lights':13}{'largest':>7}{'error':>11}{'/ bound':>7}")
+    missed = sum(compare(title, asset, settings, chroot, keep) for title, asset, settings in assets())
+    if missed:
+        sys.exit(f"{missed} pictures differ from numpy's by more than the bound")
+    say("all within the bound")
+
+
+if __name__ == "__main__":
+    main()

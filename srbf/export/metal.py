@@ -1,0 +1,36 @@
+"""The shader pack as Metal: whole stages by spirv-cross, since no Metal compiler runs outside a Mac to check a text of our own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from srbf import files
+from srbf.asset import Asset
+from srbf.export import exr, spirv
+from srbf.export.asset_shader import counts
+from srbf.export.settings import PLAIN, Settings, Written
+
+LANGUAGE: spirv.Language = "metal"
+
+
+def stages_of(asset: Asset) -> dict[str, str]:
+    """The Metal text of every stage that relights an asset, by name: its method's for directional and point lights, and the last pass.
+
+    Raises InputError on an asset that no shader relights, MissingLibraryError without glslang and spirv-cross.
+    """
+    defines = counts(asset)
+    stem = "" if asset.method == "relighting-map" else asset.method.replace("-", "_") + "_"
+    names = ["fullscreen.vert", f"{stem}directional.frag", f"{stem}point.frag", "finish.frag"]
+    return {name: spirv.cross_compile(spirv.compile_stage(name, defines), LANGUAGE) for name in names}
+
+
+def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
+    """Fill an empty folder: the asset as EXRs, and its stages as `.metal` files, each with `main0`.
+
+    Raises what `stages_of` raises.
+    """
+    texts = stages_of(asset)
+    written = exr.write(asset, folder, settings)
+    for name, text in texts.items():
+        files.write_text(folder / f"{name.replace('.', '_')}.metal", text)
+    return Written((*written.notes, "Metal by spirv-cross: not compiled by Apple's compiler here"))

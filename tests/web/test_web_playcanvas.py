@@ -1,0 +1,33 @@
+"""PlayCanvas, in a browser: a material of an asset shows what numpy says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from web_assets import HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+
+from srbf.asset import Asset
+from srbf.methods import relight
+
+ALBEDO = (0.8, 0.5, 0.3)
+
+
+@pytest.mark.parametrize("kind", ["directional", "point", "several"])
+def test_a_material_shows_albedo_times_irradiance_over_pi(browser: Any, make_asset: Callable[..., Asset], kind: str) -> None:
+    """Receivers from the vertex stage, the mesh's second UV set with v downwards."""
+    asset = complete(on_a_plane(make_asset(k=7, encoding="half", ambient=True)))
+    job = {"asset": browser.serve(asset), "lights": LIGHTS[kind], "color": ALBEDO, "half": HALF_EXTENT}
+    shown = browser.picture("playcanvas-material", **job) * np.pi / ALBEDO
+    assert (np.abs(shown - relight(asset, LIGHTS[kind])) <= tolerance(asset, LIGHTS[kind])).all()
+
+
+def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, make_planes: Callable[..., Asset]) -> None:
+    asset = complete(make_planes(scalars=6, encoding="uint8"), quantity="radiance", source={"receiver": {"kind": "view"}})
+    job = {"lights": LIGHTS["several"], "color": ALBEDO, "half": HALF_EXTENT}
+    shown = browser.picture("playcanvas-material", asset=browser.serve(asset), **job)
+    assert (np.abs(shown - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
+    clustered = browser.serve(complete(make_planes(scalars=5, clusters=7)))
+    assert "found a clustered eigen map" in browser.answer("playcanvas-material", asset=clustered, **job)["error"]

@@ -1,0 +1,79 @@
+/** An asset in a Babylon.js scene: its textures, its lights, the materials that it lights. */
+import type { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";
+import type { Scene } from "@babylonjs/core/scene.js";
+import { type Asset, loadAsset, type LoadOptions } from "../asset";
+import { SrbfError } from "../errors";
+import { lampRoom, packedLamps } from "../lamp";
+import type { Light } from "../lights";
+import { columnMajor, type Matrix4, multiplied, Z_UP_FROM_Y_UP } from "../matrix";
+import { frameValues, needPositions } from "../shader";
+import { type PluginOptions, type SharedFrame, SrbfPlugin } from "./plugin";
+import { BabylonTextures } from "./textures";
+
+/** Blender's world from Babylon's left-handed one, as its glTF loader turns scenes: (x, y, z) to (-x, -z, y). */
+export const Z_UP_FROM_LEFT_HANDED: Matrix4 = [
+  [-1, 0, 0, 0],
+  [0, 0, -1, 0],
+  [0, 1, 0, 0],
+  [0, 0, 0, 1],
+];
+
+/** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+export class SrbfRelightingMap {
+  /** In the asset's world: Blender's, z up, metres. */
+  readonly lights: Light[] = [];
+  /** Blender's world from the scene's; where meshes of the asset were moved, with the inverse of that. */
+  worldFromScene: Matrix4;
+  readonly textures: BabylonTextures;
+  private readonly frame: SharedFrame;
+  private readonly plugins: SrbfPlugin[] = [];
+
+  /** @throws SrbfError on clustered eigen maps, which must be drawn into a lightmap first, and on block-compressed layers. */
+  constructor(
+    readonly asset: Asset,
+    scene: Scene,
+    options: { filter?: "linear" | "nearest" } = {},
+  ) {
+    if (asset.manifest.method === "clustered-eigen-map") {
+      throw new SrbfError("expected relighting maps or an eigen map for Babylon.js, found a clustered eigen map; fit another, or use srbf/three");
+    }
+    this.worldFromScene = scene.useRightHandedSystem ? Z_UP_FROM_Y_UP : Z_UP_FROM_LEFT_HANDED;
+    this.textures = new BabylonTextures(asset, scene, options.filter ?? "linear");
+    this.frame = { weights: new Float32Array(0), lamps: new Float32Array(16), lampCount: 0, room: 1, assetFromScene: new Float32Array(16) };
+    this.update();
+  }
+
+  /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
+  static async load(url: string, scene: Scene, options: { filter?: "linear" | "nearest" } & LoadOptions = {}): Promise<SrbfRelightingMap> {
+    return new SrbfRelightingMap(await loadAsset(url, options), scene, options);
+  }
+
+  /** Light `material` by this asset: irradiance in the place of its direct diffuse light, or radiance in that of all its light. */
+  apply(material: PBRMaterial, options: PluginOptions = {}): PBRMaterial {
+    const { source, transport } = this.asset.manifest;
+    const receivers = options.receivers ?? (source?.receiver?.kind === "view" ? "map" : "vertex");
+    if (receivers === "map") needPositions(this.asset, 1);
+    const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
+    const chosen = { uv: options.uv ?? "uv2", uvOrigin: options.uvOrigin ?? "top", receivers, direct } as const;
+    this.plugins.push(new SrbfPlugin(material, this.asset, this.textures, this.frame, chosen));
+    return material;
+  }
+
+  /** Bring the uniforms to the lights as they are now. */
+  update(): void {
+    const values = frameValues(this.asset, this.lights);
+    const room = lampRoom(values.lamps.length);
+    const changed = room !== this.frame.room;
+    this.frame.weights = values.weights;
+    this.frame.lamps = packedLamps(values.lamps, room);
+    this.frame.lampCount = values.lamps.length;
+    this.frame.room = room;
+    this.frame.assetFromScene = new Float32Array(columnMajor(multiplied(this.asset.assetFromWorld, this.worldFromScene)));
+    this.textures.weights?.update(values.weights);
+    if (changed) for (const plugin of this.plugins) plugin.markAllDefinesAsDirty();
+  }
+
+  dispose(): void {
+    this.textures.dispose();
+  }
+}

@@ -1,0 +1,108 @@
+/** An asset in a PlayCanvas scene: its textures, its lights, the materials that show it. */
+import { type GraphicsDevice, SEMANTIC_POSITION, SEMANTIC_TEXCOORD0, SEMANTIC_TEXCOORD1, ShaderMaterial } from "playcanvas";
+import { type Asset, loadAsset, type LoadOptions } from "../asset";
+import { SrbfError } from "../errors";
+import { lampRoom, packedLamps } from "../lamp";
+import type { Light } from "../lights";
+import { columnMajor, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
+import { frameValues, needPositions, paddedCenters } from "../shader";
+import { fragmentText, type ShaderOptions, vertexText } from "./shader";
+import { PlayCanvasTextures } from "./textures";
+
+export interface ShowOptions extends Partial<ShaderOptions> {
+  /** The UV set of the lightmap. */
+  channel?: 0 | 1;
+  /** Linear reflectance of the surface, for irradiance assets. */
+  albedo?: Triple;
+}
+
+interface Shown {
+  material: ShaderMaterial;
+  options: ShaderOptions & { channel: 0 | 1 };
+}
+
+/** An asset that PlayCanvas shows under WebGL2 by materials of its own. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+export class SrbfRelightingMap {
+  /** In the asset's world: Blender's, z up, metres. */
+  readonly lights: Light[] = [];
+  /** Blender's world from the scene's; where meshes of the asset were moved, with the inverse of that. */
+  worldFromScene: Matrix4 = Z_UP_FROM_Y_UP;
+  readonly textures: PlayCanvasTextures;
+  private readonly shown: Shown[] = [];
+  private room = 1;
+
+  /** @throws SrbfError on clustered eigen maps, which must be drawn into a lightmap first, and on block-compressed layers. */
+  constructor(
+    readonly asset: Asset,
+    device: GraphicsDevice,
+    options: { filter?: "linear" | "nearest" } = {},
+  ) {
+    if (asset.manifest.method === "clustered-eigen-map") {
+      throw new SrbfError("expected relighting maps or an eigen map for PlayCanvas, found a clustered eigen map; fit another, or use srbf/three");
+    }
+    this.textures = new PlayCanvasTextures(asset, device, options.filter ?? "linear");
+  }
+
+  /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
+  static async load(url: string, device: GraphicsDevice, options: { filter?: "linear" | "nearest" } & LoadOptions = {}): Promise<SrbfRelightingMap> {
+    return new SrbfRelightingMap(await loadAsset(url, options), device, options);
+  }
+
+  /** A material that shows this asset alone: none of the scene's lights, no fog, no skins; tone mapped and encoded as the camera asks. */
+  material(options: ShowOptions = {}): ShaderMaterial {
+    const kind = this.asset.manifest.source?.receiver?.kind;
+    const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
+    if (receivers === "map") needPositions(this.asset, 1);
+    const shown: Shown = {
+      material: new ShaderMaterial(),
+      options: { receivers, uvOrigin: options.uvOrigin ?? "top", channel: options.channel ?? 1 },
+    };
+    const { material } = shown;
+    for (const [name, texture] of Object.entries(this.textures.samplers)) material.setParameter(name, texture);
+    material.setParameter("srbfAlbedo", [...(options.albedo ?? [1, 1, 1])]);
+    material.setParameter("srbfScale[0]", this.asset.scale);
+    material.setParameter("srbfBias[0]", this.asset.bias);
+    if (this.asset.basis.kind === "gaussian") material.setParameter("srbfCenters[0]", paddedCenters(this.asset));
+    else material.setParameter("srbfTableSize", this.asset.basis.tableSize);
+    this.shown.push(shown);
+    this.compile(shown);
+    this.update();
+    return material;
+  }
+
+  /** Bring the materials to the lights as they are now. */
+  update(): void {
+    const values = frameValues(this.asset, this.lights);
+    const room = lampRoom(values.lamps.length);
+    if (room !== this.room) {
+      this.room = room;
+      for (const shown of this.shown) this.compile(shown);
+    }
+    const assetFromScene = new Float32Array(columnMajor(multiplied(this.asset.assetFromWorld, this.worldFromScene)));
+    if (this.textures.weights) {
+      (this.textures.weights.lock() as Float32Array).set(values.weights);
+      this.textures.weights.unlock();
+    }
+    for (const { material } of this.shown) {
+      if (this.asset.basis.kind === "gaussian") material.setParameter("srbfWeights[0]", values.weights);
+      material.setParameter("srbfLamps[0]", packedLamps(values.lamps, room));
+      material.setParameter("srbfLampCount", values.lamps.length);
+      material.setParameter("srbfAssetFromScene", assetFromScene);
+    }
+  }
+
+  dispose(): void {
+    this.textures.dispose();
+  }
+
+  private compile({ material, options }: Shown): void {
+    const { manifest, layers } = this.asset;
+    material.shaderDesc = {
+      uniqueName: `srbf ${manifest.method} ${manifest.quantity} ${layers.count} ${this.room} ${Object.values(options).join(" ")}`,
+      attributes: { aPosition: SEMANTIC_POSITION, aLightmapUv: options.channel === 0 ? SEMANTIC_TEXCOORD0 : SEMANTIC_TEXCOORD1 },
+      vertexGLSL: vertexText(options),
+      fragmentGLSL: fragmentText(this.asset, this.room, options),
+    };
+    material.update();
+  }
+}

@@ -1,0 +1,44 @@
+/** The shader of a PlayCanvas ShaderMaterial that shows an asset. */
+import type { Asset } from "../asset";
+import { shaderText } from "../shader";
+
+export interface ShaderOptions {
+  /** Where v is 0: `top` as glTF has it, `bottom` otherwise. */
+  uvOrigin: "top" | "bottom";
+  /** Where receivers are: `vertex`, as the mesh stands, or `map`, as the asset recorded it. */
+  receivers: "vertex" | "map";
+}
+
+export function vertexText({ uvOrigin }: ShaderOptions): string {
+  return `attribute vec3 aPosition;
+attribute vec2 aLightmapUv;
+uniform mat4 matrix_model;
+uniform mat4 matrix_viewProjection;
+uniform mat4 srbfAssetFromScene;
+varying vec2 vSrbfUv;
+varying vec3 vSrbfReceiver;
+void main(void) {
+    vec4 place = matrix_model * vec4(aPosition, 1.0);
+    vSrbfReceiver = (srbfAssetFromScene * place).xyz;
+    vSrbfUv = ${uvOrigin === "top" ? "aLightmapUv" : "vec2(aLightmapUv.x, 1.0 - aLightmapUv.y)"};
+    gl_Position = matrix_viewProjection * place;
+}`;
+}
+
+/** Outgoing light: albedo times irradiance over pi, or radiance. */
+export function fragmentText(asset: Asset, room: number, { receivers }: ShaderOptions): string {
+  // The engine reads the sizes of uniform arrays itself, and knows no products.
+  const mapped = "texelFetch(srbfPositions, ivec2(vSrbfUv * vec2(textureSize(srbfPositions, 0))), 0).xyz";
+  const light = `srbfRelitSurface(vSrbfUv, ${receivers === "map" ? mapped : "vSrbfReceiver"})`;
+  return `#include "gammaPS"
+#include "tonemappingPS"
+varying vec2 vSrbfUv;
+varying vec3 vSrbfReceiver;
+uniform vec3 srbfAlbedo;
+${receivers === "map" ? "uniform highp sampler2D srbfPositions;" : ""}
+${shaderText(asset, room).replaceAll("4 * SRBF_LAMPS", String(4 * room))}
+void main(void) {
+    vec3 outgoing = ${asset.manifest.quantity === "irradiance" ? `srbfAlbedo * ${light} * 0.3183098861837907` : light};
+    gl_FragColor = vec4(gammaCorrectOutput(toneMap(outgoing)), 1.0);
+}`;
+}
