@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import Annotated
 
 import typer
@@ -28,10 +29,15 @@ def view(
     server = ViewerServer(contents_of(asset, capture, mesh), port)
     try:
         typer.echo(server.url)
-        if browser and not webbrowser.open(server.url):
-            note("no browser was found: open the address yourself")
+        if browser:
+            Thread(target=_open, args=(server.url,), daemon=True).start()  # a browser in the terminal would not come back
         server.serve_forever(poll_interval=0.1)
     except KeyboardInterrupt:
         return
     finally:
         server.server_close()
+
+
+def _open(url: str) -> None:
+    if not webbrowser.open(url):
+        note("no browser was found: open the address yourself")

@@ -188,6 +188,12 @@ class Viewer {
     }
   }
 
+  /** Until `waiting` is counted down again the page is not at rest. */
+  private wait(): void {
+    ++this.waiting;
+    document.body.dataset.state = "busy";
+  }
+
   private play(seconds: number): void {
     const light = this.state.lights[this.state.selected];
     if (!light) return;
@@ -219,7 +225,7 @@ class Viewer {
     const sun = this.sun();
     element("status").dataset.rmse = "";
     if (this.state.compare === "off" || !references || !sun) {
-      this.compared = this.sky.marked = -1;
+      this.compared = this.wanted = this.sky.marked = -1;
       if (this.state.compare !== "off") say("comparing needs a sun: add one", "hint");
       return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
     }
@@ -249,7 +255,7 @@ class Viewer {
     const { references } = this.loaded;
     if (!references || index === this.wanted) return;
     this.wanted = index;
-    ++this.waiting;
+    this.wait();
     references
       .image(index)
       .then((image) => {
@@ -282,6 +288,7 @@ class Viewer {
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
+    (split.querySelector("i") as HTMLElement).ariaValueNow = String(Math.round(100 * state.split));
     this.status();
   }
 
@@ -329,9 +336,9 @@ class Viewer {
 
   private status(): void {
     const { asset, facts, references } = this.loaded;
-    const pace = [...this.paces].sort((a, b) => a - b)[this.paces.length >> 1] ?? 0;
+    const pace = this.paces.length < PACES ? "–" : [...this.paces].sort((a, b) => a - b)[PACES >> 1].toFixed(1);
     const parts = [
-      `<b>${pace.toFixed(1)}</b> ms a frame`,
+      `<b>${pace}</b> ms a frame`,
       `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU`,
     ];
     if (this.compared >= 0 && references) {
@@ -461,7 +468,7 @@ class Viewer {
 
   /** A dropped sky; the first takes the suns' place. */
   private async environment(file: File): Promise<void> {
-    ++this.waiting;
+    this.wait();
     try {
       this.environments.set(file.name, await readEnvironment(file));
       const { lights } = this.state;
