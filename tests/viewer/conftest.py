@@ -24,7 +24,8 @@ import pytest
 from filelock import FileLock
 
 from srbf.viewer.built_page import FILES, ROOT
-from srbf.viewer.server import ViewerServer, contents_of
+from srbf.viewer.contents import contents_of
+from srbf.viewer.server import ViewerServer
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path.append(str(TESTS / "web"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -258,3 +259,24 @@ def test_a_damaged_asset_is_said_in_one_line(
     assert victim.name in text
     assert "404" in text
     assert "\n" not in text
+
+
+def test_one_file_shows_the_same_from_the_disk(chromium: Any, asset: Asset, built: Path, tmp_path: Path) -> None:
+    asset.save(tmp_path / "asset")
+    page = tmp_path / "room & hall.html"
+    done = CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(page)])
+    assert done.exit_code == 0, done.output
+    assert CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(page)]).exit_code == 1, "it is not written over"
+    shutil.rmtree(tmp_path / "asset")
+    chromium("open", url=page.as_uri() + PICTURE + "}", width=WIDTH, height=HEIGHT)
+    assert shows(chromium, asset, [DirectionalLight((-0.45, -0.5, 0.74))])
+
+
+def test_one_file_holds_its_mesh(chromium: Any, built: Path, make_asset: Callable[..., Asset], tmp_path: Path) -> None:
+    asset = complete(on_a_plane(make_asset(k=3)), source={"receiver": {"kind": "lightmap", "object": "Table"}})
+    asset.save(tmp_path / "asset")
+    page = tmp_path / "page.html"
+    assert CliRunner().invoke(app, ["view", str(tmp_path / "asset"), "--save", str(page)]).exit_code == 0
+    chromium("open", url=page.as_uri(), width=WIDTH, height=HEIGHT)
+    assert chromium.state()["view"] == "mesh"
+    assert np.ptp(chromium.canvas()[150:400]) > 100

@@ -22,7 +22,8 @@ from srbf.capture import Capture
 from srbf.errors import ImageError, InputError, ManifestError, MissingLibraryError
 from srbf.image import read_image
 from srbf.viewer import built_page
-from srbf.viewer.server import ViewerServer, contents_of
+from srbf.viewer.contents import contents_of
+from srbf.viewer.server import ViewerServer
 
 
 def ask(url: str, path: str, method: str = "GET", host: str | None = None) -> tuple[int, bytes]:

@@ -32,7 +32,8 @@ const commands = {
     page.on("console", (message) => said.push(`${message.type()}: ${message.text()}`));
     page.on("pageerror", (error) => said.push(`error: ${error}`));
     page.on("request", (request) => {
-      if (!request.url().startsWith(new URL(url).origin) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
+      const home = new URL(url).protocol === "file:" ? url.split("#")[0] : new URL(url).origin;
+      if (!request.url().startsWith(home) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
     });
     await page.goto(url);
     await settled();
