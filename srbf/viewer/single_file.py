@@ -9,28 +9,33 @@ import re
 from srbf.viewer.contents import Content, read
 
 PAGE = ("", "index.html", "viewer.js", "viewer.css")
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; font-src data:; img-src blob: data:; connect-src blob: data:"
-FETCH = """
-const held = JSON.parse(document.getElementById("held").textContent);
-const elsewhere = globalThis.fetch.bind(globalThis);
-globalThis.fetch = (resource, options) => {
-  const url = new URL(typeof resource === "string" ? resource : resource.url ?? resource, document.baseURI);
-  const name = Object.keys(held).find((key) => url.pathname.endsWith("/" + key));
-  if (name === undefined || !/^(file|https?):$/.test(url.protocol)) return elsewhere(resource, options);
-  return Promise.resolve(new Response(Uint8Array.from(atob(held[name]), (c) => c.charCodeAt(0))));
-};
-"""
+POLICY = "; ".join(
+    ("default-src 'none'", "script-src 'unsafe-inline'", "style-src 'unsafe-inline'", "font-src data:", "img-src blob: data:")
+    + ("connect-src blob: data:",)
+)
+FETCH = """{
+  const held = JSON.parse(document.getElementById("held").textContent);
+  const elsewhere = globalThis.fetch.bind(globalThis);
+  const home = decodeURIComponent(new URL(".", document.baseURI).pathname);
+  globalThis.fetch = (resource, options) => {
+    const url = new URL(resource.url ?? resource, document.baseURI);
+    const name = decodeURIComponent(url.pathname).slice(home.length);
+    if (!/^(file|https?):$/.test(url.protocol) || !Object.hasOwn(held, name)) return elsewhere(resource, options);
+    return Promise.resolve(new Response(Uint8Array.from(atob(held[name]), (c) => c.charCodeAt(0))));
+  };
+}"""
 
 
 def single_file(contents: dict[str, Content]) -> str:
     """HTML of `contents_of` an asset; a capture's images are left out, as many as there are."""
     kept = {name: content for name, content in contents.items() if name not in PAGE}
     held = {name: base64.b64encode(read(content)).decode("ascii") for name, content in kept.items()}
+    names = json.dumps(held).replace("<", r"\u003c")  # none of them ends the script
     script, style = (read(contents[name]).decode("utf-8") for name in ("viewer.js", "viewer.css"))
     parts = [
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}" />',
         f"<style>{style}</style>",
-        f'<script type="application/json" id="held">{json.dumps(held)}</script>',
+        f'<script type="application/json" id="held">{names}</script>',
         f"<script>{FETCH}</script>",
         '<script type="module">' + re.sub(r"</(?=script)", r"<\\/", script, flags=re.IGNORECASE) + "</script>",
     ]
