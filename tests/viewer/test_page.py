@@ -165,6 +165,17 @@ def test_a_saved_path_is_a_round(chromium: Any, asset: Asset, url: str, tmp_path
     assert np.degrees(np.diff(azimuths)) == pytest.approx(np.full(47, 7.5), abs=0.01)
 
 
+def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url: str, tmp_path: Path) -> None:
+    """In the plane of the sun's azimuth, 75 degrees to either side, from where the sun stands."""
+    chromium("open", url=url + "#{'path':'swing','seconds':3}", width=WIDTH, height=HEIGHT)
+    directions = np.array([light.direction for (light,) in lights_of(chromium, tmp_path, "Path (FRAMES.json)")])  # type: ignore[union-attr]
+    start = np.array([-0.45, -0.5, 0.74]) / np.linalg.norm([-0.45, -0.5, 0.74])
+    assert directions[0] == pytest.approx(start, abs=1e-4)
+    assert directions @ np.cross(start, [0, 0, 1]) == pytest.approx(np.zeros(72), abs=1e-4)
+    tilt = np.degrees(np.arctan2(directions @ [start[0], start[1], 0] / np.hypot(start[0], start[1]), directions[:, 2]))
+    assert (tilt.max(), tilt.min()) == pytest.approx((75, -75), abs=0.2)
+
+
 @pytest.mark.parametrize("suffix", ["exr", "png", "hdr"])
 def test_an_environment_dropped_on_the_page_lights_it(chromium: Any, asset: Asset, url: str, tmp_path: Path, suffix: str) -> None:
     sky = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)

@@ -15,6 +15,7 @@ from web_assets import complete, on_a_plane
 
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.export.gltf import model
 from srbf.image import read_image
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
@@ -99,6 +100,24 @@ def test_a_lightmap_is_shown_on_its_mesh(chromium: Any, lightmap: Asset, serve: 
     turned = np.array(chromium.state()["eye"][0])
     assert np.linalg.norm(turned - eye) > 0.2
     assert np.linalg.norm(turned - target) == pytest.approx(np.linalg.norm(eye - target), rel=1e-3)
+
+
+def test_a_mesh_of_one_s_own_is_shown(chromium: Any, lightmap: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    """Half of the plane, with the same texels on it: what the file leaves out is not there."""
+    half = replace(lightmap, images={**lightmap.images, "coverage": lightmap.images["coverage"].copy()})
+    half.images["coverage"][:, 30:] = 0
+    (tmp_path / "half.glb").write_bytes(model(half))
+    lightmap.save(tmp_path / "asset")
+    eye, target = np.array([0.8, -3.6, 3.8]), np.array([0.1, 0.0, 0.2])
+    where = f"#{{'eye':[{eye.tolist()},{target.tolist()}],'exposure':-1.5}}"
+    chromium("open", url=serve(tmp_path / "asset", None, tmp_path / "half.glb") + where, width=WIDTH, height=HEIGHT)
+    (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
+    shown = read_image(tmp_path / "saved.png", 3) * 255
+    expected = shown_as(relight(lightmap, [DirectionalLight((-0.45, -0.5, 0.74))]), -1.5)
+    for row, column, there in ((12, 9, True), (33, 22, True), (20, 40, False), (8, 52, False)):
+        x, y = orbit_pixel(lightmap.images["position"][row, column], eye, target)
+        seen = shown[int(y), int(x)]
+        assert np.abs(seen - (expected[row, column] if there else [15, 17, 20])).max() <= 3, (row, column)
 
 
 @pytest.fixture

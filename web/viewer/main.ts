@@ -76,7 +76,8 @@ class Viewer {
     const { width, height } = asset.manifest;
     this.stage = new Stage(this.renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, changed);
     const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : asset.basis.functions.centers;
-    const points: readonly SkyPoint[] = references?.lights ?? centers.map((direction): SkyPoint => ({ direction, role: "center" }));
+    const seen = centers.filter((direction) => asset.manifest.domain === "sphere" || direction[2] > 0); // light functions reach past the horizon
+    const points: readonly SkyPoint[] = references?.lights ?? seen.map((direction): SkyPoint => ({ direction, role: "center" }));
     this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, points, changed);
     this.panel = new Panel(
       element("chips"),
