@@ -50,15 +50,24 @@ export async function threeMaterial(job: Job) {
   }
   const size = (job.size as [number, number]) ?? [width, height];
   const target = new THREE.WebGLRenderTarget(size[0], size[1], { type: job.target === "half" ? THREE.HalfFloatType : THREE.FloatType });
-  shared().setRenderTarget(target);
-  shared().render(scene, facingCamera(job));
-  shared().setRenderTarget(null);
-  const pixels = read(target, size[0], size[1]);
+  const frame = () => {
+    shared().setRenderTarget(target);
+    shared().render(scene, facingCamera(job));
+    shared().setRenderTarget(null);
+    return picture(size[0], size[1], upsideDown(read(target, size[0], size[1]), size[1])); // the framebuffer's row 0 is at the bottom
+  };
+  const first = frame();
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(shared());
+    return frame();
+  });
   target.dispose();
   material.dispose();
   mesh.geometry.dispose();
   map.dispose();
-  return picture(size[0], size[1], upsideDown(pixels, size[1])); // the framebuffer's row 0 is at the bottom
+  material.lightMap?.dispose();
+  return { ...first, pictures, textures: shared().info.memory.textures, programs: shared().info.programs?.length };
 }
 
 function read(target: THREE.WebGLRenderTarget, width: number, height: number): Float32Array {
