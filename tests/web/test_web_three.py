@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, decoded, on_a_plane, tolerance
 
 from srbf.asset import Asset
 from srbf.containers import read_texture_array
@@ -167,6 +167,22 @@ def test_a_mesh_far_away_shows_the_file_s_own_mip_level(browser: Any, make_asset
     bound = 2 / 256 * np.abs(exported.coefficients()).sum(axis=0).max()  # the filter's fractions have 8 bits
     assert np.abs(shown - relight(half, LIGHTS["directional"])).max() < bound
     assert np.abs(shown - relight(exported, LIGHTS["directional"])[::2, ::2]).max() > 10 * bound
+
+
+def test_a_gltf_export_loads_and_is_lit_by_the_asset_that_it_names(browser: Any, make_asset: Callable[..., Asset]) -> None:
+    """Its mesh reaches from the first texel's centre to the last one's, so the pixels at the edge are not all its own."""
+    asset = complete(on_a_plane(make_asset(k=7, encoding="half")), source={"receiver": {"kind": "lightmap", "object": "Plate"}})
+    asset.images["coverage"][:] = 1
+    asset.images["normal"] = np.broadcast_to(np.float32([0, 0, 1]), asset.images["position"].shape).copy()
+    asset.manifest["normal"] = "normal.exr"
+    url = browser.place(lambda folder: export(asset, "gltf", folder, Settings(encoding="half")))
+    answer = browser.answer("three-gltf", asset=url, lights=LIGHTS["several"], half=HALF_EXTENT)
+    assert "error" not in answer, answer
+    assert all(width for width in answer["fallback"]), "a viewer that does not know the extension shows a picture"
+    inner = (slice(1, -1), slice(1, -1))
+    exported = Asset.open(browser.folder(url))
+    error = np.abs(decoded(answer) * np.pi - relight(exported, LIGHTS["several"]))
+    assert (error <= tolerance(exported, LIGHTS["several"]))[inner].all()
 
 
 @pytest.mark.parametrize(
