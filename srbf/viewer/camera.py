@@ -23,7 +23,7 @@ class FittedCamera:
     """A pinhole camera: `position` (m), `rotation` whose rows are its right, down and forward axes, and `lens`, upper triangular with
     lens[2, 2] = 1, which takes camera coordinates to (u, v, 1) times depth; u right and v down, 0 to 1 over the picture."""
 
-    position: Float64[ndarray, "3"]
+    position: Float64[ndarray, 3]
     rotation: Float64[ndarray, "3 3"]
     lens: Float64[ndarray, "3 3"]
     rms: float  # pixels
@@ -76,7 +76,7 @@ def _error(
     return np.where(np.isfinite(error), error, np.inf)
 
 
-def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, "3"], size: float, rms: float) -> FittedCamera | None:
+def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, 3], size: float, rms: float) -> FittedCamera | None:
     turn = matrix[:, :3]
     if abs(np.linalg.det(turn)) < 1e-9:  # an orthographic camera: it is nowhere
         return None
