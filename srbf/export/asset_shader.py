@@ -25,7 +25,7 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, vec4 weights[SRB
     return srbfRelightDirectional(layers, uv, 0, weights, srbfScale, srbfBias);
 }
 
-/* One point or spot light of this asset; table is r_table.exr. */
+/* One point or spot light of this asset; table is r_table.exr, or pairs of it where SRBF_PAIRS is defined. */
 vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
     return srbfRelightPoint(layers, uv, 0, table, srbfCenters, srbfScale, srbfBias, receiver, lamp);
 }
@@ -91,13 +91,16 @@ class AssetShader:
         return self.files[-1]
 
 
-def counts(asset: Asset) -> dict[str, int]:
-    """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights."""
+def counts(asset: Asset, pairs: bool = False) -> dict[str, int]:
+    """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights.
+
+    `pairs`: relighting maps find the R table as values and differences, one fetch in place of two.
+    """
     if asset.method not in _FUNCTIONS:
         raise InputError(f"expected an asset of {', '.join(_FUNCTIONS)}, found {asset.method}: no shader relights it")
     plain = {"SRBF_PLAIN": 1} if _is_plain(asset) else {}
     if asset.method == "relighting-map":
-        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS} | plain
+        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS} | plain | ({"SRBF_PAIRS": 1} if pairs else {})
     size = asset.manifest["w_table"]["size"]
     return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS} | plain
 
@@ -108,9 +111,8 @@ def _is_plain(asset: Asset) -> bool:
     return bool(((asset.scale == 1) | unused).all() and not asset.bias.any() and not asset.stored.transpose(0, 3, 1, 2)[unused].any())
 
 
-def asset_shader(asset: Asset, prepare: Callable[[str, str], str] = lambda text, path: text) -> AssetShader:
-    """The shader of one asset, its files by `pack_files`; InputError on functions that no shader knows."""
-    defines = counts(asset)
+def asset_shader(asset: Asset, defines: dict[str, int], prepare: Callable[[str, str], str]) -> AssetShader:
+    """The shader of one asset with its `counts`, its files by `pack_files`."""
     stem = asset.method.replace("-", "_")
     needed = [f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl", "combine/mip_level.glsl"]
     files = [*pack_files(needed, None, prepare), parse(_FUNCTIONS[asset.method], "asset")]

@@ -11,6 +11,8 @@ from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.dialect import WIDTH, Writer, guarded, wrapped
+from srbf.export.preprocessing import preprocess
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     MATRICES,
@@ -24,11 +26,8 @@ from srbf.export.translation import (
     Parameter,
     Struct,
     Token,
-    Writer,
-    guarded,
     is_sign,
     pack_files,
-    preprocess,
     render_plain,
     significant,
     split,
@@ -77,14 +76,16 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
     return "\n".join([HEADING, PRELUDE, *(guarded(file, writer.file(file)) for file in pack)])
 
 
-def asset_include(asset: Asset) -> str:
+def asset_include(asset: Asset, pairs: bool = False) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader. With `pairs`
+    relighting maps take `srbf.gl.textures.pairs_of` their R table in its place.
 
     Raises InputError on an asset that no shader relights.
     """
-    known = set(counts(asset))
-    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
+    defined = counts(asset, pairs)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, "#define {} {}".format))
     writer = HlslWriter(shader.files)
     defines = "\n".join(f"#define {name} {value}" for name, value in shader.defines.items())
     arrays = "\n".join(
@@ -123,9 +124,10 @@ class HlslWriter(Writer):
     def struct(self, item: Struct) -> str:
         """The struct, and a function that makes one: HLSL has no constructors of structs."""
         members = [_declared(part) for part in split(item.body.inside, ";") if significant(part)]
-        parameters = ", ".join(f"{self.type(kind)} {self.name(name)}" for kind, name in members)
+        head = f"{item.name} {_maker(item.name)}("
+        parameters = wrapped([f"{self.type(kind)} {self.name(name)}" for kind, name in members], len(head), WIDTH)
         lines = [f"    {item.name} made;", *(f"    made.{self.name(name)} = {self.name(name)};" for _, name in members), "    return made;"]
-        return super().struct(item) + f"\n\n{item.name} {_maker(item.name)}({parameters}) {{\n" + "\n".join(lines) + "\n}"
+        return super().struct(item) + f"\n\n{head}{parameters}) {{\n" + "\n".join(lines) + "\n}"
 
     def body(self, function: Function) -> str:
         matrices = frozenset(parameter.name for parameter in function.parameters if parameter.type in MATRICES)

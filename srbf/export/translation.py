@@ -1,4 +1,4 @@
-"""The shader pack taken apart: its small GLSL as functions, constants, structs and comments, and what every dialect's writer shares.
+"""The shader pack taken apart: its small GLSL as functions, constants, structs and comments, for the dialects' writers.
 
 A translation keeps names, comments and lines, so that what ships can be read beside the pack. It knows no list of files: whatever the
 pack holds is translated, and GLSL that a dialect has no word for is refused by name.
@@ -7,9 +7,8 @@ pack holds is translated, and GLSL that a dialect has no word for is refused by 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from srbf.errors import ShaderError
@@ -21,14 +20,13 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z_]\w*)|(?P<sign>\+\+|--|[-+*/%&|^<>=!]=|&&|\|\||.)",
     re.MULTILINE | re.DOTALL,
 )
-_CLOSING = {"(": ")", "[": "]", "{": "}"}
+CLOSING = {"(": ")", "[": "]", "{": "}"}
 PRECISIONS = frozenset({"highp", "mediump", "lowp"})
 SAMPLERS = frozenset({"sampler2D", "sampler2DArray"})
 SCALARS = frozenset({"void", "float", "int", "uint", "bool"})
 VECTORS = frozenset(f"{kind}vec{n}" for kind in ("", "i", "u", "b") for n in (2, 3, 4))
 MATRICES = frozenset({"mat2", "mat3", "mat4"})
 ASSIGNMENTS = frozenset({"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="})
-WIDTH = 140  # of a line of the pack
 SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
 # What no dialect has a word for, or another meaning: the pack does without.
 UNTRANSLATABLE = frozenset(
@@ -162,45 +160,6 @@ def parse(text: str, path: str) -> PackFile:
     return PackFile(path, tuple(items))
 
 
-def preprocess(text: str, path: str, known: set[str], define: Callable[[str, str], str]) -> str:
-    """A file's text with its conditions taken; a `#define` becomes what `define` (name, value) says, and is `known` from there on.
-
-    Raises ShaderError on `#error`, with its words, and on conditions past `#ifdef`, `#ifndef` and `#elif defined(...)`.
-    """
-    lines: list[str] = []
-    taken: list[str] = []  # of every open condition: yes, not yet, or no more
-    for line in text.splitlines():
-        match = re.match(r"\s*#\s*(\w+)\s*(.*?)\s*(?://.*)?$", line)
-        word, rest = (match[1], match[2]) if match else ("", "")
-        if word in ("ifndef", "ifdef"):
-            taken.append("yes" if (rest in known) == (word == "ifdef") else "not yet")
-        elif word in ("elif", "else"):
-            holds = word == "else" or _defined(rest, path) in known
-            taken[-1] = "yes" if taken[-1] == "not yet" and holds else "not yet" if taken[-1] == "not yet" else "no more"
-        elif word == "endif":
-            taken.pop()
-        elif any(state != "yes" for state in taken):
-            continue
-        elif word in ("", "include"):
-            lines.append(line)
-        elif word == "error":
-            raise ShaderError(f"{path}: {rest}")
-        else:
-            name, _, value = rest.partition(" ")
-            if word != "define" or "(" in name or not value:
-                raise ShaderError(f"{path}: expected #ifdef, #ifndef, #elif, #error or the #define of a number, found {line.strip()!r}")
-            known.add(name)
-            lines.append(define(name, value.strip()))
-    return "\n".join([*lines, ""])
-
-
-def _defined(condition: str, path: str) -> str:
-    match = re.fullmatch(r"defined\s*\(?\s*(\w+)\s*\)?", condition)
-    if match is None:
-        raise ShaderError(f"{path}: expected #elif defined(NAME), found #elif {condition}")
-    return match[1]
-
-
 def tokens(text: str) -> list[Token]:
     """GLSL as words; joined again they are the text."""
     return [Token(str(match.lastgroup), match[0]) for match in _TOKEN.finditer(text)]
@@ -233,15 +192,15 @@ def is_group(node: Node | None, opening: str) -> bool:
 def render_plain(nodes: Sequence[Node]) -> str:
     """The GLSL that the nodes were read from."""
     return "".join(
-        node.text if isinstance(node, Token) else node.opening + render_plain(node.inside) + _CLOSING[node.opening] for node in nodes
+        node.text if isinstance(node, Token) else node.opening + render_plain(node.inside) + CLOSING[node.opening] for node in nodes
     )
 
 
 def _grouped(source: Iterator[Token], closing: str | None, path: str) -> Iterator[Node]:
     for token in source:
-        if token.kind == "sign" and token.text in _CLOSING:
-            yield Group(token.text, tuple(_grouped(source, _CLOSING[token.text], path)))
-        elif token.kind == "sign" and token.text in _CLOSING.values():
+        if token.kind == "sign" and token.text in CLOSING:
+            yield Group(token.text, tuple(_grouped(source, CLOSING[token.text], path)))
+        elif token.kind == "sign" and token.text in CLOSING.values():
             if token.text != closing:
                 raise ShaderError(f"{path}: expected brackets in pairs, found {token.text!r} where {closing!r} was open")
             return
@@ -282,138 +241,3 @@ def _parameter(nodes: Sequence[Node], path: str) -> Parameter:
         raise ShaderError(f"{path}: expected a parameter as type and name, found {render_plain(nodes).strip()!r}")
     size = render_plain(words[2].inside) if len(words) == 3 and isinstance(words[2], Group) else None
     return Parameter(words[0].text, words[1].text, size, out)
-
-
-@dataclass
-class Writer:
-    """Writes parsed GLSL in another dialect: the base of every dialect, which says its own words in the methods below.
-
-    A texture that is filtered somewhere down the calls travels with its sampler, `nameSampler`; one that is only fetched goes alone.
-    """
-
-    files: list[PackFile]
-    types: Mapping[str, str] = field(default_factory=dict)
-    words: Mapping[str, str] = field(default_factory=dict)  # functions of other names
-    reserved: frozenset[str] = frozenset()
-
-    @cached_property
-    def functions(self) -> dict[str, Function]:
-        return {function.name: function for file in self.files for function in file.functions}
-
-    @cached_property
-    def structs(self) -> frozenset[str]:
-        return frozenset(item.name for file in self.files for item in file.items if isinstance(item, Struct))
-
-    @cached_property
-    def sampled(self) -> frozenset[tuple[str, str]]:
-        """(function, parameter) of every texture that is filtered there or further down."""
-        found: set[tuple[str, str]] = set()
-        for function in self.functions.values():  # callees come first
-            names = {parameter.name for parameter in function.parameters if parameter.type in SAMPLERS}
-            for callee, arguments in _calls(function.body.inside):
-                for i, argument in enumerate(arguments):
-                    name = render_plain(argument).strip()
-                    target = self.functions.get(callee)
-                    further = target is not None and i < len(target.parameters) and (callee, target.parameters[i].name) in found
-                    if name in names and ((callee in SAMPLED_BY and i == 0) or further):
-                        found.add((function.name, name))
-        return frozenset(found)
-
-    def file(self, file: PackFile) -> str:
-        """One file in this dialect, its header's `use` in this dialect's own words."""
-        text = re.sub(r"\n{3,}", "\n\n", "".join(self.item(item) for item in file.items))
-        uses = "\n".join(self.signature(function, 11) for function in file.functions).replace("\n", "\n           ")
-        return re.sub(r"(?<=\n   use:    ).+?(?=\n   domain:)", lambda _: uses, text, count=1, flags=re.DOTALL)
-
-    def item(self, item: Item) -> str:
-        if isinstance(item, Token):
-            return self.directive(item.text) if item.kind == "directive" else item.text
-        if isinstance(item, Struct):
-            return self.struct(item)
-        if isinstance(item, Constant):
-            return self.constant(item)
-        return self.signature(item) + " {" + self.body(item) + "}"
-
-    def directive(self, text: str) -> str:
-        return text
-
-    def struct(self, item: Struct) -> str:
-        return f"struct {item.name} {{{self.expression(item.body.inside)}}};"
-
-    def constant(self, item: Constant) -> str:
-        raise NotImplementedError
-
-    def signature(self, item: Function, indent: int = 0) -> str:
-        """`type name(parameters)`, a line broken where the pack's own limit asks for it."""
-        head = f"{self.type(item.type)} {item.name}("
-        parameters = [text for parameter in item.parameters for text in self.parameter(item, parameter)]
-        return head + wrapped(parameters, len(head), WIDTH - indent) + ")"
-
-    def parameter(self, function: Function, parameter: Parameter) -> list[str]:
-        raise NotImplementedError
-
-    def body(self, function: Function) -> str:
-        return self.expression(function.body.inside)
-
-    def type(self, name: str) -> str:
-        return self.types.get(name, name)
-
-    def name(self, text: str) -> str:
-        return text + "_" if text in self.reserved else text
-
-    def expression(self, nodes: Sequence[Node]) -> str:
-        """Nodes in a row, calls by their rules."""
-        out: list[str] = []
-        i = 0
-        while i < len(nodes):
-            node = nodes[i]
-            if isinstance(node, Group):
-                out.append(node.opening + self.expression(node.inside) + _CLOSING[node.opening])
-            elif node.kind == "name" and not (out and out[-1] == "."):
-                following = nodes[i + 1] if i + 1 < len(nodes) else None
-                if isinstance(following, Group) and following.opening == "(" and node.text not in ("if", "for", "return"):
-                    out.append(self.call(node.text, [self.expression(part) for part in split(following.inside, ",")]))
-                    i += 1
-                elif node.text in PRECISIONS:
-                    i += 1  # with the space after it
-                else:
-                    out.append(self.type(node.text) if node.text in self.types else self.name(node.text))
-            else:
-                out.append(node.text)
-            i += 1
-        return "".join(out)
-
-    def call(self, name: str, arguments: list[str]) -> str:
-        """A call whose arguments are already in this dialect, with the spaces that they had."""
-        target = self.functions.get(name)
-        if target is not None:
-            pairs = zip(target.parameters, arguments, strict=True)
-            arguments = [text + f", {text.strip()}Sampler" * ((name, p.name) in self.sampled) for p, text in pairs]
-        return f"{self.types.get(name) or self.words.get(name, name)}({','.join(arguments)})"
-
-
-def wrapped(parts: Sequence[str], column: int, width: int) -> str:
-    """Parts with commas, on as many lines as it takes, each at `column`."""
-    lines: list[str] = []
-    for part in parts:
-        if lines and column + len(lines[-1]) + len(part) + 3 <= width:
-            lines[-1] += ", " + part
-        else:
-            lines.append(part)
-    return (",\n" + " " * column).join(lines)
-
-
-def guarded(file: PackFile, text: str) -> str:
-    """A translated file between include guards, its first line saying where it is from."""
-    guard = "SRBF_" + re.sub(r"\W", "_", file.path.removesuffix(".glsl")).upper()
-    body = text.replace("// SPDX-License-Identifier: MIT\n", "", 1).strip()  # the whole include says it once
-    return f"#ifndef {guard}\n#define {guard}\n// from glsl/{file.path}\n{body}\n#endif\n"
-
-
-def _calls(nodes: Sequence[Node]) -> Iterator[tuple[str, list[list[Node]]]]:
-    for i, node in enumerate(nodes):
-        if isinstance(node, Group):
-            before = nodes[i - 1] if i else None
-            if node.opening == "(" and isinstance(before, Token) and before.kind == "name":
-                yield before.text, split(node.inside, ",")
-            yield from _calls(node.inside)

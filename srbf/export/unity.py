@@ -47,7 +47,7 @@ def unity_include(asset: Asset) -> str:
     radiance = asset.quantity == "radiance"
     defines = [
         f"#define SRBF_UNITY_SCALE {math.pi if radiance else 1.0}  // {'radiance' if radiance else 'irradiance'} in Unity's units",
-        f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)  // radiance has it' if radiance else '(albedo)'}",
+        f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)' if radiance else '(albedo)'}",
         *(["#define SRBF_CLUSTERED"] if asset.method == "clustered-eigen-map" else []),
     ]
-    return asset_include(asset) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'
+    return asset_include(asset, pairs=True) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'

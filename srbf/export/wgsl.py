@@ -11,13 +11,14 @@ from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, counts, rows_of
+from srbf.export.dialect import WIDTH, Writer, wrapped
+from srbf.export.preprocessing import preprocess
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
     ASSIGNMENTS,
     SAMPLERS,
     SCALARS,
     VECTORS,
-    WIDTH,
     Constant,
     Function,
     Group,
@@ -26,15 +27,12 @@ from srbf.export.translation import (
     Parameter,
     Struct,
     Token,
-    Writer,
     is_group,
     is_sign,
     pack_files,
-    preprocess,
     render_plain,
     significant,
     split,
-    wrapped,
 )
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
@@ -70,8 +68,9 @@ def asset_module(asset: Asset) -> str:
     """Everything that a WGSL shader needs to relight one asset: its numbers, the pack's functions that it needs, and
     `srbfAssetDirectional`, `srbfAssetPoint`. InputError on an asset that no shader relights.
     """
-    known = set(counts(asset))
-    shader = asset_shader(asset, lambda text, path: preprocess(text, path, known, constant_of))
+    defined = counts(asset)
+    known = set(defined)
+    shader = asset_shader(asset, defined, lambda text, path: preprocess(text, path, known, constant_of))
     arrays = "\n".join(
         f"const {name} = array<vec4f, {count}>(\n{rows_of(values, 'vec4f({})'.format)},\n);"
         for name, (count, values) in shader.arrays.items()

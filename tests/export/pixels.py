@@ -11,12 +11,15 @@ import numpy as np
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.basis.octahedral_table import lookup
 from srbf.export import spirv
 from srbf.gl.context import create_context
 from srbf.gl.textures import AssetTextures, Limits
 from srbf.gl.uniforms import lamp_uniforms, padded
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation
+from srbf.methods.relighting_map import basis_weights
 from srbf.receivers import light_vectors
+from srbf.scalar_planes import first_function, planes_of
 
 FLOAT = 1e-5  # the contract, of the sum of the terms' magnitudes
 
@@ -48,17 +51,28 @@ def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
 
 
 def magnitude(asset: Asset, light: Light) -> np.ndarray:
-    """The sum of the magnitudes of a picture's terms, (H, W, 3): what the tolerance is relative to; of planes an upper bound of it."""
-    layers = np.abs(asset.coefficients())
+    """The sum of the magnitudes of a picture's terms, decoding included, (H, W, 3): what the tolerance is relative to."""
+    bias = asset.bias[:, None, None]
+    layers = np.abs(asset.coefficients() - bias) + np.abs(bias)  # (N, H, W, C)
+    lamp = isinstance(light, PointLight)
+    color = np.broadcast_to(np.array(light.color), (asset.height, asset.width, 3))
     if isinstance(light, PointLight):
-        _, strength = light_vectors(light, asset.images["position"])
+        unit, _ = light_vectors(light, asset.images["position"])
         reach = attenuation(np.linalg.norm(np.array(light.position) - asset.images["position"], axis=-1), light)
-        color = reach[..., None] * np.array(light.color)
-    else:
-        color = np.broadcast_to(light.color, (asset.height, asset.width, 3))
+        color = color * reach[..., None]  # without the cone, whose own rounding is relative to 1
     if asset.method == "relighting-map":
-        return layers.sum(axis=0) * color  # R is at most 1
-    return (1 + layers.sum(axis=(0, 3)))[..., None] * np.abs(asset.tables["w_table"].astype(np.float32)).max() * color
+        if lamp:
+            return np.einsum("khwc,hwk->hwc", layers, basis_weights(asset, unit)) * color
+        return np.einsum("khwc,kc->hwc", layers, np.abs(methods.folded_weights(asset, [light])))
+    first, entry = first_function(asset, slice(None)), asset.manifest["w_table"]
+    table = np.abs(asset.tables["w_table"].astype(np.float32))
+    weights = np.abs(methods.folded_weights(asset, [light]))
+
+    def function(j: int) -> np.ndarray:
+        return lookup(table, entry["size"], entry["columns"], first + j, unit) * color if lamp else weights[first + j]
+
+    planes = planes_of(layers, asset.scalars)
+    return function(0) + sum(plane[..., None] * function(j) for j, plane in enumerate(planes, start=1))
 
 
 def run(fragment: str, asset: Asset, images: dict[str, np.ndarray], uniforms: dict[str, Any]) -> np.ndarray:

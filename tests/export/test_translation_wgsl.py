@@ -14,7 +14,11 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import wgsl
-from srbf.export.translation import library_paths, parse, preprocess
+from srbf.export.preprocessing import preprocess
+from srbf.export.translation import (
+    library_paths,
+    parse,
+)
 from srbf.gl.uniforms import lamp_uniforms, packed_lamps
 from srbf.lights import PointLight
 

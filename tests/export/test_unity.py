@@ -22,6 +22,7 @@ from srbf.export import spirv, unity
 from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
+from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import packed_lamps
 from srbf.lights import DirectionalLight, PointLight, SpotLight
 
@@ -103,7 +104,8 @@ def test_the_custom_function_gives_numpys_pixels(assets: dict[str, Asset], folde
     matrix[:3, :3], matrix[:3, 3] = AXES, -OFFSET
     weights = weights_of(asset, FARS)
     images = images_of(asset)
-    images |= {"_SrbfTable": images["table"], "_SrbfAmbient": asset.images["ambient"], "positions": placed.astype(np.float32)}
+    table = pairs_of(asset.table)[None] if method == "relighting-map" else images["table"]
+    images |= {"_SrbfTable": table, "_SrbfAmbient": asset.images["ambient"], "positions": placed.astype(np.float32)}
     images |= {"_SrbfWeightRows": weights} if method != "relighting-map" else {}
     images |= {"_SrbfClusters": images["clusters"]} if "clusters" in images else {}
     found = run(spirv.cross_compile(spirv.compile_hlsl(text + MAIN), "glsl"), asset, images, uniforms_of(lights, weights, matrix))[..., :3]
@@ -180,6 +182,8 @@ def test_c_sharp_reads_the_files_and_weighs_lights_as_numpy(folders: dict[str, P
         np.testing.assert_array_equal(np.array(said[f"layer{i}"][0]).reshape(layer.shape), layer)
     table = asset.table[None, :, None] if maps else asset.tables["w_table"]
     np.testing.assert_array_equal(np.array(said["table"][0]).reshape(table.shape).astype(np.float32), table)
+    if maps:
+        np.testing.assert_array_equal(np.array(said["pairs"][0]).reshape(-1, 2).astype(np.float32), pairs_of(asset.table))
     if asset.clusters > 1:
         np.testing.assert_array_equal(np.array(said["clusters"][0]).reshape(asset.height, asset.width), asset.tables["cluster_index"])
     expected = methods.folded_weights(asset, FARS)

@@ -33,6 +33,7 @@ static class Answers
             for (int j = 0; j < 6; j++) n[j] = double.Parse(arguments[i + j], CultureInfo.InvariantCulture);
             lights.Add(new FarLight { ToLight = new Vector(n[0], n[1], n[2]).Normalized(), Color = new Vector(n[3], n[4], n[5]) });
         }
+        Print("pairs", SrbfMath.Pairs(table.Values));
         if (manifest.Method == "relighting-map") Print("weights", SrbfMath.MapWeights(manifest.Centers, table.Values, lights));
         else Print("weights", SrbfMath.PlaneWeights(manifest.Centers, manifest.Spreads, SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values, lights));
         foreach (Vector axis in new[] { new Vector(1, 0, 0), new Vector(0, 1, 0), new Vector(0, 0, 1) })

@@ -18,7 +18,7 @@ namespace UnityEngine
     public class Texture : Object { public FilterMode filterMode; public TextureWrapMode wrapMode; public int width, height; }
     public enum FilterMode { Point, Bilinear, Trilinear }
     public enum TextureWrapMode { Clamp }
-    public enum TextureFormat { RGBAHalf, RGBAFloat, RFloat, R8, RGBA32, BC7, DXT1 }
+    public enum TextureFormat { RGBAHalf, RGBAFloat, RGFloat, R8, RGBA32, BC7, DXT1 }
     public class Texture2D : Texture
     {
         public Texture2D(int width, int height, TextureFormat format, bool mipChain, bool linear) { }

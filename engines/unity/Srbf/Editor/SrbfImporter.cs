@@ -30,9 +30,13 @@ namespace Srbf
             context.SetMainObject(asset);
             asset.layers = Add(context, "layers", Layers(manifest, folder));
             SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
-            asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RFloat : TextureFormat.RGBAHalf, FilterMode.Point));
-            if (asset.IsMaps) asset.rTable = table.Values;
-            else asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
+            if (asset.IsMaps)
+            {
+                asset.rTable = table.Values;
+                table = new SrbfImage { Width = table.Width, Height = 1, Channels = 2, Values = SrbfMath.Pairs(table.Values) };
+            }
+            asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RGFloat : TextureFormat.RGBAHalf, FilterMode.Point));
+            if (!asset.IsMaps) asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
             if (manifest.ClusterFile != null)
                 asset.clusters = Add(context, "clusters", Texture(SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)), TextureFormat.R8, FilterMode.Point));
             SrbfImage ambient = manifest.AmbientFile != null
@@ -77,7 +81,7 @@ namespace Srbf
         static Texture2D Texture(SrbfImage image, TextureFormat format, FilterMode filter)
         {
             var texture = new Texture2D(image.Width, image.Height, format, false, true) { filterMode = filter, wrapMode = TextureWrapMode.Clamp };
-            if (format == TextureFormat.RFloat) texture.SetPixelData(image.Values, 0);
+            if (format == TextureFormat.RGFloat) texture.SetPixelData(image.Values, 0);
             else if (format == TextureFormat.R8) texture.SetPixelData(System.Array.ConvertAll(image.Values, value => (byte)value), 0);
             else texture.SetPixelData(Halves(image.Rgba()), 0);
             texture.Apply(false);

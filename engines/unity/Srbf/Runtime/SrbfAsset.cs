@@ -8,7 +8,7 @@ namespace Srbf
     {
         public string method, quantity, transport;
         public Texture2DArray layers;  // relighting maps, or planes four by four: row 0 is the image's top
-        public Texture2D table;        // r_table or w_table
+        public Texture2D table;        // pairs of r_table, or w_table
         public Texture2D clusters;     // of a clustered eigen map alone
         public Texture2D ambient;      // black where the scene emits nothing
         public int scalars, clusterCount;

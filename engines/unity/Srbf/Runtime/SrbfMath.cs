@@ -48,6 +48,19 @@ namespace Srbf
             return table[j] + (table[j + 1] - table[j]) * (place - j);
         }
 
+        /// <summary>The R table from its end, and what the next entry has more, 0 in the last: what the shader reads by one fetch.</summary>
+        public static float[] Pairs(float[] table)
+        {
+            var pairs = new float[2 * table.Length];
+            for (int j = 0; j < table.Length; j++)
+            {
+                int at = table.Length - 1 - j;
+                pairs[2 * j] = table[at];
+                pairs[2 * j + 1] = at > 0 ? table[at - 1] - table[at] : 0;
+            }
+            return pairs;
+        }
+
         /// <summary>The sum over far lights of colour times R_i, RGBA a map with A = 1: what _SrbfWeights holds.</summary>
         public static float[] MapWeights(double[] centers, float[] table, IList<FarLight> lights)
         {
