@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import webbrowser
 from pathlib import Path
+from threading import Thread
 from typing import Annotated
 
 import typer
 
-from srbf.cli.parameters import AssetFolder
+from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note
-from srbf.viewer.server import ViewerServer, contents_of
+from srbf.errors import OutputExistsError
+from srbf.files import write_text
+from srbf.viewer.contents import Content, contents_of
+from srbf.viewer.server import ViewerServer
+from srbf.viewer.single_file import single_file
 
 
 def view(
@@ -22,16 +27,37 @@ def view(
         Path | None, typer.Option(help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False)
     ] = None,
     port: Annotated[int, typer.Option(help="On 127.0.0.1; 0: any that is free.", min=0, max=65535)] = 0,
+    save: Annotated[
+        Path | None, typer.Option(help="Write one HTML file that opens from the disk, and serve nothing.", show_default=False)
+    ] = None,
+    force: Force = False,
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
     """Show an asset in the browser under lights that are dragged; Ctrl-C ends it."""
+    if save is not None:
+        _save(save, contents_of(asset, None, mesh), capture, force)
+        return
     server = ViewerServer(contents_of(asset, capture, mesh), port)
     try:
         typer.echo(server.url)
-        if browser and not webbrowser.open(server.url):
-            note("no browser was found: open the address yourself")
+        if browser:
+            Thread(target=_open, args=(server.url,), daemon=True).start()  # a browser in the terminal would not come back
         server.serve_forever(poll_interval=0.1)
     except KeyboardInterrupt:
         return
     finally:
         server.server_close()
+
+
+def _save(path: Path, contents: dict[str, Content], capture: Path | None, force: bool) -> None:
+    if capture is not None:
+        raise typer.BadParameter("expected --save without a capture: one file does not hold its images")
+    if path.exists() and not (force and path.is_file()):
+        raise OutputExistsError(f"expected no {path} yet, found one; choose another name, or add --force")
+    write_text(path, single_file(contents))
+    note(f"wrote {path}, {path.stat().st_size / (1 << 20):.1f} MiB")
+
+
+def _open(url: str) -> None:
+    if not webbrowser.open(url):
+        note("no browser was found: open the address yourself")

@@ -12,7 +12,7 @@ from srbf.arrays import Float, Float64
 from srbf.asset import Asset
 
 POINTS = 4000  # of the picture, evenly spaced: eleven numbers are asked for
-ROUNDS = 4  # of least squares; after each, the tenth that fits worst (pixels across an edge) is left out
+ROUNDS = 8  # of least squares; each leaves out the tenth that fitted the one before worst: pixels across an edge
 KEPT = 0.9
 WORST = 1.0  # pixels, rms: beyond it no pinhole camera saw this picture
 FLAT = 1e-6  # of the largest singular value: points of one plane do not tell where they are seen from
@@ -23,7 +23,7 @@ class FittedCamera:
     """A pinhole camera: `position` (m), `rotation` whose rows are its right, down and forward axes, and `lens`, upper triangular with
     lens[2, 2] = 1, which takes camera coordinates to (u, v, 1) times depth; u right and v down, 0 to 1 over the picture."""
 
-    position: Float64[ndarray, 3]
+    position: Float64[ndarray, " 3"]
     rotation: Float64[ndarray, "3 3"]
     lens: Float64[ndarray, "3 3"]
     rms: float  # pixels
@@ -54,8 +54,8 @@ def fitted_camera(asset: Asset) -> FittedCamera | None:
     for _ in range(ROUNDS):
         matrix = _projection(points[kept], seen[kept])
         error = _error(matrix, points, seen, (asset.width, asset.height))
-        rms = float(np.sqrt((error[kept] ** 2).mean()))
-        kept = np.argsort(error[kept])[: int(KEPT * len(kept))] if len(kept) < len(points) else np.argsort(error)[: int(KEPT * len(error))]
+        kept = np.argsort(error)[: int(KEPT * len(error))]
+    rms = float(np.sqrt((error[kept] ** 2).mean()))
     return _decomposed(matrix, middle, size, rms) if rms <= WORST else None
 
 
@@ -76,7 +76,7 @@ def _error(
     return np.where(np.isfinite(error), error, np.inf)
 
 
-def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, 3], size: float, rms: float) -> FittedCamera | None:
+def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, " 3"], size: float, rms: float) -> FittedCamera | None:
     turn = matrix[:, :3]
     if abs(np.linalg.det(turn)) < 1e-9:  # an orthographic camera: it is nowhere
         return None

@@ -2,26 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Callable
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
-from srbf import files
-from srbf.asset import MANIFEST, Asset
-from srbf.capture import Capture
 from srbf.errors import InputError, SrbfError
-from srbf.export.web import shown_mesh
-from srbf.viewer import facts
-from srbf.viewer.built_page import page_files
-from srbf.viewer.references import References
+from srbf.viewer.contents import Content, read
 
 HOST = "127.0.0.1"
-ASSET, CAPTURE = "asset/", "capture/"
 TYPES = {
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
@@ -40,8 +30,6 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
 }
-
-Content = bytes | Path | Callable[[], bytes]
 
 
 class ViewerServer(ThreadingHTTPServer):
@@ -65,43 +53,6 @@ class ViewerServer(ThreadingHTTPServer):
         """A page that was closed while it loaded is no event."""
 
 
-def contents_of(folder: Path, capture: Path | None = None, mesh: Path | None = None) -> dict[str, Content]:
-    """Everything the page may ask for of the asset in `folder`; what `Asset.open`, `Capture.open` and `page_files` raise."""
-    page = page_files()
-    asset = Asset.open(folder)
-    references = None
-    if capture is not None:
-        references = References(Capture.open(capture))
-        references.check(asset)
-    notes: list[str] = []
-    shown = shown_mesh(asset, mesh, notes)
-    told = facts.facts(asset, ASSET, shown is not None, facts.title(folder), CAPTURE if references else None, tuple(notes))
-    contents: dict[str, Content] = {"": page["index.html"], **page, facts.NAME: json.dumps(told).encode()}
-    manifest = folder / MANIFEST
-    for name in (MANIFEST, *asset.manifest.get("sha256", {}), *_named(asset)):
-        path = files.inside(folder, name, manifest)
-        if path.is_file():
-            contents[ASSET + name] = path
-    if shown is not None:
-        contents[facts.MESH] = shown
-    if references is not None:
-        contents[f"{CAPTURE}lights.json"] = json.dumps(references.lights()).encode()
-        for index in range(len(references.capture.lights)):
-            contents[f"{CAPTURE}{index}.exr"] = _image(references, index)
-    return contents
-
-
-def _image(references: References, index: int) -> Callable[[], bytes]:
-    return lambda: references.image(index)
-
-
-def _named(asset: Asset) -> list[str]:
-    """Files that asset.json names; an asset need not have checksums."""
-    entries = [entry["file"] for entry in asset.layers]
-    tables = [asset.manifest[name]["file"] for name in asset.tables]
-    return [*entries, *tables, *(asset.manifest[name] for name in asset.images)]
-
-
 class _Handler(BaseHTTPRequestHandler):
     server: ViewerServer
     protocol_version = "HTTP/1.1"
@@ -122,7 +73,7 @@ class _Handler(BaseHTTPRequestHandler):
         if content is None:
             return self._send(HTTPStatus.NOT_FOUND, b"expected a file of the page or of its asset\n", ".txt", body)
         try:
-            data = content.read_bytes() if isinstance(content, Path) else content if isinstance(content, bytes) else content()
+            data = read(content)
         except (OSError, SrbfError) as error:
             line = " ".join(str(error).split())
             return self._send(HTTPStatus.INTERNAL_SERVER_ERROR, f"{line}\n".encode(), ".txt", body)

@@ -21,17 +21,19 @@ const said = [];
 let context;
 let page;
 
-const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 30_000, polling: 30 });
+const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 20_000, polling: 20 });
 
 const commands = {
   async open({ url, width = 900, height = 700, touch = false }) {
     await context?.close();
     context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, hasTouch: touch });
+    context.setDefaultTimeout(10_000);
     page = await context.newPage();
     page.on("console", (message) => said.push(`${message.type()}: ${message.text()}`));
     page.on("pageerror", (error) => said.push(`error: ${error}`));
     page.on("request", (request) => {
-      if (!request.url().startsWith(new URL(url).origin) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
+      const home = new URL(url).protocol === "file:" ? url.split("#")[0] : new URL(url).origin;
+      if (!request.url().startsWith(home) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
     });
     await page.goto(url);
     await settled();
@@ -40,6 +42,11 @@ const commands = {
     const value = await page.evaluate(script);
     return value;
   },
+  /** The address once it says what is shown. */
+  async address() {
+    await page.waitForFunction(() => document.body.dataset.address !== "old", undefined, { timeout: 20_000, polling: 20 });
+    return page.url();
+  },
   async drag({ path }) {
     await page.mouse.move(...path[0]);
     await page.mouse.down();
@@ -47,8 +54,8 @@ const commands = {
     await page.mouse.up();
     await settled();
   },
-  async touch({ at }) {
-    await page.touchscreen.tap(...at);
+  async touch({ at, count = 1 }) {
+    for (let i = 0; i < count; ++i) await page.touchscreen.tap(...at);
     await settled();
   },
   async click({ at, count = 1 }) {
@@ -61,7 +68,7 @@ const commands = {
   },
   /** Type a number into the panel's row of that name. */
   async number({ name, value }) {
-    const input = page.locator(`.lil-gui .controller:has(.name:text-is("${name}")) input[type=text], .lil-gui .lil-controller:has(.lil-name:text-is("${name}")) input[type=text]`).first();
+    const input = page.locator(`.lil-gui .controller:has(.name:text-is("${name}")) input`).first();
     await input.fill(String(value));
     await input.press("Enter");
     await settled();

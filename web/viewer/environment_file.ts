@@ -28,6 +28,8 @@ export async function readEnvironment(file: File): Promise<Environment> {
   throw new SrbfError(`expected an environment as .exr, .hdr or .png, found ${file.name}; convert it first`);
 }
 
+const MANTISSA = 255 / 256; // three divides mantissas by 255, Radiance and OpenImageIO by 256
+
 function readHdr(buffer: ArrayBuffer, name: string): Environment {
   const loader = new HDRLoader();
   loader.type = FloatType;
@@ -37,7 +39,8 @@ function readHdr(buffer: ArrayBuffer, name: string): Environment {
   } catch (error) {
     throw new SrbfError(`cannot read ${name}: ${error instanceof Error ? error.message : String(error)}; is it damaged or cut short?`);
   }
-  return rgb(image.width, image.height, 4, image.data);
+  const { width, height, pixels } = rgb(image.width, image.height, 4, image.data);
+  return { width, height, pixels: pixels.map((value) => value * MANTISSA) };
 }
 
 function rgb(width: number, height: number, channels: number, data: ArrayLike<number>): Environment {

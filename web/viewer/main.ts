@@ -19,8 +19,9 @@ import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State } from "./state";
 
 const FRAMES_A_SECOND = 24;
-const URL_EVERY = 250; // milliseconds
+const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const TOAST = 8000;
+const PACES = 15; // frames whose median is told
 const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
 
 const element = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;
@@ -54,7 +55,7 @@ class Viewer {
   private wanted = -1;
   private error = "";
   private last = 0;
-  private pace = 0;
+  private readonly paces: number[] = [];
   private urlTimer = 0;
   private written = "";
 
@@ -74,7 +75,7 @@ class Viewer {
     model?.applyMatrix4(this.relighting.sceneFromModel());
     const { width, height } = asset.manifest;
     this.stage = new Stage(this.renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, changed);
-    const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : [];
+    const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : asset.basis.functions.centers;
     const points: readonly SkyPoint[] = references?.lights ?? centers.map((direction): SkyPoint => ({ direction, role: "center" }));
     this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, points, changed);
     this.panel = new Panel(
@@ -151,11 +152,13 @@ class Viewer {
     document.body.dataset.state = "busy";
     if (what.lights) this.lightsChanged = true;
     if (what.panel) this.panel.rebuild();
+    document.body.dataset.address = "old";
     if (!this.urlTimer) {
       this.urlTimer = window.setTimeout(() => {
         this.urlTimer = 0;
         this.written = encodeState(this.state);
         history.replaceState(undefined, "", this.written);
+        document.body.dataset.address = "written";
       }, URL_EVERY);
     }
   }
@@ -167,10 +170,11 @@ class Viewer {
     if (this.state.playing) this.play(since / 1000);
     else this.base = undefined;
     if (!this.drawNeeded) {
-      if (document.body.dataset.state === "busy" && !this.waiting && !this.urlTimer) document.body.dataset.state = "idle";
+      if (document.body.dataset.state === "busy" && !this.waiting) document.body.dataset.state = "idle";
       return;
     }
-    if (since < 1000) this.pace = this.pace ? 0.9 * this.pace + 0.1 * since : since;
+    this.paces.push(since);
+    if (this.paces.length > PACES) this.paces.shift();
     this.drawNeeded = false;
     try {
       if (this.lightsChanged) this.relight();
@@ -182,6 +186,12 @@ class Viewer {
       if (line !== this.error) say(line);
       this.error = line;
     }
+  }
+
+  /** Until `waiting` is counted down again the page is not at rest. */
+  private wait(): void {
+    ++this.waiting;
+    document.body.dataset.state = "busy";
   }
 
   private play(seconds: number): void {
@@ -215,7 +225,7 @@ class Viewer {
     const sun = this.sun();
     element("status").dataset.rmse = "";
     if (this.state.compare === "off" || !references || !sun) {
-      this.compared = this.sky.marked = -1;
+      this.compared = this.wanted = this.sky.marked = -1;
       if (this.state.compare !== "off") say("comparing needs a sun: add one", "hint");
       return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
     }
@@ -245,7 +255,7 @@ class Viewer {
     const { references } = this.loaded;
     if (!references || index === this.wanted) return;
     this.wanted = index;
-    ++this.waiting;
+    this.wait();
     references
       .image(index)
       .then((image) => {
@@ -278,6 +288,7 @@ class Viewer {
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
+    (split.querySelector("i") as HTMLElement).ariaValueNow = String(Math.round(100 * state.split));
     this.status();
   }
 
@@ -325,8 +336,9 @@ class Viewer {
 
   private status(): void {
     const { asset, facts, references } = this.loaded;
+    const pace = this.paces.length < PACES ? "–" : [...this.paces].sort((a, b) => a - b)[PACES >> 1].toFixed(1);
     const parts = [
-      `<b>${this.pace ? this.pace.toFixed(1) : "–"}</b> ms a frame`,
+      `<b>${pace}</b> ms a frame`,
       `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU`,
     ];
     if (this.compared >= 0 && references) {
@@ -363,6 +375,7 @@ class Viewer {
     });
     const help = element<HTMLDialogElement>("help");
     help.addEventListener("click", () => help.close());
+    element("keys").addEventListener("click", () => help.showModal());
     const next = <T>(list: readonly T[], now: T) => list[(list.indexOf(now) + 1) % list.length];
     listen(this.state, changed, {
       reset: () => this.stage.resetCamera(),
@@ -455,7 +468,7 @@ class Viewer {
 
   /** A dropped sky; the first takes the suns' place. */
   private async environment(file: File): Promise<void> {
-    ++this.waiting;
+    this.wait();
     try {
       this.environments.set(file.name, await readEnvironment(file));
       const { lights } = this.state;
@@ -490,15 +503,16 @@ async function main(): Promise<void> {
   document.body.dataset.state = "busy";
   try {
     const loaded = await load((done, name) => {
+      if (document.body.dataset.state === "failed") return;
       bar.value = done;
       what.textContent = name ? `Loading ${name.split("/").pop()}` : "Loading";
     });
     new Viewer(loaded);
     loading.remove();
   } catch (error) {
+    document.body.dataset.state = "failed";
     loading.classList.add("failed");
     what.textContent = lineOf(error);
-    document.body.dataset.state = "failed";
   }
 }
 

@@ -27,6 +27,7 @@ const KINDS: Record<LightState["kind"], string> = { directional: "Sun", point: "
 
 export class Panel {
   private gui: GUI | undefined;
+  private drawn = "";
   private readonly open = new Map<string, boolean>();
 
   constructor(
@@ -68,8 +69,11 @@ export class Panel {
   private readonly relight = () => this.actions.changed({ lights: true });
   private readonly redraw = () => this.actions.changed();
 
-  private drawChips(): void {
+  private drawChips(anew = false): void {
     const { lights, selected } = this.state;
+    const drawn = JSON.stringify([selected, lights.map(({ kind, color, on }) => [kind, color, on])]);
+    if (!anew && drawn === this.drawn) return; // what is replaced loses its focus
+    this.drawn = drawn;
     const numbers = new Map<string, number>();
     const chips = lights.map((light, i) => {
       const number = (numbers.get(light.kind) ?? 0) + 1;
@@ -94,7 +98,6 @@ export class Panel {
     add.append(new Option("+ add", "", true, true), ...kinds.map((kind) => new Option(KINDS[kind as LightState["kind"]], kind)));
     add.onchange = () => this.add(add.value as LightState["kind"]);
     add.disabled = lights.length >= MOST_LIGHTS;
-    if (document.activeElement instanceof HTMLSelectElement && this.chips.contains(document.activeElement)) document.activeElement.blur();
     this.chips.replaceChildren(...chips, add);
   }
 
@@ -104,7 +107,7 @@ export class Panel {
     const place: Triple = at ?? [centre[0], centre[1], centre[2] + height];
     if (kind === "environment") {
       this.actions.chooseEnvironment();
-      this.drawChips();
+      this.drawChips(true);
       return;
     }
     const light =

@@ -23,6 +23,7 @@ import { screenMaterial, type ScreenUniforms } from "./screen";
 import type { Changed, State } from "./state";
 
 const BACKGROUND = new Color(0x0f1114);
+const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes what it clears a canvas to, not a target
 const MOST_PIXEL_RATIO = 2;
 
 export class Stage {
@@ -90,7 +91,7 @@ export class Stage {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, MOST_PIXEL_RATIO));
     this.renderer.setSize(Math.max(1, width), Math.max(1, height));
     this.orbitCamera.aspect = width / Math.max(1, height);
-    this.orbitCamera.updateProjectionMatrix();
+    this.placeCamera();
   }
 
   draw(): void {
@@ -122,7 +123,7 @@ export class Stage {
       this.uniforms.nearest.value = true;
     }
     this.renderer.autoClear = true;
-    this.renderer.setClearColor(BACKGROUND);
+    this.renderer.setClearColor(BACKGROUND_BYTES);
     this.renderer.setRenderTarget(target);
     this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
     const upward = new Uint8Array(4 * width * height);
@@ -191,7 +192,8 @@ export class Stage {
 
   private placeCamera(): void {
     const { centre, radius } = this.receivers.bounds;
-    const around: Triple = [centre[0] - 0.9 * radius, centre[1] - 2.1 * radius, centre[2] + 1.9 * radius];
+    const away = radius * Math.max(1, 1.15 / this.orbitCamera.aspect); // farther where the window is narrow
+    const around: Triple = [centre[0] - 0.9 * away, centre[1] - 2.1 * away, centre[2] + 1.9 * away];
     const [eye, target] = this.state.eye ?? [around, centre];
     this.orbitCamera.near = radius * 0.01;
     this.orbitCamera.far = radius * 60;

@@ -1,0 +1,176 @@
+"""The viewer's page built as it ships, and one headless Chromium that is told what to do with it."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from threading import Thread
+from typing import Any
+from urllib.parse import unquote
+
+import numpy as np
+import pytest
+from filelock import FileLock
+
+from srbf.viewer.built_page import FILES, ROOT
+from srbf.viewer.contents import contents_of
+from srbf.viewer.server import ViewerServer
+
+TESTS = Path(__file__).resolve().parents[1]
+sys.path.append(str(TESTS / "web"))
+
+spec = importlib.util.spec_from_file_location("web_conftest", TESTS / "web" / "conftest.py")
+assert spec is not None
+assert spec.loader is not None
+web_conftest = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(web_conftest)
+npm, BUILD, CHROMIUM, WEB = web_conftest.npm, web_conftest.BUILD, web_conftest.CHROMIUM, web_conftest.WEB
+
+
+@pytest.fixture(scope="session")
+def built(npm: Callable[..., str]) -> Path:
+    """The page's folder, newer than every file that it is made of."""
+    sources = [WEB / "package-lock.json", WEB / "vite.viewer.config.ts", *(WEB.parent / "glsl").rglob("*.glsl")]
+    sources += [file for part in ("src", "build", "viewer") for file in (WEB / part).rglob("*") if file.is_file()]
+    digest = hashlib.sha256()
+    for file in sorted(sources):
+        digest.update(str(file.relative_to(WEB.parent)).encode() + file.read_bytes())
+    with FileLock(BUILD / ".lock"):
+        mark = BUILD / "viewer.sha256"
+        if not mark.is_file() or mark.read_text() != digest.hexdigest() or not all((ROOT / name).is_file() for name in FILES):
+            npm("run", "build:viewer")
+            mark.write_text(digest.hexdigest())
+    return ROOT
+
+
+class Browser:
+    """One page of a Chromium; every command waits until the page has drawn what it was asked to."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        self.may_fail = False
+
+    def __call__(self, what: str, **job: Any) -> Any:
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._process.stdin.write(json.dumps({"do": what, **job}) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        assert line, "expected an answer of the browser, found it gone"
+        answer = json.loads(line)
+        assert "error" not in answer, answer
+        bad = [said for said in answer["said"] if said.startswith("error")]
+        assert self.may_fail or not bad, bad
+        return answer.get("value")
+
+    def canvas(self) -> np.ndarray:
+        """(H, W, 3) bytes of the canvas."""
+        answer = self("canvas")
+        return np.frombuffer(base64.b64decode(answer["bytes"]), np.uint8).reshape(answer["height"], answer["width"], 4)[..., :3]
+
+    def texels(self, width: int, height: int, zoom: int) -> np.ndarray:
+        """The picture on the canvas, of which each texel is `zoom` x `zoom` equal pixels: (H, W, 3) bytes."""
+        canvas = self.canvas()
+        top = round(canvas.shape[0] / 2 - height * zoom / 2)
+        left = round(canvas.shape[1] / 2 - width * zoom / 2)
+        blocks = canvas[top : top + height * zoom, left : left + width * zoom].reshape(height, zoom, width, zoom, 3)
+        assert (blocks == blocks[:, :1, :, :1]).all(), "texels are not squares of one colour"
+        return blocks[:, 0, :, 0]
+
+    def state(self) -> dict[str, Any]:
+        """What the address says."""
+        return json.loads(unquote(self("address").split("#", 1)[1].replace("'", '"')))
+
+    def file(self, text: str) -> bytes:
+        """What the button of that name hands out."""
+        return base64.b64decode(self("download", text=text)["bytes"])
+
+
+@pytest.fixture(scope="session")
+def chromium(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    program = os.environ.get("SRBF_CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if program is None:
+        pytest.fail(f"expected one of {', '.join(CHROMIUM)} on PATH, found none; apt install chromium, or name it by SRBF_CHROMIUM")
+    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
+    assert node is not None
+    log = (tmp_path_factory.mktemp("viewer") / "browser.log").open("w+")
+    process = subprocess.Popen(
+        [node, str(WEB / "viewer" / "driver.mjs"), program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
+    )
+    try:
+        assert process.stdout is not None
+        if not process.stdout.readline():
+            log.seek(0)
+            pytest.fail(f"expected {program} to start, found:\n{log.read()[-3000:]}")
+        yield Browser(process)
+    finally:
+        assert process.stdin is not None
+        process.stdin.close()
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+        log.close()
+
+
+@pytest.fixture(autouse=True)
+def every_error_counts(request: pytest.FixtureRequest) -> None:
+    if "chromium" in request.fixturenames:
+        request.getfixturevalue("chromium").may_fail = False
+
+
+@pytest.fixture
+def serve(built: Path) -> Iterator[Callable[..., str]]:
+    """Serve an asset's folder as `srbf view` does; its URL."""
+    servers: list[ViewerServer] = []
+
+    def start(folder: Path, capture: Path | None = None, mesh: Path | None = None) -> str:
+        server = ViewerServer(contents_of(folder, capture, mesh))
+        Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+        servers.append(server)
+        return server.url
+
+    yield start
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.fixture
+def serve_static() -> Iterator[Callable[[Path], str]]:
+    """Serve a folder as any static host does; its URL."""
+    with static_hosts() as start:
+        yield start
+
+
+@contextmanager
+def static_hosts() -> Iterator[Callable[[Path], str]]:
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, format: str, *args: Any) -> None:
+            pass
+
+    servers: list[ThreadingHTTPServer] = []
+
+    def start(folder: Path) -> str:
+        server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+        Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
+        servers.append(server)
+        return f"http://127.0.0.1:{server.server_port}/"
+
+    try:
+        yield start
+    finally:
+        for server in servers:
+            server.shutdown()
+            server.server_close()

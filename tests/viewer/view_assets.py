@@ -1,0 +1,36 @@
+"""A made view of a room whose camera is known, and a made lightmap that a mesh shows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from web_assets import complete
+
+from srbf.asset import Asset
+
+EYE = np.array([0.3, -4.0, 1.2])
+FORWARD = np.array([-0.05, 1.0, -0.15]) / np.linalg.norm([-0.05, 1.0, -0.15])
+RIGHT = np.cross(FORWARD, [0, 0, 1]) / np.linalg.norm(np.cross(FORWARD, [0, 0, 1]))
+ROTATION = np.stack([RIGHT, np.cross(FORWARD, RIGHT), FORWARD])
+LENS = np.array([[0.9, 0, 0.5], [0, 1.2, 0.48], [0, 0, 1]])  # to u and v, 0 to 1
+DEPTHS = (0.0, 3.0)  # metres: of the floor, and of the wall at the end of it
+
+
+def seen_room(asset: Asset) -> Asset:
+    """`asset` as a view of a floor and a wall, all of it covered."""
+    u, v = np.meshgrid((np.arange(asset.width) + 0.5) / asset.width, (np.arange(asset.height) + 0.5) / asset.height)
+    rays = np.linalg.solve(LENS, np.stack([u, v, np.ones_like(u)]).reshape(3, -1)).T @ ROTATION
+    with np.errstate(divide="ignore"):
+        floor, wall = (DEPTHS[0] - EYE[2]) / rays[:, 2], (DEPTHS[1] - EYE[1]) / rays[:, 1]
+    reach = np.minimum(np.where(floor > 0, floor, np.inf), np.where(wall > 0, wall, np.inf))
+    position = (EYE + reach[:, None] * rays).reshape(asset.height, asset.width, 3).astype(np.float32)
+    covered = np.ones((asset.height, asset.width), np.float32)
+    whole = complete(replace(asset, images={**asset.images, "position": position, "coverage": covered}))
+    return complete(whole, source={"receiver": {"kind": "view", "camera": "Camera"}})
+
+
+def project(place: np.ndarray) -> np.ndarray:
+    """(u, v) of a place in the room."""
+    seen = LENS @ (ROTATION @ (np.asarray(place) - EYE))
+    return seen[:2] / seen[2]
