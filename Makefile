@@ -28,10 +28,10 @@ demo: setup
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 
 test: setup-test
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 test-fast: setup-test
-	$(BIN)/pytest -m "not blender" -n 2
+	$(BIN)/pytest -m "not blender and not engines" -n 2
 
 test-godot: setup-test
 	sh scripts/godot-chroot

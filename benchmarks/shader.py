@@ -107,6 +107,9 @@ class Bench:
         self.draws: dict[tuple[str, str], Callable[[], None]] = {}
         for name, asset in self.assets.items():
             textures = AssetTextures(context, asset, limits, resources)
+            textures.layers()
+            if context.error == "GL_OUT_OF_MEMORY":
+                raise SystemExit(f"expected room for the layers of {name} at {side} x {side}, found none on this device; use fewer --sides")
             weights = folded_weights(asset, SUN)
             for by_formula in (False, True) if formula and name == MAPS else (False,):
                 passes = PASSES[asset.method](asset, programs, textures, limits, by_formula)

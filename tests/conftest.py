@@ -32,7 +32,16 @@ from srbf.capture import Capture  # noqa: E402
 from srbf.image import write_image  # noqa: E402
 from srbf.sphere import point_set, random_directions  # noqa: E402
 
+OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
 Answer = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what compiles other languages, or drives a browser: minutes in all."""
+    here = Path(__file__).parent
+    for item in items:
+        if item.path.is_relative_to(here) and item.path.relative_to(here).as_posix().startswith(OTHER_LANGUAGES):
+            item.add_marker(pytest.mark.engines)
 
 
 @pytest.fixture(scope="session")

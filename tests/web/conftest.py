@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
 import os
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from filelock import FileLock
+from web_assets import decoded
 
 from srbf.asset import Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
@@ -146,12 +146,6 @@ def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
         except subprocess.TimeoutExpired:
             process.kill()
         log.close()
-
-
-def decoded(picture: dict[str, Any]) -> np.ndarray:
-    """(H, W, 3) float32 of what the page says of a picture."""
-    pixels = np.frombuffer(base64.b64decode(picture["pixels"]), np.float32)
-    return pixels.reshape(picture["height"], picture["width"], 4)[..., :3]
 
 
 def as_json(light: Light) -> dict[str, Any]:

@@ -16,8 +16,7 @@ ALBEDO = (0.8, 0.5, 0.3)
 BRIGHTEST = 30.0  # Babylon.js clamps what a PBR material hands to post-processes
 
 
-@pytest.mark.parametrize("right_handed", [True, False])
-@pytest.mark.parametrize("kind", ["directional", "point", "several"])
+@pytest.mark.parametrize(("kind", "right_handed"), [("directional", True), ("point", False), ("several", True)])
 def test_a_pbr_material_shows_albedo_times_irradiance_over_pi(
     browser: Any, make_asset: Callable[..., Asset], kind: str, right_handed: bool
 ) -> None:

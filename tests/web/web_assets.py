@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -105,3 +106,9 @@ def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> n
     if target == "half":
         return HALF * (bound + ambient) + HALF_TINY
     return FLOAT * (bound + ambient) + 1e-7
+
+
+def decoded(picture: dict[str, Any]) -> np.ndarray:
+    """(H, W, 3) float32 of what the page says of a picture."""
+    pixels = np.frombuffer(base64.b64decode(picture["pixels"]), np.float32)
+    return pixels.reshape(picture["height"], picture["width"], 4)[..., :3]

@@ -15,6 +15,7 @@ import {
   type Asset,
   type Triple,
 } from "../src";
+import { checkCompression } from "../src/compression";
 import { lookup } from "../src/gaussian";
 import { flipRows, padToFour } from "../src/image";
 import { insidePath } from "../src/manifest";
@@ -121,6 +122,16 @@ describe("loading", () => {
   it("names the damaged file", async () => {
     const fetcher = async (url: string) => (url.endsWith("asset.json") ? Response.json(MANIFEST) : new Response("no picture"));
     await expect(loadAsset("http://x/a", { fetch: fetcher })).rejects.toThrow(/cannot read (map_00|r_table).exr/);
+  });
+});
+
+describe("compressed layers", () => {
+  const asset = (encoding: string) => ({ layers: { encoding } }) as unknown as Asset;
+
+  it("are refused by name where the GPU cannot read them", () => {
+    expect(() => checkCompression(asset("bc7"), (encoding) => encoding !== "bc7")).toThrow("expected a GPU that reads bc7");
+    checkCompression(asset("bc1"), (encoding) => encoding !== "bc7");
+    checkCompression(asset("half"), () => false);
   });
 });
 

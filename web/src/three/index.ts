@@ -1,3 +1,4 @@
+export { GLTF_EXTENSION, relightGltf } from "./gltf";
 export type { TargetOptions } from "./lightmap_pass";
 export type { MaterialOptions } from "./material";
 export { SrbfRelightingMap, type RelightingMapOptions } from "./relighting_map";

@@ -1,9 +1,9 @@
 /** An asset in a three.js scene: its textures, the lights that it follows, the materials that it lights. */
 import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
+import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
 import { lampRoom } from "../lamp";
-import type { Encoding } from "../manifest";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
@@ -19,6 +19,7 @@ export interface RelightingMapOptions extends TargetOptions {
   source?: "maps" | "lightmap";
 }
 
+const EXTENSIONS = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
 const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
 
 /**
@@ -99,7 +100,7 @@ export class SrbfRelightingMap extends SceneAsset {
     const frame = this.frame();
     if (this.pass) needPositions(this.asset, frame.lamps.length);
     if (renderer) {
-      checkCompression(renderer, this.asset);
+      checkCompression(this.asset, (encoding) => renderer.extensions.has(EXTENSIONS[encoding]));
       this.checkUniforms(renderer, lampRoom(frame.lamps.length));
     }
     setFrame(this.uniforms, this.textures, frame);
@@ -139,15 +140,5 @@ export class SrbfRelightingMap extends SceneAsset {
           (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
       );
     }
-  }
-}
-
-const EXTENSIONS: Partial<Record<Encoding, string>> = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
-
-function checkCompression(renderer: WebGLRenderer, asset: Asset): void {
-  const { encoding } = asset.layers;
-  const extension = EXTENSIONS[encoding];
-  if (extension !== undefined && !renderer.extensions.has(extension)) {
-    throw new SrbfError(`expected a GPU that reads ${encoding} (${extension}), found one without; serve it srbf export --target uint8`);
   }
 }

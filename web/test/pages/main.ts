@@ -4,7 +4,7 @@ import { host, layers, load } from "./host";
 import type { Job } from "./job";
 import { playcanvasMaterial } from "./playcanvas";
 import { nodesLightmap, nodesMaterial } from "./three_nodes";
-import { threeLightmap, threeMaterial } from "./three_webgl";
+import { threeGltf, threeLightmap, threeMaterial } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "babylon-material": babylonMaterial,
@@ -14,6 +14,7 @@ const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "playcanvas-material": playcanvasMaterial,
   "nodes-lightmap": nodesLightmap,
   "nodes-material": nodesMaterial,
+  "three-gltf": threeGltf,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,
 };

@@ -1,6 +1,7 @@
 /** Jobs for three.js' WebGLRenderer. */
 import * as THREE from "three";
-import { SrbfRelightingMap } from "../../src/three";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
+import { relightGltf, SrbfRelightingMap } from "../../src/three";
 import { type Job, lightOfJson, picture, upsideDown } from "./job";
 import { addLights, facingCamera, quad } from "./three_scene";
 
@@ -50,15 +51,46 @@ export async function threeMaterial(job: Job) {
   }
   const size = (job.size as [number, number]) ?? [width, height];
   const target = new THREE.WebGLRenderTarget(size[0], size[1], { type: job.target === "half" ? THREE.HalfFloatType : THREE.FloatType });
-  shared().setRenderTarget(target);
-  shared().render(scene, facingCamera(job));
-  shared().setRenderTarget(null);
-  const pixels = read(target, size[0], size[1]);
+  const frame = () => {
+    shared().setRenderTarget(target);
+    shared().render(scene, facingCamera(job));
+    shared().setRenderTarget(null);
+    return picture(size[0], size[1], upsideDown(read(target, size[0], size[1]), size[1])); // the framebuffer's row 0 is at the bottom
+  };
+  const first = frame();
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    map.update(shared());
+    return frame();
+  });
   target.dispose();
   material.dispose();
   mesh.geometry.dispose();
   map.dispose();
-  return picture(size[0], size[1], upsideDown(pixels, size[1])); // the framebuffer's row 0 is at the bottom
+  material.lightMap?.dispose();
+  return { ...first, pictures, textures: shared().info.memory.textures, programs: shared().info.programs?.length };
+}
+
+/** A model of `srbf export --target gltf` as GLTFLoader reads it, lit by the asset that it names, from above. */
+export async function threeGltf(job: Job) {
+  const gltf = await new GLTFLoader().loadAsync(`${job.asset}/model.glb`);
+  const meshes: THREE.Mesh[] = [];
+  gltf.scene.traverse((object) => {
+    if ((object as THREE.Mesh).isMesh) meshes.push(object as THREE.Mesh);
+  });
+  const fallback = meshes.map((mesh) => ((mesh.material as THREE.MeshBasicMaterial).map?.image as { width: number } | undefined)?.width ?? 0);
+  const [map] = await relightGltf(gltf, job.asset, { filter: "nearest" });
+  map.lights.push(...job.lights.map(lightOfJson));
+  map.update(shared());
+  const { width, height } = map.asset.manifest;
+  const target = new THREE.WebGLRenderTarget(width, height, { type: THREE.FloatType });
+  shared().setRenderTarget(target);
+  shared().render(gltf.scene, facingCamera(job));
+  shared().setRenderTarget(null);
+  const pixels = read(target, width, height);
+  target.dispose();
+  map.dispose();
+  return { ...picture(width, height, upsideDown(pixels, height)), fallback };
 }
 
 function read(target: THREE.WebGLRenderTarget, width: number, height: number): Float32Array {

@@ -5,7 +5,7 @@
 import * as tsl from "three/tsl";
 
 /** A node, or what becomes one: three's types of nodes know no clamped integers, and change with every release. */
-export type N = any; // eslint-disable-line
+export type N = any;
 
 const { Fn, abs, clamp, dot, float, floor, int, ivec2, length, max, min, mix, select, textureLoad, vec2, vec3 } = tsl as Record<string, N>;
 

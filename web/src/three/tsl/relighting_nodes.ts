@@ -3,6 +3,7 @@ import { FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, Neare
 import { attribute, Fn, positionWorld, screenCoordinate, texture, textureLoad, vec2, vec4 } from "three/tsl";
 import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
+import { checkCompression } from "../../compression";
 import { SrbfError } from "../../errors";
 import { needPositions } from "../../shader";
 import type { TargetOptions } from "../lightmap_pass";
@@ -79,6 +80,7 @@ export class SrbfRelightingNodes extends SceneAsset {
    */
   update(renderer?: Renderer): void {
     const frame = this.frame();
+    if (renderer) checkCompression(this.asset, (encoding) => reads(renderer, encoding));
     if (this.target) needPositions(this.asset, frame.lamps.length);
     this.inputs.set(frame);
     this.inputs.assetFromScene.value.copy(this.assetFromScene());
@@ -114,6 +116,11 @@ export class SrbfRelightingNodes extends SceneAsset {
     if (!positions) return vec4(0).xyz;
     return (textureLoad(positions, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).xyz;
   }
+}
+
+function reads(renderer: Renderer, encoding: "bc7" | "bc1"): boolean {
+  if (encoding === "bc7" || (renderer.backend as { isWebGPUBackend?: boolean }).isWebGPUBackend) return renderer.hasFeature("texture-compression-bc");
+  return renderer.hasFeature("texture-compression-s3tc");
 }
 
 function lightmapTarget(asset: Asset, options: TargetOptions): RenderTarget {
