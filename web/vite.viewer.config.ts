@@ -1,12 +1,13 @@
-// The page of `srbf view` and of `srbf export --target web`: three files that need no network.
+// The page of `srbf view` and of `srbf export --target web`: files that need no network.
 import { fileURLToPath } from "node:url";
 import { defineConfig } from "vite";
 import { glsl } from "./build/glsl_plugin.ts";
+import { licenses } from "./viewer/licenses_plugin.ts";
 
 export default defineConfig({
   root: fileURLToPath(new URL("viewer", import.meta.url)),
   base: "./",
-  plugins: [glsl()],
+  plugins: [glsl(), licenses()],
   build: {
     target: "es2022",
     outDir: fileURLToPath(new URL("../srbf/viewer/page", import.meta.url)),

@@ -1,4 +1,4 @@
-"""The built page, `srbf/viewer/page/`: three files that need no network."""
+"""The built page, `srbf/viewer/page/`: files that need no network."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from srbf.errors import MissingLibraryError
 
 ROOT = Path(__file__).resolve().parent / "page"
-FILES = ("index.html", "viewer.js", "viewer.css")
+FILES = ("index.html", "viewer.js", "viewer.css", "LICENSES.txt")
 
 
 def page_files(root: Path = ROOT) -> dict[str, Path]:

@@ -19,6 +19,7 @@ TYPES = {
     ".json": "application/json",
     ".glb": "model/gltf-binary",
     ".png": "image/png",
+    ".txt": "text/plain; charset=utf-8",
 }
 HEADERS = {
     "Content-Security-Policy": (
@@ -82,7 +83,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, status: HTTPStatus, data: bytes, suffix: str, body: bool) -> None:
         self.send_response(status)
-        self.send_header("Content-Type", TYPES.get(suffix, "text/plain; charset=utf-8" if suffix == ".txt" else "application/octet-stream"))
+        self.send_header("Content-Type", TYPES.get(suffix, "application/octet-stream"))
         self.send_header("Content-Length", str(len(data)))
         for name, value in HEADERS.items():
             self.send_header(name, value)

@@ -8,7 +8,7 @@ import re
 
 from srbf.viewer.contents import Content, read
 
-PAGE = ("", "index.html", "viewer.js", "viewer.css")
+PAGE = ("", "index.html", "viewer.js", "viewer.css", "LICENSES.txt")
 POLICY = "; ".join(
     ("default-src 'none'", "script-src 'unsafe-inline'", "style-src 'unsafe-inline'", "font-src data:", "img-src blob: data:")
     + ("connect-src blob: data:",)
@@ -37,6 +37,7 @@ def single_file(contents: dict[str, Content]) -> str:
         f"<style>{style}</style>",
         f'<script type="application/json" id="held">{names}</script>',
         f"<script>{FETCH}</script>",
+        f'<script type="text/plain" id="licenses">\n{read(contents["LICENSES.txt"]).decode("utf-8")}</script>',
         '<script type="module">' + re.sub(r"</(?=script)", r"<\\/", script, flags=re.IGNORECASE) + "</script>",
     ]
     page = read(contents["index.html"]).decode("utf-8")

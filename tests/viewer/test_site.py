@@ -37,7 +37,7 @@ def test_a_site_is_the_asset_and_the_page(built: Path, lightmap: Asset, tmp_path
     assert (site / "mesh.glb").read_bytes()[:4] == b"glTF"
     told = json.loads((site / "viewer.json").read_text())
     assert (told["asset"], told["mesh"], told["kind"], told["title"], told["capture"]) == ("./", "mesh.glb", "lightmap", "Table", None)
-    named = {"asset.json", "mesh.glb", "viewer.json", "index.html", "viewer.js", "viewer.css"}
+    named = {"asset.json", "mesh.glb", "viewer.json", "index.html", "viewer.js", "viewer.css", "LICENSES.txt"}
     assert {path.name for path in site.iterdir() if path.is_file()} == named
     assert str(tmp_path) not in (site / "viewer.json").read_text()
 
@@ -55,6 +55,14 @@ def test_a_page_asks_no_other_machine(built: Path) -> None:
     assert "//" not in page.replace("https://www.w3.org", "")
     assert 'src="./viewer.js"' in page
     assert 'href="./viewer.css"' in page
+
+
+def test_the_terms_of_what_is_bundled_come_with_it(built: Path) -> None:
+    text = (built / "LICENSES.txt").read_text()
+    for package in ("three", "fast-png", "parse-exr", "ktx-parse"):
+        assert f"\n{package} " in text, package
+    assert "George Michael Brower" in text, "the panel's, which three holds"
+    assert text.count("Permission is hereby granted") >= 4
 
 
 def test_a_lightmap_without_positions_is_shown_as_texels(built: Path, make_asset: Callable[..., Asset], tmp_path: Path) -> None:
