@@ -6,6 +6,8 @@ BIN := $(VENV)/bin
 SCENE ?= caustics
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
+PAGE := srbf/viewer/page/index.html
+PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.glsl)
 
 .PHONY: setup setup-test demo test test-fast test-godot check torture bench extension web clean
 setup: $(VENV)/.installed
@@ -24,7 +26,7 @@ $(VENV)/.tested-by: $(VENV)/.installed
 	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export,test,dev]'
 	touch $@
 
-demo: setup
+demo: setup $(PAGE)
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 
 test: setup-test
@@ -37,8 +39,15 @@ test-godot: setup-test
 	sh scripts/godot-chroot
 	$(BIN)/python scripts/test_godot.py
 
-web: setup-test
-	cd web && PATH=$(abspath $(BIN)):$$PATH && npm ci --no-audit --no-fund && npm run build
+# The npm package, and the page of srbf view, by the Node.js of a Python package.
+NPM := cd web && PATH="$(abspath $(BIN)):$$PATH" npm --no-fund --no-audit --no-update-notifier --loglevel=error
+web: $(PAGE)
+	$(NPM) run build
+
+$(PAGE): $(VENV)/.installed $(PAGE_SOURCES)
+	$(BIN)/pip install --quiet --editable '.[web]'
+	$(NPM) ci
+	$(NPM) run build:viewer
 
 check: setup-test
 	$(BIN)/ruff format --check .
@@ -57,4 +66,4 @@ extension: setup
 	$(BIN)/python scripts/build_extension.py $(addprefix --platform ,$(PLATFORMS))
 
 clean:
-	rm -rf .venv .venv-* out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf web/node_modules web/dist srbf/viewer/page build .venv .venv-* out dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

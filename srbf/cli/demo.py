@@ -21,3 +21,4 @@ def demo(
     with progress_bar(scene) as update:
         page = run_demo(scene, output, lights, Reporter(update, note), update)
     note(f"look at {page}")
+    note(f"drag its lights: srbf view {page.parents[1] / 'asset'} {page.parents[1] / 'capture'}")
