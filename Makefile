@@ -40,7 +40,7 @@ test-godot: setup-test
 	$(BIN)/python scripts/test_godot.py
 
 # The npm package, and the page of srbf view, by the Node.js of a Python package.
-NPM := cd web && PATH="$(abspath $(BIN)):$$PATH" npm --no-fund --no-audit --no-update-notifier --loglevel=error
+NPM := cd web && PATH="$(abspath $(BIN)):$$PATH" NODE_USE_SYSTEM_CA=1 npm --no-fund --no-audit --no-update-notifier --loglevel=error
 web: $(PAGE)
 	$(NPM) run build
 

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import base64
-import hashlib
-import importlib.util
 import json
-import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -21,7 +17,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from filelock import FileLock
+from npm_package import WEB, browser_program, built, node_program, npm
 
 from srbf.viewer.built_page import FILES, ROOT
 from srbf.viewer.contents import contents_of
@@ -30,27 +26,14 @@ from srbf.viewer.server import ViewerServer
 TESTS = Path(__file__).resolve().parents[1]
 sys.path.append(str(TESTS / "web"))
 
-spec = importlib.util.spec_from_file_location("web_conftest", TESTS / "web" / "conftest.py")
-assert spec is not None
-assert spec.loader is not None
-web_conftest = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(web_conftest)
-npm, BUILD, CHROMIUM, WEB = web_conftest.npm, web_conftest.BUILD, web_conftest.CHROMIUM, web_conftest.WEB
+__all__ = ["npm"]  # a fixture
 
 
-@pytest.fixture(scope="session")
-def built(npm: Callable[..., str]) -> Path:
+@pytest.fixture(scope="session", name="built")
+def viewer_page(npm: Callable[..., str]) -> Path:
     """The page's folder, newer than every file that it is made of."""
-    sources = [WEB / "package-lock.json", WEB / "vite.viewer.config.ts", *(WEB.parent / "glsl").rglob("*.glsl")]
-    sources += [file for part in ("src", "build", "viewer") for file in (WEB / part).rglob("*") if file.is_file()]
-    digest = hashlib.sha256()
-    for file in sorted(sources):
-        digest.update(str(file.relative_to(WEB.parent)).encode() + file.read_bytes())
-    with FileLock(BUILD / ".lock"):
-        mark = BUILD / "viewer.sha256"
-        if not mark.is_file() or mark.read_text() != digest.hexdigest() or not all((ROOT / name).is_file() for name in FILES):
-            npm("run", "build:viewer")
-            mark.write_text(digest.hexdigest())
+    files = [file for part in ("src", "build", "viewer") for file in (WEB / part).rglob("*") if file.is_file()]
+    built("build:viewer", npm, [WEB / "vite.viewer.config.ts", *files], [ROOT / name for name in FILES])
     return ROOT
 
 
@@ -99,14 +82,13 @@ class Browser:
 
 @pytest.fixture(scope="session")
 def chromium(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    program = os.environ.get("SRBF_CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
-    if program is None:
-        pytest.fail(f"expected one of {', '.join(CHROMIUM)} on PATH, found none; apt install chromium, or name it by SRBF_CHROMIUM")
-    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-    assert node is not None
     log = (tmp_path_factory.mktemp("viewer") / "browser.log").open("w+")
     process = subprocess.Popen(
-        [node, str(WEB / "viewer" / "driver.mjs"), program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, text=True
+        [node_program(), str(WEB / "viewer" / "driver.mjs"), browser_program()],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=log,
+        text=True,
     )
     try:
         assert process.stdout is not None

