@@ -23,9 +23,11 @@ from srbf.export.translation import (
     Token,
     render_plain,
     split,
+    without,
 )
 
 WIDTH = 140  # of a line of the pack
+SOFTWARE = "SRBF_SAMPLED"  # what only software renderers want: engines get the pack without
 
 
 @dataclass
@@ -54,7 +56,7 @@ class Writer:
         found: set[tuple[str, str]] = set()
         for function in self.functions.values():  # callees come first
             names = {parameter.name for parameter in function.parameters if parameter.type in SAMPLERS}
-            for callee, arguments in _calls(function.body.inside):
+            for callee, arguments in _calls(without(function.body.inside, SOFTWARE)):
                 for i, argument in enumerate(arguments):
                     name = render_plain(argument).strip()
                     target = self.functions.get(callee)
@@ -97,7 +99,7 @@ class Writer:
         raise NotImplementedError
 
     def body(self, function: Function) -> str:
-        return self.expression(function.body.inside)
+        return self.expression(without(function.body.inside, SOFTWARE))
 
     def type(self, name: str) -> str:
         return self.types.get(name, name)

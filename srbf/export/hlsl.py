@@ -11,7 +11,7 @@ from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.asset_shader import asset_shader, counts, rows_of
-from srbf.export.dialect import WIDTH, Writer, guarded, wrapped
+from srbf.export.dialect import SOFTWARE, WIDTH, Writer, guarded, wrapped
 from srbf.export.preprocessing import preprocess
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.translation import (
@@ -31,6 +31,7 @@ from srbf.export.translation import (
     render_plain,
     significant,
     split,
+    without,
 )
 
 TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "int"), ("u", "uint"), ("b", "bool")) for n in (2, 3, 4)}
@@ -131,7 +132,8 @@ class HlslWriter(Writer):
 
     def body(self, function: Function) -> str:
         matrices = frozenset(parameter.name for parameter in function.parameters if parameter.type in MATRICES)
-        return self.expression(_multiplied(function.body.inside, matrices) if matrices else function.body.inside)
+        nodes = without(function.body.inside, SOFTWARE)
+        return self.expression(_multiplied(nodes, matrices) if matrices else nodes)
 
     def call(self, name: str, arguments: list[str]) -> str:
         arguments = [_bare(argument) for argument in arguments]

@@ -140,6 +140,21 @@ def pack_files(
     return [file for file in found.values() if file is not None]
 
 
+def without(nodes: Sequence[Node], name: str) -> list[Node]:
+    """Nodes of a function's body without what `#ifdef name` adds there: as where `name` is never defined."""
+    kept: list[Node] = []
+    branch = ""
+    for node in nodes:
+        words = node.text.split()[:2] if isinstance(node, Token) and node.kind == "directive" else []
+        if words == ["#ifdef", name]:
+            branch = "#ifdef"
+        elif branch and words[:1] in (["#else"], ["#endif"]):
+            branch = "#else" if words == ["#else"] else ""
+        elif branch != "#ifdef":
+            kept.append(node)
+    return kept
+
+
 def parse(text: str, path: str) -> PackFile:
     """A file of the pack as items; ShaderError on what is neither function, struct, constant, directive nor comment."""
     nodes = list(_grouped(iter(tokens(text)), None, path))

@@ -13,17 +13,19 @@ if TYPE_CHECKING:
     import moderngl
 
 REQUIRED = 330  # OpenGL 3.3 core
+SOFTWARE = ("llvmpipe", "softpipe", "SwiftShader")  # renderers without a GPU
 EGL_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libgl": "libGL.so.1", "libegl": "libEGL.so.1"})  # without and with -dev links
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a context can hold: texels a side, layers an array, texture units and vec4 uniforms of a fragment shader."""
+    """What a context can hold: texels a side, layers an array, texture units, vec4 uniforms of a fragment shader; and if it is software."""
 
     texture_size: int
     array_layers: int
     texture_units: int
     fragment_vectors: int
+    software: bool = False
 
     @staticmethod
     def of(context: moderngl.Context) -> Limits:
@@ -34,6 +36,7 @@ class Limits:
             array_layers=int(info["GL_MAX_ARRAY_TEXTURE_LAYERS"]),
             texture_units=int(info["GL_MAX_TEXTURE_IMAGE_UNITS"]),
             fragment_vectors=int(info["GL_MAX_FRAGMENT_UNIFORM_COMPONENTS"]) // 4,
+            software=any(name in str(info["GL_RENDERER"]) for name in SOFTWARE),
         )
 
 

@@ -33,7 +33,7 @@ class MapPasses:
         self._lamps = lamps_a_pass(self._free, VECTORS_A_MAP)
         self._formula = formula
         self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
-        self._functions = {"SRBF_FORMULA" if formula else "SRBF_PAIRS": 1}
+        self._functions = {"SRBF_FORMULA": 1} if formula else {"SRBF_PAIRS": 1} | ({"SRBF_SAMPLED": 1} if limits.software else {})
 
     def check_lamps(self) -> None:
         """InputError where the shaders know no formula for the functions of a lamp's direction."""

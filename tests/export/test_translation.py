@@ -120,6 +120,14 @@ def test_a_matrix_times_a_vector_is_hlsls_mul_and_nothing_else() -> None:
         hlsl.HlslWriter([other]).file(other)
 
 
+def test_what_software_renderers_want_stays_in_the_pack() -> None:
+    path = "basis/weight_pairs.glsl"
+    assert "#ifdef SRBF_SAMPLED" in (shader_root() / path).read_text()
+    text = hlsl.include([path])
+    assert "#ifdef SRBF_SAMPLED" not in text and "SampleLevel" not in text and "#else" not in text
+    assert "float srbfWeightPairs(Texture2D pairs, float versine)" in text
+
+
 def test_words_that_hlsl_keeps_to_itself_are_renamed() -> None:
     assert "float3 point_" in hlsl.include(["shadow/shadow_place.glsl"])
     spirv.compile_hlsl(hlsl.include(["shadow/shadow_place.glsl"]) + ENTRY)

@@ -97,8 +97,9 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     exact = {"table": basis_weights(asset, directions.astype(float)), "formula": asset.basis.evaluate(directions.astype(float))}
     centers = padded(asset.basis.centers)
     centers[:, 3] = 0.5 / asset.basis.spread**2
-    exact["pairs"] = exact["table"]
+    exact["pairs"] = exact["sampled"] = exact["table"]
     defines = {"table": {}, "formula": {"SRBF_FORMULA": 1}, "pairs": {"SRBF_PAIRS": 1}}
+    defines["sampled"] = defines["pairs"] | {"SRBF_SAMPLED": 1}
     for by, expected in exact.items():
         for i in (0, 7, 24):
             found = evaluate(
@@ -106,7 +107,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
                 "vec4(srbfCenterWeight(rTable, a.xyz, b))",
                 vec4(directions),
                 np.broadcast_to(centers[i], (N + 1, 4)),
-                images={"rTable": pairs_of(asset.table)[None] if by == "pairs" else asset.table[None, :, None]},
+                images={"rTable": pairs_of(asset.table)[None] if by in ("pairs", "sampled") else asset.table[None, :, None]},
                 defines=defines[by],
             )[:, 0]
             np.testing.assert_allclose(found, expected[:, i], atol=SUM)

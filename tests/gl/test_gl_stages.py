@@ -22,6 +22,7 @@ PLANES: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 384)] + [
 FOLDED: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 288)]  # three vec4 a layer
 # 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
 LAMPS: list[dict[str, object]] = [{"SRBF_LAMPS": 1}, {"SRBF_LAMPS": 16}, {"SRBF_LAMPS": 16, "SRBF_DEPTH": 1}]
+SAMPLED: dict[str, object] = {"SRBF_PAIRS": 1, "SRBF_SAMPLED": 1}
 LIT_MAPS = [{"SRBF_K": k} | lamps for k in (1, 25, 32) for lamps in LAMPS] + [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_FORMULA": 1}]
 LIT_MAPS += [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
 LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS] + [{"SRBF_SCALARS": 9, "SRBF_LAMPS": 4, "SRBF_PLAIN": 1}]
@@ -29,7 +30,9 @@ UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range
 METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
-    "point.frag": [{"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1}, {"SRBF_PAIRS": 1, "SRBF_PLAIN": 1})],
+    "point.frag": [
+        {"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1}, {"SRBF_PAIRS": 1, "SRBF_PLAIN": 1}, SAMPLED)
+    ],
     "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
     "weighted.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
@@ -127,7 +130,7 @@ def test_the_readme_says_what_every_stage_and_define_takes() -> None:
             if not name.startswith("environment_"):
                 assert f"`{uniform}`" in after or f"`{uniform}[" in after, f"{name}: {uniform}"
     for file in FILES:
-        for define in re.findall(r"\bSRBF_(?:K|SCALARS|LAYERS|LAMPS|UNITS|PLAIN|PAIRS|FORMULA|DEPTH)\b", (ROOT / file).read_text()):
+        for define in re.findall(r"\bSRBF_(?:K|SCALARS|LAYERS|LAMPS|UNITS|PLAIN|PAIRS|SAMPLED|FORMULA|DEPTH)\b", (ROOT / file).read_text()):
             assert f"| `{define}` |" in after
 
 
