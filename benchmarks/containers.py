@@ -66,8 +66,8 @@ class Row:
     table: float
 
 
-def measure(asset: Asset, capture: Capture, target: str, encoding: str, folder: Path) -> Row:
-    report = export(asset, target, folder, Settings(encoding, levels=1), force=True)  # type: ignore[arg-type]
+def measure(asset: Asset, capture: Capture, target: str, encoding: LayerEncoding, folder: Path) -> Row:
+    report = export(asset, target, folder, Settings(encoding, levels=1), force=True)
     exported = Asset.open(folder)
     error = evaluate(exported, capture, roles=("holdout",))["holdout"]
     layers = sum(path.stat().st_size for path in folder.iterdir() if path.name.startswith(("map", "plane", "cluster")))
@@ -148,8 +148,9 @@ def at_the_edges(path: Path, folder: Path) -> None:
         print(f"{path}, {name}: {chart_gap(coverage)} texels between charts, {levels_without_bleeding(asset)} levels by auto")
         full = directional_responses(asset, directions)
         peak = float(np.quantile(np.maximum(full[:, asset.covered], 0), PEAK_QUANTILE))
-        for encoding in ("half", "uint8", "bc7"):
-            export(asset, "dds", folder, Settings(encoding, levels=EDGE_LEVELS), force=True)  # type: ignore[arg-type]
+        encodings: tuple[LayerEncoding, ...] = ("half", "uint8", "bc7")
+        for encoding in encodings:
+            export(asset, "dds", folder, Settings(encoding, levels=EDGE_LEVELS), force=True)
             exported = Asset.open(folder)
             texture = read_texture_array(folder / exported.layers[0]["file"])
             seen = []

@@ -293,7 +293,7 @@ class _Reader:
         path = files.inside(self.folder, name, self.folder / MANIFEST)
         expected = self.manifest.get("sha256", {}).get(name)
         if expected and path.is_file() and files.sha256_of(path) != expected:
-            raise ImageError(f"expected {path} as it was written, found another checksum: it is damaged or was changed; fit again")
+            raise ImageError(f"expected {path} as it was written, found another checksum: damaged or changed since; fit or export again")
         return path
 
     def _pixels(self, name: str, channels: int) -> np.ndarray:

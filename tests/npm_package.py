@@ -7,7 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -68,3 +69,24 @@ def node_program() -> str:
     node = shutil.which("node", path=PATH)
     assert node is not None
     return node
+
+
+@contextmanager
+def driven(driver: Path, *arguments: str, log: Path) -> Iterator[subprocess.Popen[str]]:
+    """A script of node's that drives a browser, once it has said that it is ready: asked by lines on stdin, ended with the block."""
+    with log.open("w+") as errors:
+        command = [node_program(), str(driver), *arguments]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True)
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            if not process.stdout.readline():
+                errors.seek(0)
+                pytest.fail(f"expected {' '.join(arguments)} to start, found:\n{errors.read()[-3000:]}")
+            yield process
+        finally:
+            process.stdin.close()
+            try:
+                process.wait(20)
+            except subprocess.TimeoutExpired:
+                process.kill()

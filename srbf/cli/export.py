@@ -55,9 +55,9 @@ def export(
     opened = Asset.open(asset)
     if target is None:
         assert keep is not None
-        if encoding in ("bc7", "bc1"):
+        if encoding == "bc7" or encoding == "bc1":
             raise InputError(f"expected --encoding {encoding} with --target dds or ktx2, found it without a target")
-        kept = keep_fewer(opened, keep, encoding)  # type: ignore[arg-type]
+        kept = keep_fewer(opened, keep, encoding)
         kept.save(output, force)
         note(_kept(kept, keep))
         return

@@ -16,7 +16,7 @@ from srbf.errors import MissingLibraryError
 from srbf.image import read_stored
 
 BlockFormat = Literal["bc7", "bc1"]
-BLOCK_BYTES: dict[BlockFormat, int] = {"bc7": 16, "bc1": 8}  # 8 and 4 bits a texel
+BLOCK_BYTES: dict[str, int] = {"bc7": 16, "bc1": 8}  # 8 and 4 bits a texel
 SIDE = 4
 ROWS_AT_A_TIME = 1 << 14  # of one picture that OpenImageIO decodes
 

@@ -7,9 +7,9 @@ import struct
 import numpy as np
 
 from srbf.containers.dds_header import DX10, DXGI, LENGTH, MAGIC, TEXTURE_2D, header
-from srbf.containers.texture_array import TexelFormat, TextureArray, level_bytes, level_size
+from srbf.containers.texture_array import TextureArray, level_bytes, level_size
 
-FORMS: dict[int, TexelFormat] = {number: form for form, number in DXGI.items()}  # type: ignore[misc]
+FORMS = {number: form for form, number in DXGI.items()}
 
 
 def pack(texture: TextureArray) -> bytes:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import struct
+from typing import Literal
 
 MAGIC = b"DDS "
 SIZE, PIXEL_FORMAT_SIZE, LENGTH = 124, 32, 148
-DXGI = {"bc7": 98, "bc1": 71, "uint8": 28, "half": 10}  # BC7_UNORM, BC1_UNORM, R8G8B8A8_UNORM, R16G16B16A16_FLOAT
+TexelFormat = Literal["bc7", "bc1", "uint8", "half"]
+DXGI: dict[TexelFormat, int] = {"bc7": 98, "bc1": 71, "uint8": 28, "half": 10}  # BC7_UNORM, BC1_UNORM, R8G8B8A8_UNORM, R16G16B16A16_FLOAT
 CAPS, HEIGHT, WIDTH, PITCH, PIXEL_FORMAT, MIPMAPS, LINEAR_SIZE = 1, 2, 4, 8, 0x1000, 0x20000, 0x80000
 FOURCC, DX10 = 4, 0x30315844
 COMPLEX, TEXTURE, MIPMAP = 8, 0x1000, 0x400000
@@ -14,7 +16,7 @@ TEXTURE_2D = 3
 BITS = {"bc7": 8, "bc1": 4, "uint8": 32, "half": 64}  # a texel
 
 
-def header(form: str, width: int, height: int, layers: int = 1, levels: int = 1) -> bytes:
+def header(form: TexelFormat, width: int, height: int, layers: int = 1, levels: int = 1) -> bytes:
     """For `layers` of one size with `levels` each, the full size included: every layer's levels follow each other."""
     blocks = form.startswith("bc")
     pitch = -(-width // 4) * -(-height // 4) * 2 * BITS[form] if blocks else width * BITS[form] // 8

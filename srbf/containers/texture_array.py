@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.containers.blocks import BLOCK_BYTES, BlockFormat, decode
+from srbf.containers.dds_header import TexelFormat
 from srbf.errors import InputError
 
-TexelFormat = Literal["bc7", "bc1", "uint8", "half"]
 TEXEL_BYTES = {"uint8": 4, "half": 8}
 DTYPES = {"uint8": np.uint8, "half": np.float16}
 
@@ -25,7 +24,7 @@ def level_size(width: int, height: int, level: int) -> tuple[int, int]:
 def level_bytes(form: str, width: int, height: int) -> int:
     """Bytes of one layer's level of width x height texels: blocks of 4 x 4 texels, begun ones whole, or plain texels."""
     if form in BLOCK_BYTES:
-        return -(-width // 4) * -(-height // 4) * BLOCK_BYTES[form]  # type: ignore[index]
+        return -(-width // 4) * -(-height // 4) * BLOCK_BYTES[form]
     return width * height * TEXEL_BYTES[form]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -31,7 +32,7 @@ SOFTWARE = "SRBF_SAMPLED"  # what only software renderers want: engines get the 
 
 
 @dataclass
-class Writer:
+class Writer(ABC):
     """Writes parsed GLSL in another dialect: the base of every dialect, which says its own words in the methods below.
 
     A texture that is filtered somewhere down the calls travels with its sampler, `nameSampler`; one that is only fetched goes alone.
@@ -86,8 +87,9 @@ class Writer:
     def struct(self, item: Struct) -> str:
         return f"struct {item.name} {{{self.expression(item.body.inside)}}};"
 
+    @abstractmethod
     def constant(self, item: Constant) -> str:
-        raise NotImplementedError
+        """`const type name = value` outside a function."""
 
     def signature(self, item: Function, indent: int = 0) -> str:
         """`type name(parameters)`, a line broken where the pack's own limit asks for it."""
@@ -95,8 +97,9 @@ class Writer:
         parameters = [text for parameter in item.parameters for text in self.parameter(item, parameter)]
         return head + wrapped(parameters, len(head), WIDTH - indent) + ")"
 
+    @abstractmethod
     def parameter(self, function: Function, parameter: Parameter) -> list[str]:
-        raise NotImplementedError
+        """A parameter as this dialect declares it: a texture that is sampled is two."""
 
     def body(self, function: Function) -> str:
         return self.expression(without(function.body.inside, SOFTWARE))

@@ -12,9 +12,7 @@ from srbf.containers.texture_array import level_size
 from srbf.dilation import dilate, nearest_covered
 from srbf.parallel import each
 
-GUTTER = (
-    2.5  # of a level's texels between two charts: a bilinear sample half a texel into one takes the next texel, whose nearest is its own
-)
+GUTTER = 2.5  # of a level's texels between two charts: half a texel into one a bilinear sample takes the next, whose nearest is its own
 
 
 def smaller_levels(
@@ -35,16 +33,16 @@ def smaller_levels(
 
         def fill(
             i: int,
-            rows: object = rows,
-            columns: object = columns,
+            rows: sparse.csr_matrix = rows,
+            columns: sparse.csr_matrix = columns,
             weight: ndarray = weight,
-            nearest: object = nearest,
+            nearest: ndarray | None = nearest,
             out: ndarray = smaller,
         ) -> None:
             for c in range(layers.shape[3]):
-                total = rows @ (columns @ (layers[i, :, :, c] * coverage).T).T  # type: ignore[operator]
+                total = rows @ (columns @ (layers[i, :, :, c] * coverage).T).T
                 out[i, :, :, c] = total / np.where(weight > 0, weight, 1)
-            out[i] = dilate(out[i], nearest)  # type: ignore[arg-type]
+            out[i] = dilate(out[i], nearest)
 
         each(fill, len(layers))
         found.append(smaller)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lights_and_depth_twins import PROJECTIONS, projection
+from depth_twins import PROJECTIONS, projection
 
 from srbf import methods
 from srbf.asset import Asset

@@ -321,6 +321,8 @@ def test_wrong_settings_are_refused(context: Any, make_asset: Callable[..., Asse
 
 
 def test_closing_twice_is_harmless(context: Any, make_asset: Callable[..., Asset]) -> None:
-    relighter = Relighter(make_asset())
+    relighter = Relighter(make_asset(), context=context)
     relighter.close()
     relighter.close()
+    with Relighter(make_asset(), context=context) as other:  # a context that was lent is still there
+        assert other.relight([]).shape == (9, 14, 3)

@@ -64,7 +64,9 @@ def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[
         fragment, defines = "lightmap.frag", DEFINES["lightmap.frag"][0]
     vertex = resolve(f"stages/{vertex_of(fragment)}", version=version)
     with context:
-        compile_program(context, vertex, resolve(f"stages/{fragment}", version=version, defines=defines)).release()
+        program = compile_program(context, vertex, resolve(f"stages/{fragment}", version=version, defines=defines))
+        assert program.glo > 0
+        program.release()
 
 
 def vertex_of(fragment: str) -> str:

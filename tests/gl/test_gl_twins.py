@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import lights_and_depth_twins  # noqa: F401  registers its twins
+import depth_twins  # noqa: F401  registers its twins
+import many_lights_twins  # noqa: F401
 import numpy as np
 import pytest
 from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, lamp_expression, twin, units, vec4

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from npm_package import WEB, browser_program, built, node_program, npm
+from npm_package import WEB, browser_program, built, driven, npm
 
 from srbf.viewer.built_page import FILES, ROOT
 from srbf.viewer.contents import contents_of
@@ -82,28 +82,9 @@ class Browser:
 
 @pytest.fixture(scope="session")
 def chromium(built: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    log = (tmp_path_factory.mktemp("viewer") / "browser.log").open("w+")
-    process = subprocess.Popen(
-        [node_program(), str(WEB / "viewer" / "driver.mjs"), browser_program()],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=log,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        if not process.stdout.readline():
-            log.seek(0)
-            pytest.fail(f"expected {program} to start, found:\n{log.read()[-3000:]}")
+    log = tmp_path_factory.mktemp("viewer") / "browser.log"
+    with driven(WEB / "viewer" / "driver.mjs", browser_program(), log=log) as process:
         yield Browser(process)
-    finally:
-        assert process.stdin is not None
-        process.stdin.close()
-        try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            process.kill()
-        log.close()
 
 
 @pytest.fixture(autouse=True)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from npm_package import BUILD, WEB, browser_program, built, node_program, npm
+from npm_package import BUILD, WEB, browser_program, built, driven, npm
 from web_assets import decoded
 
 from srbf.asset import Asset
@@ -80,29 +80,9 @@ class Browser:
 def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One headless Chromium for all tests of a session."""
     assets = tmp_path_factory.mktemp("web_assets")
-    program = browser_program()
-    log = (assets.parent / "browser.log").open("w+")
-    process = subprocess.Popen(
-        [node_program(), str(WEB / "test" / "driver.mjs"), program, str(pages), str(assets)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=log,
-        text=True,
-    )
-    try:
-        assert process.stdout is not None
-        if not process.stdout.readline():
-            log.seek(0)
-            pytest.fail(f"expected {program} to start, found:\n{log.read()[-3000:]}")
+    arguments = (browser_program(), str(pages), str(assets))
+    with driven(WEB / "test" / "driver.mjs", *arguments, log=assets.parent / "browser.log") as process:
         yield Browser(process, assets)
-    finally:
-        assert process.stdin is not None
-        process.stdin.close()
-        try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            process.kill()
-        log.close()
 
 
 def as_json(light: Light) -> dict[str, Any]:

@@ -1,0 +1,14 @@
+/** The page's own elements, and the one line that it says. */
+const TOAST = 8000; // milliseconds
+
+export const element = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;
+
+export function say(message: string, kind: "toast" | "hint" = "toast"): void {
+  const place = element(kind);
+  place.textContent = message;
+  place.hidden = false;
+  clearTimeout(Number(place.dataset.timer));
+  place.dataset.timer = String(setTimeout(() => (place.hidden = true), TOAST));
+}
+
+export const lineOf = (error: unknown) => (error instanceof Error ? error.message : String(error)).replaceAll(/\s+/g, " ");
