@@ -2,7 +2,7 @@
 """`python -m blender_bake JOB.json`, or `blender --background --python blender_bake/__main__.py -- JOB.json`.
 
 The job says scene, receiver, size, quantity, lights and scratch folder; see `run`. Events come out as JSON lines:
-scene, warning, image (name or light, file, seconds), file, ready, survey, error, done.
+scene, warning, image (name or light, file, seconds), file, ready, survey, mesh, error, done.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     after those in the job. A light: index, kind, direction | position, samples, seed, denoise (bool).
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
     by which the tints of translucent materials are chosen, unless `tints` has them already. A job with `survey` gets what that asks for,
-    and nothing is baked.
+    one with `mesh` the scene's triangles and looks (see `scene_mesh`), and no light is baked.
     """
-    from blender_bake import emission, no_shadow, scene_file, survey, translucency
+    from blender_bake import emission, no_shadow, scene_file, scene_mesh, survey, translucency
     from blender_bake import scene as scenes
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
@@ -63,6 +63,9 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     scenes.configure(scene)
     if "survey" in job:
         channel.emit("survey", **survey.answer(scene, job, channel))
+        return
+    if "mesh" in job:
+        channel.emit("mesh", **scene_mesh.answer(scene, job))
         return
     no_shadow.let_light_through(scene, job["no_shadow"])
     own_light = scenes.OwnLight(scene)

@@ -58,22 +58,50 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
 
 def parts(receivers: set[str] | None) -> Iterator[Part]:
     """Every renderable object that casts shadows or receives light (`receivers`: all of them where None), by material."""
+    for shown in rendered():
+        obj = shown.object
+        casts = obj.visible_shadow
+        if not (casts or (obj.visible_camera if receivers is None else shown.name in receivers)):
+            continue
+        mesh = obj.to_mesh()
+        if mesh is not None:
+            yield from _by_material(shown, casts, mesh)
+            obj.to_mesh_clear()
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An evaluated object with faces, or an instance of one, where it stands: named for the object that shows it."""
+
+    object: bpy.types.Object
+    name: str
+    is_instance: bool
+    matrix: np.ndarray
+
+
+def rendered() -> Iterator[Shown]:
+    """All that renders of the scene, see `show_as_rendered`; each is good until the next is asked for."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         obj = instance.object
         if obj.type not in SOLID or obj.hide_render or not (instance.is_instance or instance.show_self):
             continue
-        casts = obj.visible_shadow
         name = instance.parent.name if instance.is_instance and instance.parent else obj.name
-        if not (casts or (obj.visible_camera if receivers is None else name in receivers)):
-            continue
-        mesh = obj.to_mesh()
-        if mesh is not None:
-            yield from _by_material(obj, name, casts, mesh, np.array(instance.matrix_world))
-            obj.to_mesh_clear()
+        yield Shown(obj, name, instance.is_instance, np.array(instance.matrix_world))
 
 
-def _by_material(obj: bpy.types.Object, name: str, casts: bool, mesh: bpy.types.Mesh, matrix: np.ndarray) -> Iterator[Part]:
+@dataclass(frozen=True)
+class Corners:
+    """Triangles of a mesh in the world, T of them: the loop of each corner (3 T), its place and normal (3 T, 3), each one's slot (T)."""
+
+    loops: np.ndarray
+    places: np.ndarray
+    normals: np.ndarray
+    materials: np.ndarray
+
+
+def corners_of(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Corners:
+    """The mesh's triangles where `matrix` (4, 4) puts them."""
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     loops = np.empty(count * 3, np.int32)
@@ -89,10 +117,16 @@ def _by_material(obj: bpy.types.Object, name: str, casts: bool, mesh: bpy.types.
     corners = points.reshape(-1, 3)[vertices[loops]] @ matrix[:3, :3].T + matrix[:3, 3]
     turned = normals.reshape(-1, 3)[loops] @ np.linalg.pinv(matrix[:3, :3])
     turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
-    for index in np.unique(materials):
-        chosen = np.repeat(materials == index, 3)
-        slot = obj.material_slots[index].material if index < len(obj.material_slots) else None
-        yield Part(name, slot.name if slot else None, casts, corners[chosen].astype("<f4"), turned[chosen].astype("<f4"))
+    return Corners(loops, corners, turned, materials)
+
+
+def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh) -> Iterator[Part]:
+    found, slots = corners_of(mesh, shown.matrix), shown.object.material_slots
+    for index in np.unique(found.materials):
+        chosen = np.repeat(found.materials == index, 3)
+        slot = slots[index].material if index < len(slots) else None
+        places, normals = found.places[chosen].astype("<f4"), found.normals[chosen].astype("<f4")
+        yield Part(shown.name, slot.name if slot else None, casts, places, normals)
 
 
 def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import srbf
-from srbf.cli import bake, demo, evaluate, export, fit, import_, info, relight, report, view
+from srbf.cli import bake, demo, evaluate, export, fit, import_, info, mesh, relight, report, view
 from srbf.cli.terminal import Commands
 
 app = typer.Typer(
@@ -33,6 +33,7 @@ app.command("relight")(relight.relight)
 app.command("evaluate")(evaluate.evaluate)
 app.command("report")(report.report)
 app.command("export")(export.export)
+app.command("mesh")(mesh.mesh)
 app.command("view")(view.view)
 app.command("info")(info.info)
 app.command("demo")(demo.demo)
