@@ -1,0 +1,86 @@
+"""`python -m scripts.gallery`: make the gallery, or go on with it.
+
+What is baked and fitted goes to -o, pictures to --docs, the page beside that folder. An output that is there, made from the same
+scene, settings and version, is kept. --small makes every step for real, tiny: for the test.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+from scripts.gallery import figure, page
+from scripts.gallery.making import is_done, make
+from scripts.gallery.places import Places
+from scripts.gallery.scenes import SCENES
+from scripts.gallery.steps import Steps
+from srbf import files
+from srbf.bake.run import Reporter
+from srbf.errors import SrbfError
+
+EVERY = 20.0  # seconds between two lines about a bake's progress
+
+
+def main() -> int:
+    """Make what is asked for; 0 where all of it is there."""
+    parser = argparse.ArgumentParser(prog="python -m scripts.gallery", description=__doc__.splitlines()[0])
+    parser.add_argument("--only", action="append", choices=[scene.name for scene in SCENES], help="make this scene alone; repeats")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out/gallery"), help="folder of bakes and assets")
+    parser.add_argument("--docs", type=Path, default=Path("docs/gallery"), help="folder of pictures; the page is beside it")
+    parser.add_argument("--small", action="store_true", help="tiny, in seconds")
+    given = parser.parse_args()
+    warnings.showwarning = lambda message, *_rest, **_named: say(f"  {message}")
+    steps = Steps(given.output, say)
+    scenes = [scene.small() if given.small else scene for scene in SCENES]
+    everything = [Places(scene, given.output / scene.name, given.docs) for scene in scenes]
+    started = time.perf_counter()
+    try:
+        for places in everything:
+            if not given.only or places.scene.name in given.only:
+                make(places, steps, Reporter(progress_lines(), say))
+        made = [places for places in everything if is_done(places, steps)]
+        finish(made, steps, given.docs)
+    except SrbfError as error:
+        say(f"gallery: {error}")
+        return 1
+    for places in made:
+        say(f"{places.scene.name:14} {page.duration(steps.total([places.scene.name]).seconds)}")
+    whole = page.duration(steps.total([places.scene.name for places in made]).seconds)
+    say(f"{'all':14} {whole}; this run {page.duration(time.perf_counter() - started)}, {len(steps.redone)} steps")
+    return 0
+
+
+def finish(made: list[Places], steps: Steps, docs: Path) -> None:
+    """The figure of all scenes that are done, and the page, which is written only where its text changes."""
+    steps.run("figure", figure.made_from(made, steps), [docs / page.FIGURE], lambda anew: figure.draw(made, docs / page.FIGURE))
+    path = docs.with_suffix(".md")
+    written = page.text(made, steps, docs.name)
+    if not path.is_file() or path.read_text(encoding="utf-8") != written:
+        files.write_text(path, written)
+        say(f"wrote {path}")
+
+
+def progress_lines() -> Callable[[float, float, str], None]:
+    """A line about a bake now and then."""
+    last = time.monotonic()
+
+    def tell(done: float, total: float, what: str) -> None:
+        nonlocal last
+        if time.monotonic() - last > EVERY:
+            last = time.monotonic()
+            say(f"  {what}, {done:.0f} of {total:.0f} samples")
+
+    return tell
+
+
+def say(line: str) -> None:
+    """A line on stdout, at once."""
+    print(line, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,161 @@
+"""docs/gallery.md, written from what the steps measured: no figure in it is typed."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import srbf
+from scripts.gallery.lamps import ALONE
+from scripts.gallery.places import Places
+from scripts.gallery.scenes import Fit
+from scripts.gallery.steps import Steps
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.quality import family_of, name_of, texel_bytes
+
+FIGURE = "error-by-bytes.webp"
+WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+
+
+def text(made: Sequence[Places], steps: Steps, folder: str) -> str:
+    """The page, its pictures in `folder` beside it."""
+    parts = [INTRODUCTION.format(folder=folder, figure=FIGURE)]
+    parts += [_scene(places, steps, folder) for places in made]
+    parts.append(_time(made, steps))
+    return "\n\n".join(parts) + "\n"
+
+
+INTRODUCTION = """# Gallery
+Scenes that show what the maps hold and where they fail. `make gallery` builds, bakes, fits, measures and draws all of it and writes
+this page; stopped at any moment, it goes on where it was. Every figure below was measured by that run.
+
+In a strip each row is one light that no fit has seen, under one exposure; its direction stands beside it on the sky seen from above.
+The number under a relit picture is its PSNR against the one beside it on the left; the tables have the mean over all held-out lights.
+*25 maps* are the article's method at 200 bytes a texel, *best of 16 bytes* is `srbf fit --method auto --budget 16`. *+ rays*: baked with
+`--transport indirect`, the direct light added as by `srbf relight --direct ray`. Clips are relit from assets alone; they are lossy
+WebP, and no measure of anything.
+
+## What a byte buys
+![Held-out PSNR against bytes a texel, a panel a scene]({folder}/{figure})
+
+Curves: methods fitted to the same 4096 random texels under all light and asked there for the held-out lights, as `srbf report` does it
+(clusters hold so few texels a little better than a whole picture's many). Dashed and dotted: all captured images interpolated, and the
+nearest one, at the bytes of keeping every image. Stars: the assets of this page that leave the direct light to rays, on all texels."""
+
+
+def _scene(places: Places, steps: Steps, folder: str) -> str:
+    scene = places.scene
+    parts = [f"## {scene.title}", f"{scene.shows} {scene.fails}".strip()]
+    parts.append(f"![{scene.name}: rendered and relit under held-out lights]({folder}/{places.strip.name})")
+    parts.append(f"![{scene.name} under lights that move]({folder}/{places.clip.name})")
+    parts.append(_lamps(places, folder))
+    parts.append(_bake_table(places, steps))
+    parts.append(_asset_table(places, steps))
+    return "\n\n".join(part for part in parts if part)
+
+
+def _lamps(places: Places, folder: str) -> str:
+    fit = places.scene.fits[-1]
+    if not places.lamp_strip.is_file() or not places.lamp_errors(fit).is_file():
+        return ""
+    errors = files.read_json(places.lamp_errors(fit))
+    words = (
+        f"The lantern against {len(errors['lights'])} true Cycles lamps on its path (a bake of point lights): relative RMSE "
+        f"**{errors['train']['relative_rmse']:.2f}**; by the rays' direct light alone, without what the asset holds, "
+        f"{errors[ALONE]['relative_rmse']:.2f}."
+    )
+    return f"{words}\n\n![Three true lamps, relit, and their direct light alone]({folder}/{places.lamp_strip.name})"
+
+
+def _bake_table(places: Places, steps: Steps) -> str:
+    capture = Capture.open(places.capture)
+    trained, held = len(capture.indices("train")), len(capture.indices("holdout"))
+    settings = places.scene.bake_settings()
+    sun = f"{np.degrees(settings.sun_angle):.1f}°" if settings.sun_angle else "a point"
+    samples = f"{settings.samples}" if places.scene.dome else f"{settings.samples}, held out {settings.holdout_samples}"
+    cells = {
+        "receiver": f"`{places.scene.receiver}`",
+        "texels": f"{capture.width} × {capture.height}",
+        "lights": f"{trained} and {held} held out",
+        "samples": samples,
+        "sun": sun,
+        "transport": capture.transport,
+        "bake": duration(steps.made(f"{places.scene.name}/bake").seconds),
+        "capture": f"{size_of(places.capture) / 2**20:.0f} MiB",
+    }
+    return _table([list(cells), list(cells.values())])
+
+
+def _asset_table(places: Places, steps: Steps) -> str:
+    rows = [["asset", "bytes a texel", "fit", "held-out PSNR", "relative RMSE"]]
+    for fit in places.scene.fits:
+        asset, error = Asset.open(places.asset(fit)), files.read_json(places.errors(fit))["holdout"]
+        seconds = steps.made(f"{places.scene.name}/fit {fit.folder}").seconds
+        rows.append(
+            [_named(fit, asset), f"{texel_bytes(asset):g}", duration(seconds), f"{error['psnr']:.2f} dB", f"{error['relative_rmse']:.3f}"]
+        )
+    return _table(rows)
+
+
+def _named(fit: Fit, asset: Asset) -> str:
+    name = f"{family_of(asset)}, {name_of(asset)}" if fit.method == "auto" else fit.label
+    return f"{fit.label}: {name}" if fit.method == "auto" else name
+
+
+def _time(made: Sequence[Places], steps: Steps) -> str:
+    rows = [["", *(places.scene.name for places in made), "all"]]
+    kinds: dict[str, tuple[str, ...]] = {
+        "build and bake": ("build", "bake", "photograph", "import", "bake true lamps"),
+        "fit": ("fit",),
+        "measure": ("evaluate", "compare methods"),
+        "draw": ("strip", "clip", "lamp strip"),
+    }
+    totals = np.zeros(len(made) + 1)
+    for kind, starts in kinds.items():
+        seconds = [steps.spent(places.scene.name, starts) for places in made]
+        totals += [*seconds, sum(seconds)]
+        rows.append([kind, *map(duration, seconds), duration(sum(seconds))])
+    rows.append(["**together**", *map(duration, totals[:-1]), f"**{duration(totals[-1])}**"])
+    whole = steps.total([places.scene.name for places in made])
+    stopped = "" if not whole.interrupted else f" It was stopped and gone on with {whole.interrupted} times."
+    source = Capture.open(made[0].rendered).manifest["source"]
+    cores = f"{_number(os.cpu_count() or 1)} {platform.machine()} cores that other work shared"
+    versions = f"srbf {srbf.__version__}, Blender {blender_version(source)}, Python {platform.python_version()}, numpy {np.__version__}"
+    return (
+        f"## How long it took\n{_table(rows)}\n\n"
+        f"Wall time of every step, summed, on {cores}; CPU time of all processes {duration(whole.cpu)}.{stopped} {versions}; no GPU."
+    )
+
+
+def blender_version(source: dict[str, Any]) -> str:
+    """As a capture names the one that rendered it."""
+    return str(source.get("blender", "unknown"))
+
+
+def _table(rows: Sequence[Sequence[str]]) -> str:
+    head, *body = rows
+    return "\n".join(["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *("| " + " | ".join(row) + " |" for row in body)])
+
+
+def _number(count: int) -> str:
+    return WORDS[count] if count < len(WORDS) else str(count)
+
+
+def duration(seconds: float) -> str:
+    """Seconds in words."""
+    if seconds < 9.95:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of all files below a folder."""
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,69 @@
+"""Where the files of one scene are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from scripts.gallery.scenes import Fit, Scene
+from srbf.capture import Capture
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the files of one scene are."""
+
+    scene: Scene
+    folder: Path
+    docs: Path
+
+    @property
+    def blend(self) -> Path:
+        return self.folder / f"{self.scene.name}.blend"
+
+    @property
+    def capture(self) -> Path:
+        return self.folder / "capture"
+
+    @property
+    def rendered(self) -> Path:
+        """What Blender rendered: the capture itself, but for photographs, which are imported."""
+        return self.folder / "dome" if self.scene.dome else self.capture
+
+    @property
+    def photographs(self) -> Path:
+        return self.folder / "photographs"
+
+    @property
+    def true_lamps(self) -> Path:
+        return self.folder / "true-lamps"
+
+    @property
+    def scores(self) -> Path:
+        return self.folder / "scores.json"
+
+    @property
+    def strip(self) -> Path:
+        return self.docs / f"{self.scene.name}-strip.webp"
+
+    @property
+    def clip(self) -> Path:
+        return self.docs / f"{self.scene.name}-clip.webp"
+
+    @property
+    def lamp_strip(self) -> Path:
+        return self.docs / f"{self.scene.name}-lamps.webp"
+
+    def asset(self, fit: Fit) -> Path:
+        return self.folder / fit.folder
+
+    def errors(self, fit: Fit) -> Path:
+        return self.folder / f"{fit.folder}.errors.json"
+
+    def lamp_errors(self, fit: Fit) -> Path:
+        return self.folder / f"{fit.folder}.lamps.json"
+
+    def answers(self, fit: Fit) -> Capture:
+        """What a fit is fitted to."""
+        opened = Capture.open(self.capture)
+        return opened.combined() if fit.light == "all" else opened

@@ -1,0 +1,109 @@
+"""The strip of a scene: rendered and relit pictures side by side under unseen lights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+from PIL import Image, ImageDraw
+
+from scripts.gallery import drawing
+from scripts.gallery.drawing import INK, SOFT, font
+from scripts.gallery.places import Places
+from srbf import files
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.direct.choice import Added
+from srbf.evaluation import psnr
+from srbf.methods import directional_responses
+from srbf.sphere import normalize
+
+NARROWEST, WIDEST = 160, 384  # pixels of one picture
+GAP, HEADING, UNDER, SIDE = 8, 30, 24, 74
+
+
+@dataclass(frozen=True)
+class Row:
+    """One light: what stands beside its pictures, the pictures with a line under each, and the exposure that they share."""
+
+    glyph: Image.Image | None
+    beside: tuple[str, ...]
+    pictures: tuple[ndarray, ...]
+    under: tuple[str, ...]
+    gain: float
+
+
+def draw(places: Places) -> None:
+    """Write the strip: a row a light, the renderer's picture first, then each fit's with its PSNR."""
+    scene = places.scene
+    capture = Capture.open(places.capture).combined()
+    chosen = tested_lights(capture, scene.tested)
+    answers = [relit(places, fit_index, capture, chosen) for fit_index in range(len(scene.fits))]
+    errors = [files.read_json(places.errors(fit)) for fit in scene.fits]
+    rows = []
+    for n, index in enumerate(chosen):
+        direction, file = capture.directions([index])[0], capture.lights[index].file
+        reference = np.maximum(capture.image(index), 0)
+        under = ["held out"]
+        for error in errors:
+            (rmse,) = [light["rmse"] for light in error["lights"] if light["file"] == file]
+            under.append(f"{psnr(error['holdout']['peak'], rmse):.1f} dB")
+        elevation = np.degrees(np.arcsin(direction[2]))
+        rows.append(
+            Row(
+                drawing.sun(direction, SIDE - 14),
+                (f"{elevation:.0f}° high",),
+                (reference, *(answer[n] for answer in answers)),
+                tuple(under),
+                drawing.gain_of(reference),
+            )
+        )
+    headings = ["photographed" if scene.dome else "rendered by Cycles", *(fit.label for fit in scene.fits)]
+    drawing.save(sheet(headings, rows), places.strip)
+
+
+def tested_lights(capture: Capture, wanted: Sequence[tuple[float, float]]) -> list[int]:
+    """The held-out light nearest to each (azimuth, elevation) in degrees, none twice."""
+    indices = capture.indices("holdout")
+    directions = capture.directions(indices)
+    chosen: list[int] = []
+    for azimuth, elevation in np.radians(wanted):
+        aim = normalize(np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]))
+        order = np.argsort(-(directions @ aim))
+        chosen.append(next(indices[i] for i in order if indices[i] not in chosen))
+    return chosen
+
+
+def relit(places: Places, fit_index: int, capture: Capture, chosen: Sequence[int]) -> list[ndarray]:
+    """A fit's pictures under some of the capture's lights, its direct light added where it lacks it."""
+    fit = places.scene.fits[fit_index]
+    asset = Asset.open(places.asset(fit))
+    directions = capture.directions(chosen)
+    with Added(asset, fit.direct) as added:
+        direct = added.directional(directions)
+        return list(np.maximum(directional_responses(asset, directions) + direct, 0))
+
+
+def sheet(headings: Sequence[str], rows: Sequence[Row]) -> Image.Image:
+    """Rows of pictures under headings on white."""
+    height, width = rows[0].pictures[0].shape[:2]
+    w = min(WIDEST, max(NARROWEST, width))
+    h = round(w * height / width)
+    paper = Image.new("RGB", (SIDE + len(headings) * (w + GAP), HEADING + len(rows) * (h + UNDER)), "white")
+    pen = ImageDraw.Draw(paper)
+    for column, heading in enumerate(headings):
+        x = SIDE + column * (w + GAP)
+        pen.text((x, HEADING - 8), heading, font=font(15), fill=INK, anchor="ls")
+    for n, row in enumerate(rows):
+        y = HEADING + n * (h + UNDER)
+        if row.glyph is not None:
+            drawing.paste(paper, row.glyph, 4, y)
+        for line, text in enumerate(row.beside):
+            pen.text((4, y + SIDE + 4 + 16 * line), text, font=font(12), fill=SOFT, anchor="ls")
+        for column, (linear, under) in enumerate(zip(row.pictures, row.under, strict=True)):
+            x = SIDE + column * (w + GAP)
+            paper.paste(drawing.picture(linear, row.gain, (w, h)), (x, y))
+            pen.text((x, y + h + 17), under, font=font(13), fill=INK if column else SOFT, anchor="ls")
+    return paper
