@@ -12,7 +12,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf import files
-from srbf.arrays import Float32, Int
+from srbf.arrays import Float32
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError, ManifestError, OutputExistsError
@@ -87,7 +87,7 @@ def made_layers(capture: Capture, receivers: list[dict[str, Any]]) -> dict[str, 
     name = capture.manifest.get("source", {}).get("uv")
     if name is None:
         return {}
-    path = files.inside(capture.folder, name, capture.folder / MANIFEST)
+    path = files.inside(capture.folder, str(name), capture.folder / MANIFEST)
     told = files.read_json(path)
     try:
         layers = told["objects"] if "objects" in told else [{"object": receivers[0]["object"], **told}]
@@ -228,8 +228,8 @@ class _Writer:
         return self.document.add("nodes", {"name": camera["name"], "camera": self.document.add("cameras", lens), "matrix": pose})
 
 
-def _welded(rows: Float32[ndarray, "n C"]) -> tuple[Float32[ndarray, "m C"], Int[ndarray, " n"]]:
-    """(rows without repetition, the index of each among them as uint32)."""
+def _welded(rows: Float32[ndarray, "n C"]) -> tuple[Float32[ndarray, "m C"], ndarray]:
+    """(rows without repetition, (n,) uint32 index of each among them)."""
     rows = np.ascontiguousarray(rows + np.float32(0))  # -0 becomes 0: equal rows have equal bytes
     keys = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1]))).ravel()
     _, first, index = np.unique(keys, return_index=True, return_inverse=True)
