@@ -20,7 +20,7 @@ def may_shine() -> bool:
     """Whether any material holds a node that emits, at a strength that is not 0 or that something drives: else ambient is exactly 0."""
     for tree in _trees():
         for node in tree.nodes:
-            sockets = [node.inputs.get(name) for name in (STRENGTHS.get(node.bl_idname, ""), BLACKBODY)]
+            sockets = [_strength(node), node.inputs.get(BLACKBODY)]
             driven = tree.animation_data is not None
             if node.bl_idname in SHINING or any(s is not None and (driven or s.is_linked or s.default_value != 0) for s in sockets):
                 return True
@@ -34,13 +34,18 @@ def switch_off() -> None:
     """
     for tree in _trees():
         for node in tree.nodes:
-            socket = node.inputs.get(STRENGTHS.get(node.bl_idname, ""))
+            socket = _strength(node)
             if socket is None:
                 continue
             for link in list(socket.links):
                 tree.links.remove(link)
             tree.animation_data_clear()  # a driver would bring the strength back
             socket.default_value = 0.0
+
+
+def _strength(node: bpy.types.Node) -> bpy.types.NodeSocket | None:
+    name = STRENGTHS.get(node.bl_idname)
+    return node.inputs.get(name) if name else None  # a group's output has a socket without a name
 
 
 def _trees() -> list[bpy.types.NodeTree]:

@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from srbf.cli.parameters import AssetFolder, Force
+from srbf.capture import MANIFEST as CAPTURE_MANIFEST
+from srbf.cli.parameters import Force
 from srbf.cli.terminal import note
-from srbf.errors import OutputExistsError
+from srbf.errors import InputError, OutputExistsError
 from srbf.files import write_text
 from srbf.viewer.contents import Content, contents_of
 from srbf.viewer.server import ViewerServer
@@ -19,10 +20,14 @@ from srbf.viewer.single_file import single_file
 
 
 def view(
-    asset: AssetFolder,
-    capture: Annotated[
-        Path | None, typer.Argument(help="Folder of the capture it was fitted from, to compare with.", show_default=False)
-    ] = None,
+    folders: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="ASSET... [CAPTURE]",
+            help="An asset's folder, or several of one capture to switch between; and the capture, to compare with.",
+            show_default=False,
+        ),
+    ],
     mesh: Annotated[
         Path | None, typer.Option(help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False)
     ] = None,
@@ -34,10 +39,15 @@ def view(
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
     """Show an asset in the browser under lights that are dragged; Ctrl-C ends it."""
+    assets = [folder for folder in folders if not (folder / CAPTURE_MANIFEST).is_file()]
+    captures = [folder for folder in folders if folder not in assets]
+    if not assets or len(captures) > 1:
+        raise InputError(f"expected an asset or more, and at most one capture, found {len(assets)} and {len(captures)}; name them again")
+    capture = captures[0] if captures else None
     if save is not None:
-        _save(save, contents_of(asset, None, mesh), capture, force)
+        _save(save, contents_of(assets, None, mesh), capture, force)
         return
-    server = ViewerServer(contents_of(asset, capture, mesh), port)
+    server = ViewerServer(contents_of(assets, capture, mesh), port)
     try:
         typer.echo(server.url)
         if browser:

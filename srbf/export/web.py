@@ -15,14 +15,15 @@ from srbf.export.gltf import model
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.viewer import facts
 from srbf.viewer.built_page import page_files
+from srbf.viewer.measures import Measures
 
 DATA = "data"
 FORMS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": ktx2.write, "bc1": ktx2.write}
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
-    """Fill an empty folder: `index.html` with its script and style, `viewer.json`, `asset.json` with its images in `data/`, and `mesh.glb`
-    of a lightmap: `settings.mesh`, else rebuilt from its texels.
+    """Fill an empty folder: `index.html` with its script and style, `viewer.json`, `spectrum.json`, `asset.json` with its images in
+    `data/`, and `mesh.glb` of a lightmap: `settings.mesh`, else rebuilt from its texels.
 
     MissingLibraryError without the built page; InputError on a mesh without a UV set.
     """
@@ -37,7 +38,10 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
         (folder / facts.MESH).write_bytes(mesh)
     for name, path in page.items():
         shutil.copyfile(path, folder / name)
-    told = facts.facts(Asset.open(folder), "./", mesh is not None, facts.receiver_name(asset), notes=tuple(notes))
+    written = Asset.open(folder)
+    (folder / facts.SPECTRUM).write_bytes(Measures([written]).spectrum(0))
+    own = facts.described(written, facts.names([written], [folder])[0], "./", facts.SPECTRUM)
+    told = facts.facts(written, [own], mesh is not None, facts.receiver_name(asset), notes=tuple(notes))
     files.write_text(folder / facts.NAME, json.dumps(told) + "\n")
     return Written(("upload the folder to any host; a browser opens it from there, not from the disk", *notes))
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from srbf import files
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
+from srbf.errors import InputError
 from srbf.export.web import shown_mesh
 from srbf.viewer import facts
 from srbf.viewer.built_page import page_files
+from srbf.viewer.measures import Measures
 from srbf.viewer.references import References
 
-ASSET, CAPTURE = "asset/", "capture/"
+CAPTURE = "capture/"
 
 Content = bytes | Path | Callable[[], bytes]
 
@@ -26,38 +29,69 @@ def read(content: Content) -> bytes:
     return content if isinstance(content, bytes) else content()
 
 
-def contents_of(folder: Path, capture: Path | None = None, mesh: Path | None = None) -> dict[str, Content]:
-    """Everything the page may ask for of the asset in `folder`; what `Asset.open`, `Capture.open` and `page_files` raise."""
+def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path | None = None) -> dict[str, Content]:
+    """Everything the page may ask for of the assets in `folders`, the first of which it shows first.
+
+    InputError where they, or the capture, are not of one scene; what `Asset.open`, `Capture.open` and `page_files` raise.
+    """
     page = page_files()
-    asset = Asset.open(folder)
+    assets = [Asset.open(folder) for folder in folders]
+    _check_siblings(assets, folders)
     references = None
     if capture is not None:
         references = References(Capture.open(capture))
-        references.check(asset)
+        for asset in assets:
+            references.check(asset)
     notes: list[str] = []
-    shown = shown_mesh(asset, mesh, notes)
-    told = facts.facts(asset, ASSET, shown is not None, facts.title(folder), CAPTURE if references else None, tuple(notes))
-    contents: dict[str, Content] = {"": page["index.html"], **page, facts.NAME: json.dumps(told).encode()}
-    manifest = folder / MANIFEST
-    for name in (MANIFEST, *asset.manifest.get("sha256", {}), *_named(asset)):
-        path = files.inside(folder, name, manifest)
-        if path.is_file():
-            contents[ASSET + name] = path
+    shown = shown_mesh(assets[0], mesh, notes)
+    measures = Measures(assets, references.capture if references else None)
+    contents: dict[str, Content] = {"": page["index.html"], **page}
+    told = []
+    names = facts.names(assets, folders)
+    for i, (asset, folder, name) in enumerate(zip(assets, folders, names, strict=True)):
+        place = "asset/" if i == 0 else f"asset-{i}/"
+        contents |= _files(asset, folder, place)
+        contents[f"spectrum-{i}.json"] = partial(measures.spectrum, i)
+        errors = None
+        if references is not None:
+            errors = f"{CAPTURE}errors-{i}.json"
+            contents[errors] = partial(measures.errors, i)
+        told.append(facts.described(asset, name, place, f"spectrum-{i}.json", errors))
     if shown is not None:
         contents[facts.MESH] = shown
     if references is not None:
         contents[f"{CAPTURE}lights.json"] = json.dumps(references.lights()).encode()
         for index in range(len(references.capture.lights)):
-            contents[f"{CAPTURE}{index}.exr"] = _image(references, index)
+            contents[f"{CAPTURE}{index}.exr"] = partial(references.image, index)
+    page_facts = facts.facts(assets[0], told, shown is not None, facts.title(folders[0]), CAPTURE if references else None, tuple(notes))
+    contents[facts.NAME] = json.dumps(page_facts).encode()
     return contents
 
 
-def _image(references: References, index: int) -> Callable[[], bytes]:
-    return lambda: references.image(index)
+def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
+    def kind(asset: Asset) -> str:
+        return f"{asset.width} x {asset.height} {facts.receiver_kind(asset)} of {asset.quantity}"
+
+    for asset, folder in zip(assets, folders, strict=True):
+        if kind(asset) != kind(assets[0]):
+            raise InputError(
+                f"expected assets of one capture, found {kind(assets[0])} in {folders[0]} and {kind(asset)} in {folder}; view them apart"
+            )
+
+
+def _files(asset: Asset, folder: Path, place: str) -> dict[str, Content]:
+    manifest = folder / MANIFEST
+    found: dict[str, Content] = {}
+    for name in (MANIFEST, *asset.manifest.get("sha256", {}), *_named(asset)):
+        path = files.inside(folder, name, manifest)
+        if path.is_file():
+            found[place + name] = path
+    return found
 
 
 def _named(asset: Asset) -> list[str]:
     """Files that asset.json names; an asset need not have checksums."""
     entries = [entry["file"] for entry in asset.layers]
     tables = [asset.manifest[name]["file"] for name in asset.tables]
-    return [*entries, *tables, *(asset.manifest[name] for name in asset.images)]
+    scene = [asset.manifest["scene"]] if "scene" in asset.manifest else []
+    return [*entries, *tables, *scene, *(asset.manifest[name] for name in asset.images)]

@@ -2,32 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from srbf.asset import Asset
+from srbf.quality import family_of, name_of
 from srbf.viewer.camera import fitted_camera
 
 NAME = "viewer.json"
 MESH = "mesh.glb"
+SPECTRUM = "spectrum.json"
 
 
-def facts(asset: Asset, folder: str, mesh: bool, title: str, capture: str | None = None, notes: tuple[str, ...] = ()) -> dict[str, Any]:
-    """`folder` is where the page finds asset.json, `capture` where it finds lights.json, both as it would follow a link."""
+def facts(
+    asset: Asset, assets: list[dict[str, Any]], mesh: bool, title: str, capture: str | None = None, notes: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link."""
     view = receiver_kind(asset) == "view"
     camera = fitted_camera(asset) if view else None
     return {
         "title": title,
-        "asset": folder,
+        "assets": assets,
         "kind": "view" if view else "lightmap",
         "mesh": MESH if mesh else None,
         "capture": capture,
         "camera": None
         if camera is None
         else {"position": camera.position.tolist(), "rotation": camera.rotation.tolist(), "lens": camera.lens.tolist()},
-        "resident_bytes": asset.resident_bytes(),
         "notes": list(notes),
     }
+
+
+def described(asset: Asset, name: str, folder: str, spectrum: str, errors: str | None = None) -> dict[str, Any]:
+    """One asset: what it is called, where the page finds asset.json, its spectrum, and its errors by light; what it takes."""
+    return {
+        "name": name,
+        "folder": folder,
+        "resident_bytes": asset.resident_bytes(),
+        "bytes_per_texel": asset.bytes_per_texel()["directional"],
+        "spectrum": spectrum,
+        "errors": errors,
+    }
+
+
+def names(assets: Sequence[Asset], folders: Sequence[Path]) -> list[str]:
+    """What tells assets apart: their method and size, and the folder's name where two are alike."""
+    told = [name_of(asset) if asset.method == "relighting-map" else f"{family_of(asset)}, {name_of(asset)}" for asset in assets]
+    return [f"{folder.resolve().name}: {name}" if told.count(name) > 1 else name for folder, name in zip(folders, told, strict=True)]
 
 
 def receiver_kind(asset: Asset) -> str:

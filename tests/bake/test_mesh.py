@@ -86,9 +86,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def surroundings(folder: Path) -> Scene:
-    """With the capture of its ground, by the command."""
+    """With the capture of its ground, by the command; its materials have node groups, which a bake must bear too."""
     build = built("surroundings.py", folder)
-    baked(build("ground"), folder / "capture", Receiver("lightmap", "Ground", "lightmap"))
+    baked(build("surroundings"), folder / "capture", Receiver("lightmap", "Ground", "lightmap"))
     line = ["mesh", build("surroundings"), "-o", folder / "scene.glb", "--capture", folder / "capture", "--json"]
     done = CliRunner().invoke(app, list(map(str, line)))
     assert done.exit_code == 0, done.stderr

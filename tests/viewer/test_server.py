@@ -53,7 +53,7 @@ def test_the_asset_and_the_page_are_served_byte_for_byte(folder: Path, serve: Ca
     for name in ("asset.json", "map_00.png", "r_table.exr", "position.exr", "coverage.exr"):
         assert ask(url, f"/asset/{name}") == (200, (folder / name).read_bytes())
     told = json.loads(ask(url, "/viewer.json")[1])
-    assert (told["asset"], told["kind"], told["mesh"], told["capture"]) == ("asset/", "view", None, None)
+    assert (told["assets"][0]["folder"], told["kind"], told["mesh"], told["capture"]) == ("asset/", "view", None, None)
     status, body = ask(url, "/asset/asset.json", "HEAD")
     assert (status, body) == (200, b"")
 
@@ -94,7 +94,7 @@ def test_other_hosts_and_methods_are_refused(folder: Path, serve: Callable[..., 
 
 
 def test_the_server_listens_on_this_machine_alone(folder: Path, built: Path) -> None:
-    server = ViewerServer(contents_of(folder))
+    server = ViewerServer(contents_of([folder]))
     try:
         assert server.server_address[0] == "127.0.0.1"
         with pytest.raises(InputError, match="free port"):
@@ -107,7 +107,7 @@ def test_links_that_leave_the_folder_are_refused(folder: Path, built: Path) -> N
     (folder / "map_00.png").unlink()
     (folder / "map_00.png").symlink_to(folder.parent / "beside.txt")
     with pytest.raises((ManifestError, ImageError)):
-        contents_of(folder)
+        contents_of([folder])
 
 
 def test_a_capture_s_images_are_served_as_they_are(
@@ -132,7 +132,7 @@ def test_a_capture_of_something_else_is_refused(
     capture = make_capture(lambda direction: np.ones((5, 4, 3), np.float32), lights=4, holdout=1)
     complete(make_asset(k=3)).save(tmp_path / "asset")
     with pytest.raises(InputError, match="expected the capture that the asset was fitted from"):
-        contents_of(tmp_path / "asset", capture.folder)
+        contents_of([tmp_path / "asset"], capture.folder)
 
 
 def test_without_the_built_page_it_says_what_to_run(tmp_path: Path) -> None:

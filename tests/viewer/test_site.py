@@ -36,8 +36,9 @@ def test_a_site_is_the_asset_and_the_page(built: Path, lightmap: Asset, tmp_path
     assert (site / "viewer.js").read_bytes() == (built / "viewer.js").read_bytes()
     assert (site / "mesh.glb").read_bytes()[:4] == b"glTF"
     told = json.loads((site / "viewer.json").read_text())
-    assert (told["asset"], told["mesh"], told["kind"], told["title"], told["capture"]) == ("./", "mesh.glb", "lightmap", "Table", None)
-    named = {"asset.json", "mesh.glb", "viewer.json", "index.html", "viewer.js", "viewer.css", "LICENSES.txt"}
+    assert (told["mesh"], told["kind"], told["title"], told["capture"]) == ("mesh.glb", "lightmap", "Table", None)
+    assert [one["folder"] for one in told["assets"]] == ["./"]
+    named = {"asset.json", "mesh.glb", "viewer.json", "spectrum.json", "index.html", "viewer.js", "viewer.css", "LICENSES.txt"}
     assert {path.name for path in site.iterdir() if path.is_file()} == named
     assert str(tmp_path) not in (site / "viewer.json").read_text()
 

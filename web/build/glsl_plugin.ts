@@ -1,4 +1,4 @@
-/** A Vite plugin: importing a .glsl file gives its text, includes of the shader pack in place. */
+/** A Vite plugin: importing a .glsl, .vert or .frag file gives its text, includes of the shader pack in place. */
 import { fileURLToPath } from "node:url";
 import type { Plugin } from "vite";
 import { resolveIncludes } from "./glsl_includes.ts";
@@ -11,7 +11,7 @@ export function glsl(root: string = SHADER_PACK): Plugin {
     enforce: "pre",
     load(id) {
       const path = id.split("?")[0];
-      if (!path.endsWith(".glsl")) return null;
+      if (!/\.(glsl|vert|frag)$/.test(path)) return null;
       const shader = resolveIncludes(path, root);
       for (const file of shader.files) this.addWatchFile(file);
       return `export default ${JSON.stringify(shader.text)};`;

@@ -44,6 +44,9 @@ export interface Manifest {
   coverage?: string;
   ambient?: string;
   albedo?: string;
+  /** The .glb of what casts, of indirect assets. */
+  scene?: string;
+  direct?: { sun_angle?: number; footprint?: number };
   asset_from_world?: Matrix4;
   sha256?: Record<string, string>;
   source?: { receiver?: { kind?: string } };

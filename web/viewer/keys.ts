@@ -5,13 +5,14 @@ import type { Changed, State } from "./state";
 const STEP = (2 * Math.PI) / 180;
 const LARGE_STEP = (10 * Math.PI) / 180;
 
-export const KEYS: [string, string][] = [
+const KEYS: [string, string][] = [
   ["← → ↑ ↓", "move the sun, by 2°; with shift by 10°"],
   ["space", "play or hold the path"],
   ["1 … 9", "select a light"],
   ["delete", "remove the light"],
   ["double click", "put the lamp above a point, or aim the spot at it"],
-  ["t", "mesh or texels"],
+  ["t", "the scene, the mesh alone, or texels"],
+  ["a", "the next asset"],
   ["c", "compare with the capture, the next way"],
   ["m", "the next map"],
   ["r", "reset the view"],
@@ -19,7 +20,10 @@ export const KEYS: [string, string][] = [
   ["?", "this list"],
 ];
 
-export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void }): void {
+/** The list of them, as HTML. */
+export const tabled = () => `<h2>Keys</h2><table>${KEYS.map(([key, what]) => `<tr><td>${key}</td><td>${what}</td></tr>`).join("")}</table>`;
+
+export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void; nextAsset(): void }): void {
   window.addEventListener("keydown", (event) => {
     const target = event.target as HTMLElement;
     if (/^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -38,6 +42,7 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
       state.selected = Math.min(state.selected, state.lights.length - 1);
       changed({ lights: true, panel: true });
     } else if (event.key === "t") act.nextView();
+    else if (event.key === "a") act.nextAsset();
     else if (event.key === "c") act.nextCompare();
     else if (event.key === "m") act.nextMap();
     else if (event.key === "r") act.reset();

@@ -1,38 +1,75 @@
 /** What the page reads before it shows anything, and how far it is. */
-import { type Object3D, type WebGLRenderer } from "three";
+import type { BufferGeometry, Material, Mesh, Object3D, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Asset, type FloatImage, loadAsset, SrbfError } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { insidePath } from "../src/manifest";
+import type { DirectInputs } from "./direct_light";
 import type { FittedCamera } from "./frames";
 import { References } from "./reference";
+
+/** One asset, as `srbf/viewer/facts.py` describes it. */
+export interface AssetFacts {
+  name: string;
+  folder: string;
+  resident_bytes: number;
+  bytes_per_texel: number;
+  spectrum: string;
+  errors: string | null;
+}
 
 /** viewer.json: `srbf/viewer/facts.py`. */
 export interface Facts {
   title: string;
-  asset: string;
+  assets: AssetFacts[];
   kind: "view" | "lightmap";
   mesh: string | null;
   capture: string | null;
   camera: FittedCamera | null;
-  resident_bytes: number;
   notes: string[];
+}
+
+/** An asset with what only a page asks of it. */
+export interface LoadedAsset {
+  facts: AssetFacts;
+  asset: Asset;
+  coverage?: FloatImage;
+  /** Of an indirect asset that can be given its direct light. */
+  direct?: DirectInputs;
 }
 
 export interface Loaded {
   facts: Facts;
-  asset: Asset;
-  coverage?: FloatImage;
+  first: LoadedAsset;
   model?: Object3D;
   references?: References;
   notes: string[];
 }
 
-/** @throws SrbfError in one line where anything that is needed is missing or damaged. */
-export async function load(progress: (done: number, what: string) => void): Promise<Loaded> {
+type Fetcher = (url: string) => Promise<Response>;
+
+/** What is read of viewer.json before anything else. @throws SrbfError where it is missing. */
+export async function loadFacts(): Promise<Facts> {
   const facts: Facts = await (await fetched(fetch.bind(window), "viewer.json")).json();
   document.title = `${facts.title} · srbf`;
+  return facts;
+}
+
+/** @throws SrbfError in one line where anything that is needed is missing or damaged. */
+export async function load(facts: Facts, index: number, progress: (done: number, what: string) => void): Promise<Loaded> {
+  const notes = [...facts.notes];
+  const [first, model, references] = await Promise.all([
+    loadOne(facts.assets[index], progress),
+    facts.mesh ? readModel(facts.mesh, notes) : undefined,
+    facts.capture ? References.load(facts.capture) : undefined,
+  ]);
+  progress(1, "");
+  return { facts, first, model, references, notes };
+}
+
+/** One of the assets. @throws SrbfError as `load`. */
+export async function loadOne(facts: AssetFacts, progress: (done: number, what: string) => void): Promise<LoadedAsset> {
   let total = 2;
   let done = 0;
   const counting = async (url: string) => {
@@ -45,27 +82,44 @@ export async function load(progress: (done: number, what: string) => void): Prom
     progress(++done / Math.max(done, total), url);
     return new Response(body, { status: response.status });
   };
-  const asset = await loadAsset(facts.asset, { fetch: counting, verify: globalThis.isSecureContext });
-  const notes = [...facts.notes];
-  const [coverage, model, references] = await Promise.all([
-    readCoverage(asset, facts.asset, counting),
-    facts.mesh ? readModel(facts.mesh, notes) : undefined,
-    facts.capture ? References.load(facts.capture) : undefined,
-  ]);
-  progress(1, "");
-  return { facts, asset, coverage, model, references, notes };
+  const asset = await loadAsset(facts.folder, { fetch: counting, verify: globalThis.isSecureContext });
+  const { coverage: name } = asset.manifest;
+  const coverage = name === undefined ? undefined : await readImage(facts.folder, name, counting);
+  return { facts, asset, coverage, direct: await readDirect(asset, coverage, facts.folder, counting) };
 }
 
-async function readCoverage(asset: Asset, folder: string, fetcher: (url: string) => Promise<Response>): Promise<FloatImage | undefined> {
-  const name = asset.manifest.coverage;
-  if (name === undefined) return undefined;
+async function readImage(folder: string, name: string, fetcher: Fetcher): Promise<FloatImage> {
   const url = folder + insidePath(name);
   return decodeFloat(await (await fetched(fetcher, url)).arrayBuffer(), url);
 }
 
+/** None of combined assets, and of indirect ones that were made without what direct light needs. */
+async function readDirect(asset: Asset, coverage: FloatImage | undefined, folder: string, fetcher: Fetcher): Promise<DirectInputs | undefined> {
+  const { transport, scene, normal, albedo, quantity } = asset.manifest;
+  if (transport !== "indirect" || !scene || !normal || !asset.position || (quantity === "radiance" && !albedo)) return undefined;
+  const [normals, colours, casters] = await Promise.all([
+    readImage(folder, normal, fetcher),
+    quantity === "radiance" && albedo ? readImage(folder, albedo, fetcher) : undefined,
+    fetched(fetcher, folder + insidePath(scene))
+      .then((response) => response.arrayBuffer())
+      .then((buffer) => new GLTFLoader().parseAsync(buffer, "")),
+  ]);
+  return { normal: normals, coverage, albedo: colours, scene: casters.scene };
+}
+
 async function readModel(url: string, notes: string[]): Promise<Object3D | undefined> {
   try {
-    return (await new GLTFLoader().loadAsync(url)).scene;
+    const gltf = await new GLTFLoader().loadAsync(url);
+    gltf.scene.userData.cameras = gltf.cameras;
+    const surfaces: Promise<void>[] = [];
+    gltf.scene.traverse((object) => {
+      const { material, userData } = object as Mesh<BufferGeometry, Material>;
+      const surface = material?.userData.gltfExtensions?.SRBF_relighting_map?.surface;
+      if (surface === undefined) return;
+      surfaces.push(gltf.parser.getDependency("material", surface).then((found) => void (userData.surface = found)));
+    });
+    await Promise.all(surfaces);
+    return gltf.scene;
   } catch (error) {
     notes.push(`cannot read ${url}: ${error instanceof Error ? error.message : String(error)}; the texels are shown`);
     return undefined;

@@ -1,5 +1,5 @@
 /** The page: loads an asset and shows it, or says in one line why not. */
-import { load } from "./loading";
+import { load, loadFacts } from "./loading";
 import { element, lineOf } from "./messages";
 import { Viewer } from "./viewer";
 
@@ -8,18 +8,25 @@ async function main(): Promise<void> {
   const [what, bar] = [loading.querySelector("p") as HTMLElement, loading.querySelector("progress") as HTMLProgressElement];
   document.body.dataset.state = "busy";
   try {
-    const loaded = await load((done, name) => {
+    const facts = await loadFacts();
+    const loaded = await load(facts, assetOf(location.hash, facts.assets.length), (done, name) => {
       if (document.body.dataset.state === "failed") return;
       bar.value = done;
       what.textContent = name ? `Loading ${name.split("/").pop()}` : "Loading";
     });
-    new Viewer(loaded);
+    await Viewer.start(loaded);
     loading.remove();
   } catch (error) {
     document.body.dataset.state = "failed";
     loading.classList.add("failed");
     what.textContent = lineOf(error);
   }
+}
+
+/** Which asset an address asks for; the first where it says none, or none that there is. */
+function assetOf(hash: string, count: number): number {
+  const index = Number(/'asset':(\d+)/.exec(decodeURIComponent(hash))?.[1] ?? 0);
+  return index < count ? index : 0;
 }
 
 void main();

@@ -3,7 +3,7 @@ import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
 import { directionalState, isLampState, type LightState, pointState, rounded, spotState } from "./light_state";
 import type { Bounds } from "./receivers";
-import { type Changed, COMPARES, MOST_LIGHTS, PATHS, SHOWS, type State, TONES } from "./state";
+import { type Changed, COMPARES, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
 
 export interface Actions {
   changed: Changed;
@@ -11,14 +11,20 @@ export interface Actions {
   savePng(): void;
   saveFrames(): void;
   savePath(): void;
+  chooseAsset(): void;
   resetCamera(): void;
   moveTarget(on: boolean): void;
 }
 
 export interface PanelFacts {
+  /** Of the asset that is shown. */
   maps: number;
   hasPositions: boolean;
+  hasDirect: boolean;
+  /** Names of all that can be switched between. */
+  assets: string[];
   hasMesh: boolean;
+  hasScene: boolean;
   hasCapture: boolean;
   bounds: Bounds;
 }
@@ -34,10 +40,15 @@ export class Panel {
     private readonly chips: HTMLElement,
     private readonly controls: HTMLElement,
     private readonly state: State,
-    private readonly facts: PanelFacts,
+    private facts: PanelFacts,
     private readonly actions: Actions,
   ) {
     this.rebuild();
+  }
+
+  /** After another asset was chosen. */
+  tell(facts: Partial<PanelFacts>): void {
+    this.facts = { ...this.facts, ...facts };
   }
 
   /** After lights came, went or were selected. */
@@ -180,6 +191,12 @@ export class Panel {
 
   private picture(): void {
     const folder = (this.gui as GUI).addFolder("Picture");
+    const { assets, hasDirect, hasMesh, hasScene } = this.facts;
+    if (assets.length > 1) {
+      const names = Object.fromEntries(assets.map((name, i) => [name, i]));
+      folder.add(this.state, "asset", names).name("Asset").onChange(this.actions.chooseAsset);
+    }
+    if (hasDirect) folder.add(this.state, "terms", { All: TERMS[0], Direct: TERMS[1], Indirect: TERMS[2] }).name("Light").onChange(this.relight);
     folder.add(this.state, "exposure", -8, 8, 0.05).name("Exposure (stops)").onChange(this.redraw);
     folder.add(this.state, "tone", { Linear: TONES[0], AgX: TONES[1], ACES: TONES[2] }).name("Tone").onChange(this.redraw);
     folder.add(this.state, "show", { Picture: SHOWS[0], "False colour": SHOWS[1], "Negative values": SHOWS[2], "A map": SHOWS[3] }).name("Show").onChange(this.relight);
@@ -190,7 +207,9 @@ export class Panel {
         this.state.show = "map";
         this.relight();
       });
-    if (this.facts.hasMesh) folder.add(this.state, "view", { Mesh: "mesh", Texels: "texels" }).name("On").onChange(this.redraw);
+    folder.add(this.state, "spectrum").name("Spectrum").onChange(this.redraw);
+    const views = { ...(hasScene ? { Scene: VIEWS[0] } : {}), Mesh: VIEWS[1], Texels: VIEWS[2] };
+    if (hasMesh) folder.add(this.state, "view", views).name("On").onChange(this.redraw);
     folder.add(this.actions, "resetCamera").name("Reset view");
   }
 
@@ -198,6 +217,7 @@ export class Panel {
     const folder = (this.gui as GUI).addFolder("Compare");
     const names = { Off: COMPARES[0], "Slider: reference | relit": COMPARES[1], Difference: COMPARES[2], Reference: COMPARES[3] };
     folder.add(this.state, "compare", names).name("With the capture").onChange(this.relight);
+    folder.add(this.state, "errors").name("Errors on the sky").onChange(this.redraw);
   }
 
   private path(): void {
@@ -211,6 +231,7 @@ export class Panel {
         if (this.state.playing && this.state.path === "none") this.state.path = "turn";
         this.relight();
       });
+    if (this.facts.hasMesh) folder.add(this.state, "turntable").name("Camera turns").onChange(this.redraw);
   }
 
   private save(): void {

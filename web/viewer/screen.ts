@@ -1,9 +1,11 @@
 /** What the screen shows of a texel: the relit picture, a map, or how it differs from the reference; exposure, tone, false colour. */
-import { GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
+import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
 
 export const VALUES = { picture: 0, reference: 1, difference: 2, map: 3, negative: 4 } as const;
 export const COLOURS = { linear: 0, agx: 1, aces: 2, magnitude: 3, signed: 4, negative: 5 } as const;
+
+export const BACKGROUND = new Color(0x0f1114);
 
 const FRAGMENT = `precision highp float;
 precision highp int;
@@ -64,8 +66,18 @@ vec3 srgb(vec3 c) {
     return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
 }
 
+#ifdef DEVELOPED
+// A picture with its own alpha, on the background.
+uniform vec3 background;
+#endif
+
 void main() {
+#ifdef DEVELOPED
+    vec4 seen = textureLod(relit, vUv, 0.0);
+    vec3 v = seen.rgb / max(seen.a, 1e-4);
+#else
     vec3 v = valueAt();
+#endif
     vec3 c;
     if (colour == ${COLOURS.magnitude}) c = turbo(luminance(v) * toneMappingExposure);
     else if (colour == ${COLOURS.signed}) c = signedColour(luminance(v) * toneMappingExposure);
@@ -78,6 +90,9 @@ void main() {
     else if (colour == ${COLOURS.agx}) c = srgb(AgXToneMapping(v));
     else if (colour == ${COLOURS.aces}) c = srgb(ACESFilmicToneMapping(v));
     else c = srgb(LinearToneMapping(v));
+#ifdef DEVELOPED
+    c = mix(background, c, min(seen.a, 1.0));
+#endif
     shown = vec4(c, 1.0);
 }`;
 
@@ -98,6 +113,14 @@ out vec2 vUv;
 void main() {
     vUv = vec2(0.5 + 0.5 * position.x, 0.5 - 0.5 * position.y);
     gl_Position = vec4(position.xy * pictureScale + pictureOffset, 1.0, 1.0);
+}`;
+
+const WHOLE = `precision highp float;
+in vec3 position;
+out vec2 vUv;
+void main() {
+    vUv = 0.5 + 0.5 * position.xy;
+    gl_Position = vec4(position.xy, 1.0, 1.0);
 }`;
 
 export type ScreenUniforms = Record<string, IUniform> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
@@ -124,11 +147,13 @@ export function screenUniforms(relit: Texture, textures: SrbfTextures): ScreenUn
   };
 }
 
-export function screenMaterial(uniforms: ScreenUniforms, onto: "mesh" | "picture"): RawShaderMaterial {
+/** Onto a `mesh`, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom, with alpha. */
+export function screenMaterial(uniforms: ScreenUniforms, onto: "mesh" | "picture" | "screen"): RawShaderMaterial {
   return new RawShaderMaterial({
     glslVersion: GLSL3,
-    uniforms,
-    vertexShader: onto === "mesh" ? MESH : PICTURE,
+    defines: onto === "screen" ? { DEVELOPED: "" } : {},
+    uniforms: { ...uniforms, background: { value: BACKGROUND.clone().convertLinearToSRGB() } },
+    vertexShader: { mesh: MESH, picture: PICTURE, screen: WHOLE }[onto],
     fragmentShader: FRAGMENT,
     depthTest: onto === "mesh",
     depthWrite: onto === "mesh",

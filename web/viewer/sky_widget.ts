@@ -14,6 +14,8 @@ export interface SkyPoint {
 export class SkyWidget {
   /** The baked light that is compared with, if any. */
   marked = -1;
+  /** PSNR of every point, dB, to be shown in its place: worse is hotter. */
+  errors?: readonly number[];
   private readonly context: CanvasRenderingContext2D;
   private readonly widest: number;
   private dragging = false;
@@ -22,7 +24,7 @@ export class SkyWidget {
     private readonly canvas: HTMLCanvasElement,
     private readonly state: State,
     private readonly domain: "sphere" | "hemisphere",
-    private readonly points: readonly SkyPoint[],
+    private points: readonly SkyPoint[],
     private readonly changed: Changed,
   ) {
     this.context = canvas.getContext("2d") as CanvasRenderingContext2D;
@@ -32,6 +34,11 @@ export class SkyWidget {
       if (this.dragging) this.move(event);
     });
     for (const end of ["pointerup", "pointercancel"] as const) canvas.addEventListener(end, () => (this.dragging = false));
+  }
+
+  /** Other points: of another asset. */
+  show(points: readonly SkyPoint[]): void {
+    this.points = points;
   }
 
   /** Whether the capture saw light from there. */
@@ -48,7 +55,9 @@ export class SkyWidget {
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.clearRect(0, 0, width, height);
     this.ground();
-    for (const [i, point] of this.points.entries()) this.dot(point, i === this.marked);
+    const range = this.errors && ends(this.errors);
+    for (const [i, point] of this.points.entries()) this.dot(point, i === this.marked, range && ((this.errors as number[])[i] - range[0]) / (range[1] - range[0]));
+    if (range) this.scale(range);
     this.state.lights.forEach((light, i) => {
       if (light.kind === "directional") this.sun(light, i === this.state.selected);
     });
@@ -151,16 +160,41 @@ export class SkyWidget {
     c.fillText("+Y", x, y - radius - 6);
   }
 
-  private dot(point: SkyPoint, marked: boolean): void {
+  /** `good`: 0 of the worst, 1 of the best. */
+  private dot(point: SkyPoint, marked: boolean, good?: number): void {
     const [x, y] = this.project(point.direction);
+    if (good !== undefined) {
+      circle(this.context, x, y, point.role === "train" ? (this.points.length > 150 ? 3.2 : 5) : 4.4, heat(1 - good));
+      if (point.role === "holdout") this.ring(x, y, 4.4, "#ffffffb0", 1);
+      if (marked) this.ring(x, y, 6.5, "#7fd1ff", 2);
+      return;
+    }
     const tint = { train: "#9fb2c8a0", center: "#9fb2c8c0", validation: "#e0b35ac0", holdout: "#e08a5ac0" }[point.role];
     circle(this.context, x, y, point.role === "center" ? 1.8 : this.points.length > 150 ? 1.1 : 1.5, tint);
-    if (!marked) return;
-    this.context.strokeStyle = "#7fd1ff";
-    this.context.lineWidth = 2;
+    if (marked) this.ring(x, y, 5, "#7fd1ff", 2);
+  }
+
+  private ring(x: number, y: number, radius: number, colour: string, width: number): void {
+    this.context.strokeStyle = colour;
+    this.context.lineWidth = width;
     this.context.beginPath();
-    this.context.arc(x, y, 5, 0, 2 * Math.PI);
+    this.context.arc(x, y, radius, 0, 2 * Math.PI);
     this.context.stroke();
+  }
+
+  /** What the colours of errors mean. */
+  private scale([worst, best]: [number, number]): void {
+    const c = this.context;
+    const { clientHeight: height } = this.canvas;
+    const [top, high] = [height - 92, 80];
+    for (let i = 0; i < high; ++i) {
+      c.fillStyle = heat(i / (high - 1));
+      c.fillRect(4, top + i, 7, 1.5);
+    }
+    c.fillStyle = "#aab3bd";
+    c.textAlign = "left";
+    c.fillText(`${best.toFixed(1)} dB`, 15, top + 4);
+    c.fillText(`${worst.toFixed(1)} dB`, 15, top + high - 4);
   }
 
   private sun(light: DirectionalState, selected: boolean): void {
@@ -172,6 +206,19 @@ export class SkyWidget {
     circle(c, x, y, selected ? 6 : 4.5, light.color);
     c.globalAlpha = 1;
   }
+}
+
+/** The least and the most of `values`, apart. */
+function ends(values: readonly number[]): [number, number] {
+  const [least, most] = [Math.min(...values), Math.max(...values)];
+  return [least, Math.max(most, least + 0.1)];
+}
+
+/** Blue of 0 through white to red of 1. */
+function heat(x: number): string {
+  const [cold, mild, hot] = [[66, 135, 245], [232, 230, 220], [235, 64, 40]];
+  const [from, to, t] = x < 0.5 ? [cold, mild, 2 * x] : [mild, hot, 2 * x - 1];
+  return `rgb(${from.map((value, i) => Math.round(value + (to[i] - value) * t)).join(" ")})`;
 }
 
 function circle(c: CanvasRenderingContext2D, x: number, y: number, r: number, fill: string): void {

@@ -1,7 +1,6 @@
-/** The large picture: a mesh under an orbit camera, or texels as a picture that is panned and zoomed; lamps as gizmos on either. */
+/** The large picture: a mesh under an orbit camera, alone or in its scene, or texels as a picture to be panned and zoomed; lamps as gizmos on it. */
 import {
   type BufferGeometry,
-  Color,
   type Material,
   Mesh,
   type Object3D,
@@ -9,20 +8,22 @@ import {
   PlaneGeometry,
   Raycaster,
   Scene,
+  type Texture,
   Vector2,
+  Vector3,
   WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Triple } from "../src";
+import type { Light, Triple } from "../src";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { LampGizmos } from "./lamp_gizmos";
 import { rounded } from "./light_state";
 import type { Receivers } from "./receivers";
-import { screenMaterial, type ScreenUniforms } from "./screen";
+import { BACKGROUND, COLOURS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
+import { Surroundings } from "./surroundings";
 
-const BACKGROUND = new Color(0x0f1114);
 const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes what it clears a canvas to, not a target
 const MOST_PIXEL_RATIO = 2;
 
@@ -34,7 +35,10 @@ export class Stage {
   private readonly orbitCamera = new PerspectiveCamera(38, 1, 0.01, 100);
   private camera: PerspectiveCamera | undefined;
   private readonly quad: Mesh;
-  private lit: Mesh[] = [];
+  private readonly developed = new Scene();
+  private readonly developedFrom: { value: Texture | null } = { value: null };
+  private surroundings?: Surroundings;
+  private readonly lit: Mesh[] = [];
 
   constructor(
     readonly renderer: WebGLRenderer,
@@ -43,13 +47,20 @@ export class Stage {
     private readonly state: State,
     private readonly receivers: Receivers,
     private readonly fitted: FittedCamera | undefined,
-    model: Object3D | undefined,
+    private readonly model: Object3D | undefined,
+    quantity: "irradiance" | "radiance",
     changed: Changed,
   ) {
     this.quad = new Mesh(new PlaneGeometry(2, 2), screenMaterial(uniforms, "picture"));
     this.quad.frustumCulled = false;
     this.picture.add(this.quad);
     if (model) this.addModel(model);
+    if (model && this.lit.length && Surroundings.in(model)) {
+      this.surroundings = new Surroundings(model, uniforms, quantity, renderer);
+      const developer = new Mesh(new PlaneGeometry(2, 2), screenMaterial({ ...uniforms, relit: this.developedFrom }, "screen"));
+      developer.frustumCulled = false;
+      this.developed.add(developer);
+    }
     const canvas = renderer.domElement;
     this.orbit = new OrbitControls(this.orbitCamera, canvas);
     this.orbit.enableDamping = false;
@@ -66,7 +77,27 @@ export class Stage {
 
   /** Whether the mesh is shown, rather than a picture. */
   get hasMesh(): boolean {
-    return this.lit.length > 0 && this.state.view === "mesh";
+    return this.lit.length > 0 && this.state.view !== "texels";
+  }
+
+  /** Whether there is a scene around the mesh. */
+  get canShowScene(): boolean {
+    return this.surroundings !== undefined;
+  }
+
+  /** Whether the mesh is shown in its scene: what is shown of the lightmap alone, such as a map, is shown on the mesh alone. */
+  private get inScene(): boolean {
+    const { value, colour } = this.uniforms;
+    return this.canShowScene && this.state.view === "scene" && value.value === VALUES.picture && colour.value !== COLOURS.negative;
+  }
+
+  /** Turn the orbit camera about its target, by so many rad. */
+  turn(angle: number): void {
+    const { position } = this.orbitCamera;
+    position.sub(this.orbit.target).applyAxisAngle(this.orbitCamera.up, angle).add(this.orbit.target);
+    this.orbitCamera.lookAt(this.orbit.target);
+    this.orbitCamera.updateMatrixWorld(true);
+    this.state.eye = [rounded(fromThree(position)), rounded(fromThree(this.orbit.target))];
   }
 
   get canShowMesh(): boolean {
@@ -94,13 +125,13 @@ export class Stage {
     this.placeCamera();
   }
 
-  draw(): void {
+  draw(lights: readonly Light[]): void {
     this.orbit.enabled = this.hasMesh && !this.gizmos.dragging;
     this.renderer.setClearColor(BACKGROUND);
     this.uniforms.split.value *= this.renderer.getPixelRatio();
     this.aim();
-    this.renderer.autoClear = true;
-    this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
+    const { x, y } = this.renderer.getDrawingBufferSize(new Vector2());
+    this.render(lights, null, x, y);
     if (this.camera) {
       this.renderer.autoClear = false;
       this.gizmos.draw(this.renderer, this.camera, this.hasMesh);
@@ -109,7 +140,7 @@ export class Stage {
   }
 
   /** The picture texel for texel, or the mesh as large as the screen has it; RGBA bytes, top row first, nothing drawn over it. */
-  pixels(): { width: number; height: number; data: Uint8Array } {
+  pixels(lights: readonly Light[]): { width: number; height: number; data: Uint8Array } {
     const buffer = this.renderer.getDrawingBufferSize(new Vector2());
     const { width, height } = this.hasMesh ? { width: buffer.x, height: buffer.y } : this.size;
     const target = new WebGLRenderTarget(width, height, { samples: this.hasMesh ? 4 : 0 });
@@ -122,10 +153,9 @@ export class Stage {
       this.uniforms.pictureOffset.value.set(0, 0);
       this.uniforms.nearest.value = true;
     }
-    this.renderer.autoClear = true;
     this.renderer.setClearColor(BACKGROUND_BYTES);
+    this.render(lights, target, width, height);
     this.renderer.setRenderTarget(target);
-    this.renderer.render(this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
     const upward = new Uint8Array(4 * width * height);
     this.renderer.readRenderTargetPixels(target, 0, 0, width, height, upward);
     this.renderer.setRenderTarget(null);
@@ -134,6 +164,16 @@ export class Stage {
     const data = new Uint8Array(upward.length);
     for (let r = 0; r < height; ++r) data.set(upward.subarray(4 * width * (height - 1 - r), 4 * width * (height - r)), 4 * width * r);
     return { width, height, data };
+  }
+
+  /** What is shown, without gizmos, into `target` or on the canvas, of so many pixels. */
+  private render(lights: readonly Light[], target: WebGLRenderTarget | null, width: number, height: number): void {
+    const { renderer } = this;
+    const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, width, height) : undefined;
+    this.developedFrom.value = whole ?? null;
+    renderer.autoClear = true;
+    renderer.setRenderTarget(target);
+    renderer.render(whole ? this.developed : this.hasMesh ? this.scene : this.picture, this.camera ?? this.orbitCamera);
   }
 
   /** What is seen at a place of the canvas (CSS pixels), in the asset's world. */
@@ -191,10 +231,8 @@ export class Stage {
   }
 
   private placeCamera(): void {
-    const { centre, radius } = this.receivers.bounds;
-    const away = radius * Math.max(1, 1.15 / this.orbitCamera.aspect); // farther where the window is narrow
-    const around: Triple = [centre[0] - 0.9 * away, centre[1] - 2.1 * away, centre[2] + 1.9 * away];
-    const [eye, target] = this.state.eye ?? [around, centre];
+    const { radius } = this.receivers.bounds;
+    const [eye, target] = this.state.eye ?? this.firstView();
     this.orbitCamera.near = radius * 0.01;
     this.orbitCamera.far = radius * 60;
     this.orbitCamera.position.copy(toThree(eye));
@@ -202,6 +240,20 @@ export class Stage {
     this.orbitCamera.updateProjectionMatrix();
     this.orbitCamera.lookAt(this.orbit.target);
     this.orbitCamera.updateMatrixWorld(true);
+  }
+
+  /** From where the file's own camera stands, else from above and in front; it looks at the receivers' middle. */
+  private firstView(): [Triple, Triple] {
+    const { centre, radius } = this.receivers.bounds;
+    const farther = Math.max(1, 1.15 / this.orbitCamera.aspect); // where the window is narrow
+    const own = (this.model?.userData.cameras as Object3D[] | undefined)?.[0];
+    if (own) {
+      own.updateWorldMatrix(true, false);
+      const eye = fromThree(new Vector3().setFromMatrixPosition(own.matrixWorld));
+      return [eye.map((x, i) => centre[i] + (x - centre[i]) * farther) as unknown as Triple, centre];
+    }
+    const away = radius * farther;
+    return [[centre[0] - 0.9 * away, centre[1] - 2.1 * away, centre[2] + 1.9 * away], centre];
   }
 
   /** Meshes with the extension take the relit light; what else a file holds is left out. */

@@ -6,8 +6,12 @@ export const TONES = ["linear", "agx", "aces"] as const;
 export const SHOWS = ["picture", "false colour", "negative", "map"] as const;
 export const COMPARES = ["off", "slider", "difference", "reference"] as const;
 export const PATHS = ["none", "turn", "swing"] as const;
+export const TERMS = ["both", "direct", "indirect"] as const;
+export const VIEWS = ["scene", "mesh", "texels"] as const;
 
 export interface State {
+  /** Which of the assets. */
+  asset: number;
   lights: LightState[];
   /** Which light the controls are of. */
   selected: number;
@@ -17,11 +21,16 @@ export interface State {
   show: (typeof SHOWS)[number];
   /** Which map, or scalar plane, `map` shows. */
   map: number;
+  /** What an indirect asset is shown with: its own light, the direct light, or the two together. */
+  terms: (typeof TERMS)[number];
+  /** Whether the sky shows every baked light's error, and whether the spectrum is drawn. */
+  errors: boolean;
+  spectrum: boolean;
   compare: (typeof COMPARES)[number];
   /** Where the slider is, 0 to 1 of the picture's width. */
   split: number;
-  /** The lit mesh, or the lightmap's texels as a picture. */
-  view: "mesh" | "texels";
+  /** The lit mesh among the rest of the scene, alone, or the lightmap's texels as a picture. */
+  view: (typeof VIEWS)[number];
   /** The orbit camera's position and target, in the asset's world. */
   eye?: [Triple, Triple];
   /** Of pictures: screen pixels a texel, 0: as large as fits; and the texel in the middle. */
@@ -31,6 +40,8 @@ export interface State {
   /** Seconds for one round. */
   seconds: number;
   playing: boolean;
+  /** Whether the camera goes round while the path plays, in twice its time. */
+  turntable: boolean;
 }
 
 /** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be drawn anew. */
@@ -66,7 +77,10 @@ export function decodeState(hash: string, plain: State): State {
   one("map", (value: number) => Number.isInteger(value) && value >= 0);
   one("compare", choice(COMPARES));
   one("split", number(0, 1));
-  one("view", choice(["mesh", "texels"]));
+  one("view", choice(VIEWS));
+  one("asset", (value: number) => Number.isInteger(value) && value >= 0);
+  one("terms", choice(TERMS));
+  for (const key of ["errors", "spectrum", "turntable"] as const) one(key, (value: unknown) => typeof value === "boolean");
   one("eye", (value: unknown[]) => Array.isArray(value) && value.length === 2 && value.every(triple));
   one("zoom", number(0, 1e3));
   one("middle", (value: number[]) => Array.isArray(value) && value.length === 2 && value.every((x) => Number.isFinite(x)));

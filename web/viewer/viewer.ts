@@ -1,123 +1,187 @@
 /** The page at work: state, lights, picture, comparison, and what is saved. */
-import { NoToneMapping, Vector4, WebGLRenderer } from "three";
-import { type Light, type Triple } from "../src";
+import { NoToneMapping, type Vector4, WebGLRenderer } from "three";
+import type { Light, Triple } from "../src";
+import { bearing, legend, statusLine, titles } from "./captions";
+import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
-import { directionalState, environmentState, isLampState, lightOf, type LightState, linearColor, rounded } from "./light_state";
-import { KEYS, listen } from "./keys";
+import { dragSplit, dropFiles, pickFile } from "./gestures";
+import { directionalState, type DirectionalState, environmentState, isLampState, lightOf, type LightState, rounded } from "./light_state";
+import { listen, tabled } from "./keys";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange } from "./map_range";
 import { element, lineOf, say } from "./messages";
-import { Panel } from "./panel";
+import { Panel, type PanelFacts } from "./panel";
 import { along } from "./path";
 import { Receivers } from "./receivers";
-import { rmse } from "./reference";
-import { negated, ViewerRelighting } from "./relighting";
+import { negated } from "./relighting";
 import { saveFrames, savePng } from "./saving";
 import { COLOURS, screenUniforms, VALUES } from "./screen";
 import { type SkyPoint, SkyWidget } from "./sky_widget";
+import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
-import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State } from "./state";
+import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State, VIEWS } from "./state";
+import { type Subject, Subjects } from "./subject";
 
 const FRAMES_A_SECOND = 24;
 const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const PACES = 15; // frames whose median is told
 const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
 
-/** An asset on the page, drawn whenever a light or a control changed. */
+/** One asset of those that the page was given, drawn whenever a light or a control changed. */
 export class Viewer {
   private readonly state: State;
   private readonly renderer: WebGLRenderer;
-  private readonly relighting: ViewerRelighting;
+  private readonly subjects: Subjects;
+  private subject!: Subject;
   private readonly uniforms;
   private readonly receivers: Receivers;
   private readonly stage: Stage;
   private readonly sky: SkyWidget;
   private readonly panel: Panel;
   private readonly copy: Copy;
+  private readonly comparison: Comparison;
+  private readonly spectrum: SpectrumPlot;
+  private shining: Light[] = [];
   private readonly environments = new Map<string, Environment>();
   private lightsChanged = true;
   private drawNeeded = true;
   private waiting = 0;
   private base?: { light: LightState; copy: LightState; turns: number };
-  private compared = -1;
-  private wanted = -1;
   private error = "";
   private last = 0;
   private readonly paces: number[] = [];
+  private asking?: Subject; // for its errors
+  private plotted?: Subject; // its spectrum
   private urlTimer = 0;
   private written = "";
 
-  constructor(private readonly loaded: Loaded) {
-    const { facts, asset, coverage, model, references } = loaded;
-    this.renderer = new WebGLRenderer({ canvas: element<HTMLCanvasElement>("canvas"), antialias: true, preserveDrawingBuffer: true });
-    this.renderer.toneMapping = NoToneMapping;
-    checkGpu(this.renderer);
-    const floats = this.renderer.extensions.has("OES_texture_float_linear") && this.renderer.extensions.has("EXT_color_buffer_float");
-    this.relighting = new ViewerRelighting(asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear" });
-    this.uniforms = screenUniforms(this.relighting.lightmap as never, this.relighting.textures);
+  private constructor(
+    private readonly loaded: Loaded,
+    first: Subject,
+    subjects: Subjects,
+    renderer: WebGLRenderer,
+  ) {
+    const { facts, model, references } = loaded;
+    this.renderer = renderer;
+    this.subjects = subjects;
+    this.subject = first;
+    const { asset, coverage } = first;
+    this.uniforms = screenUniforms(first.lightmap, first.relighting.textures);
     this.receivers = new Receivers(asset, coverage);
     this.copy = new Copy(asset.manifest.width, asset.manifest.height);
     this.state = this.begun();
     this.readUrl(location.hash);
+    this.state.asset = facts.assets.indexOf(first.facts);
     const changed: Changed = (what = {}) => this.changed(what);
-    model?.applyMatrix4(this.relighting.sceneFromModel());
-    const { width, height } = asset.manifest;
-    this.stage = new Stage(this.renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, changed);
-    const centers = asset.basis.kind === "gaussian" ? asset.basis.centers : asset.basis.functions.centers;
-    const seen = centers.filter((direction) => asset.manifest.domain === "sphere" || direction[2] > 0); // light functions reach past the horizon
-    const points: readonly SkyPoint[] = references?.lights ?? seen.map((direction): SkyPoint => ({ direction, role: "center" }));
-    this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, points, changed);
-    this.panel = new Panel(
-      element("chips"),
-      element("controls"),
-      this.state,
-      { maps: this.planes, hasPositions: asset.position !== undefined, hasMesh: this.stage.canShowMesh, hasCapture: references !== undefined, bounds: this.receivers.bounds },
-      {
-        changed,
-        chooseEnvironment: () => this.chooseEnvironment(),
-        savePng: () => this.savePicture(),
-        saveFrames: () => saveFrames("FRAMES.json", [this.state.lights]),
-        savePath: () => this.savePath(),
-        resetCamera: () => {
-          this.stage.resetCamera();
-          changed();
-        },
-        moveTarget: (on) => {
-          this.stage.gizmos.moving = on ? "target" : "position";
-          changed();
-        },
+    this.comparison = new Comparison(references, this.uniforms, this.copy, this.receivers, {
+      wait: () => this.wait(),
+      done: () => this.done(),
+      changed: () => this.changed({ lights: true }),
+      told: () => this.status(),
+    });
+    this.spectrum = new SpectrumPlot(element<HTMLCanvasElement>("spectrum"));
+    model?.applyMatrix4(first.relighting.sceneFromModel());
+    const { width, height, quantity } = asset.manifest;
+    this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
+    if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
+    this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, this.skyPoints(), changed);
+    this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
+      changed,
+      chooseAsset: () => this.chooseAsset(),
+      chooseEnvironment: () => pickFile(".exr,.hdr,.png", (file) => void this.environment(file)),
+      savePng: () => this.savePicture(),
+      saveFrames: () => saveFrames("FRAMES.json", [this.state.lights]),
+      savePath: () => this.savePath(),
+      resetCamera: () => {
+        this.stage.resetCamera();
+        changed();
       },
-    );
-    this.title();
+      moveTarget: (on) => {
+        this.stage.gizmos.moving = on ? "target" : "position";
+        changed();
+      },
+    });
+    titles(element("title"), this.loaded.facts, this.subject);
     this.events(changed);
     for (const note of loaded.notes) say(note, "hint");
     requestAnimationFrame((now) => this.frame(now));
   }
 
-  /** How many maps, or scalar planes, there are to be looked at. */
-  private get planes(): number {
-    const { manifest, layers } = this.loaded.asset;
-    return manifest.scalars ?? layers.count;
+  /** @throws SrbfError where the GPU cannot show it. */
+  static async start(loaded: Loaded): Promise<Viewer> {
+    const renderer = new WebGLRenderer({ canvas: element<HTMLCanvasElement>("canvas"), antialias: true, preserveDrawingBuffer: true });
+    renderer.toneMapping = NoToneMapping;
+    checkGpu(renderer);
+    const index = loaded.facts.assets.indexOf(loaded.first.facts);
+    const subjects = new Subjects(loaded.facts, renderer, index, loaded.first);
+    return new Viewer(loaded, await subjects.get(index), subjects, renderer);
+  }
+
+  private panelFacts(): PanelFacts {
+    return {
+      maps: this.subject.planes,
+      hasPositions: this.subject.asset.position !== undefined,
+      hasDirect: this.subject.hasDirect,
+      assets: this.loaded.facts.assets.map(({ name }) => name),
+      hasMesh: this.stage.canShowMesh,
+      hasScene: this.stage.canShowScene,
+      hasCapture: this.comparison.possible,
+      bounds: this.receivers.bounds,
+    };
+  }
+
+  /** The capture's lights, else the centers of the basis. */
+  private skyPoints(): readonly SkyPoint[] {
+    return this.loaded.references?.lights ?? this.subject.centers.map((direction): SkyPoint => ({ direction, role: "center" }));
+  }
+
+  /** Show the asset that the state names, as soon as it is read. */
+  private chooseAsset(): void {
+    const index = this.state.asset;
+    this.wait();
+    this.subjects
+      .get(index)
+      .then((subject) => {
+        if (this.state.asset !== index) return;
+        this.subject = subject;
+        const { layers, ambient } = subject.relighting.textures;
+        this.uniforms.relit.value = subject.lightmap;
+        this.uniforms.layers.value = layers;
+        this.uniforms.ambient.value = ambient;
+        this.state.map = Math.min(this.state.map, subject.planes - 1);
+        this.sky.show(this.skyPoints());
+        this.sky.errors = undefined;
+        this.panel.tell(this.panelFacts());
+        titles(element("title"), this.loaded.facts, this.subject);
+        this.changed({ lights: true, panel: true });
+      })
+      .catch((error) => say(lineOf(error)))
+      .finally(() => this.done());
   }
 
   private begun(): State {
-    const { facts, asset } = this.loaded;
+    const { asset } = this.subject;
     return {
+      asset: 0,
       lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
       selected: 0,
       exposure: asset.manifest.quantity === "radiance" ? 1.65 : 0,
       tone: "linear",
       show: "picture",
       map: 0,
+      terms: "both",
+      errors: false,
+      spectrum: false,
       compare: "off",
       split: 0.5,
-      view: facts.mesh ? "mesh" : "texels",
+      view: this.loaded.facts.mesh ? "scene" : "texels",
       zoom: 0,
       middle: [asset.manifest.width / 2, asset.manifest.height / 2],
       path: "none",
       seconds: 8,
       playing: false,
+      turntable: false,
     };
   }
 
@@ -125,8 +189,9 @@ export class Viewer {
     try {
       const plain = this.begun();
       const state = decodeState(hash, plain);
-      state.map = Math.min(state.map, this.planes - 1);
-      if (!this.loaded.references) state.compare = "off";
+      state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
+      state.map = Math.min(state.map, this.subject.planes - 1);
+      if (!this.loaded.references) Object.assign(state, { compare: "off", errors: false });
       Object.assign(this.state, { eye: undefined }, state);
       for (const light of state.lights) {
         if (light.kind === "environment" && !this.environments.has(light.file)) say(`drop ${light.file} on the page again: an address holds no pictures`, "hint");
@@ -135,6 +200,10 @@ export class Viewer {
       say(lineOf(error));
     }
     this.written = hash;
+  }
+
+  private done(): void {
+    --this.waiting;
   }
 
   private changed(what: { lights?: boolean; panel?: boolean }): void {
@@ -185,6 +254,10 @@ export class Viewer {
   }
 
   private play(seconds: number): void {
+    if (this.state.turntable && this.stage.hasMesh) {
+      this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
+      this.changed({});
+    }
     const light = this.state.lights[this.state.selected];
     if (!light) return;
     if (this.base?.light !== light) this.base = { light, copy: structuredClone(light), turns: 0 };
@@ -199,82 +272,62 @@ export class Viewer {
   }
 
   private relight(): void {
-    const lights = this.lights();
-    if (this.state.show === "negative" && this.state.compare === "off") {
-      this.relighting.set(negated(lights));
-      this.relighting.update(this.renderer);
-      this.uniforms.negative.value = this.copy.draw(this.renderer, this.relighting.lightmap as never);
+    const comparing = this.comparing();
+    this.shining = this.lights();
+    const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold no other
+    if (this.state.show === "negative" && !comparing) {
+      this.subject.relight(negated(this.shining), terms, this.renderer);
+      this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
     }
-    this.relighting.set(lights);
-    this.relighting.update(this.renderer);
+    this.subject.relight(this.shining, terms, this.renderer);
+    const sun = this.sun();
+    if (comparing && sun && this.comparison.compared >= 0) this.comparison.measure(this.subject, sun, this.renderer);
+  }
+
+  private comparing(): boolean {
+    return this.state.compare !== "off" && this.comparison.possible && this.sun() !== undefined;
   }
 
   /** The lights, or what they are compared by: the baked one that is nearest to the sun, in the sun's colour. */
   private lights(): Light[] {
-    const { references, asset } = this.loaded;
     const sun = this.sun();
-    element("status").dataset.rmse = "";
-    if (this.state.compare === "off" || !references || !sun) {
-      this.compared = this.wanted = this.sky.marked = -1;
+    if (!sun || !this.comparing()) {
+      this.comparison.off();
+      this.sky.marked = -1;
       if (this.state.compare !== "off") say("comparing needs a sun: add one", "hint");
       return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
     }
-    this.want(references.nearest(sun.direction));
-    const color = linearColor(sun);
-    this.uniforms.referenceColour.value = color;
-    if (this.compared < 0) return [];
-    this.sky.marked = this.compared;
-    const baked = references.lights[this.compared].direction;
-    void references.image(this.compared).then((image) => {
-      const relit = this.copy.read(this.renderer, this.relighting.lightmap as never);
-      const error = rmse(relit, image, color, asset.ambient, (texel) => this.receivers.covered(texel));
-      element("status").dataset.rmse = error.toPrecision(3);
-      this.status();
-    });
-    return [{ kind: "directional", direction: baked, color }];
+    const light = this.comparison.light(sun);
+    this.sky.marked = this.comparison.compared;
+    return light ? [light] : [];
   }
 
-  private sun() {
+  private sun(): DirectionalState | undefined {
     const selected = this.state.lights[this.state.selected];
     const sun = selected?.kind === "directional" ? selected : this.state.lights.find((light) => light.kind === "directional");
     return sun?.kind === "directional" ? sun : undefined;
   }
 
-  /** Compare with light `index` as soon as its picture is there. */
-  private want(index: number): void {
-    const { references } = this.loaded;
-    if (!references || index === this.wanted) return;
-    this.wanted = index;
-    this.wait();
-    references
-      .image(index)
-      .then((image) => {
-        if (this.wanted !== index) return;
-        this.uniforms.reference.value = references.asTexture(index, image);
-        this.compared = index;
-        this.changed({ lights: true });
-      })
-      .catch((error) => say(lineOf(error)))
-      .finally(() => --this.waiting);
-  }
-
   private present(): void {
     const { state, uniforms } = this;
-    const comparing = state.compare !== "off" && this.compared >= 0;
+    const comparing = state.compare !== "off" && this.comparison.compared >= 0;
     const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
     uniforms.value.value = VALUES[value as keyof typeof VALUES];
     const signed = value === "difference" || value === "map";
     const colour = signed ? "signed" : state.show === "false colour" ? "magnitude" : state.show === "negative" && !comparing ? "negative" : state.tone;
     uniforms.colour.value = COLOURS[colour];
-    const most = value === "map" ? mapRange(this.loaded.asset, state.map) : 1;
+    const most = value === "map" ? mapRange(this.subject.asset, state.map) : 1;
     uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
     uniforms.split.value = comparing && state.compare === "slider" ? state.split * this.renderer.domElement.clientWidth : 0;
     this.chooseMap();
-    this.stage.draw();
+    this.stage.draw(this.shining);
+    this.showErrors();
     this.sky.draw();
+    this.showSpectrum();
     this.panel.refresh();
-    this.bearing();
-    this.legend(colour, most);
+    const shown = this.comparison.direction ?? this.sun()?.direction;
+    bearing(element("bearing"), shown, shown !== undefined && this.sky.inside(shown));
+    legend(element("legend"), colour, most * 2 ** -state.exposure);
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
@@ -283,7 +336,7 @@ export class Viewer {
   }
 
   private chooseMap(): void {
-    const { asset } = this.loaded;
+    const { asset } = this.subject;
     const planes = asset.manifest.scalars !== undefined;
     const layer = planes ? Math.floor(this.state.map / 4) : this.state.map;
     const shader = this.uniforms;
@@ -293,62 +346,53 @@ export class Viewer {
     (shader.layerBias.value as Vector4).fromArray(asset.bias, 4 * layer);
   }
 
-  private bearing(): void {
-    const place = element("bearing");
-    const sun = this.sun();
-    if (!sun) {
-      place.textContent = "drag on the sky to add a sun";
+  /** Every baked light's error in its place on the sky, once they are measured. */
+  private showErrors(): void {
+    const { subject } = this;
+    if (!this.state.errors) {
+      this.sky.errors = undefined;
       return;
     }
-    const shown = this.compared >= 0 && this.loaded.references ? this.loaded.references.lights[this.compared].direction : sun.direction;
-    const [x, y, z] = shown;
-    const elevation = (Math.asin(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z)))) * 180) / Math.PI;
-    const azimuth = ((Math.atan2(y, x) * 180) / Math.PI + 360) % 360;
-    const inside = this.sky.inside(shown);
-    place.classList.toggle("warn", !inside);
-    place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · the capture saw no light there"}`;
+    if (this.sky.errors || this.asking === subject) return;
+    this.asking = subject;
+    this.wait();
+    say("measuring every light's error …", "hint");
+    this.comparison
+      .errors(subject)
+      .then(({ psnr, texels }) => {
+        if (this.subject !== subject) return;
+        this.sky.errors = psnr;
+        say(`PSNR of every baked light, by ${texels} texels; rings are tested lights`, "hint");
+        this.changed({});
+      })
+      .catch((error) => {
+        this.state.errors = false;
+        say(lineOf(error));
+      })
+      .finally(() => {
+        this.asking = undefined;
+        this.done();
+      });
   }
 
-  private legend(colour: keyof typeof COLOURS, range: number): void {
-    const place = element("legend");
-    const most = range * 2 ** -this.state.exposure;
-    const text = (x: number) => String(Number(x.toPrecision(3)));
-    place.hidden = colour !== "magnitude" && colour !== "signed" && colour !== "negative";
-    if (place.hidden) return;
-    const bars = {
-      magnitude: ["linear-gradient(90deg,#30123b,#4668e0,#1bcfd4,#61fc6c,#d1e834,#fe9b2d,#d93806,#7a0402)", "0", "luminance", text(most)],
-      signed: ["linear-gradient(90deg,#d9f0ff,#2e80ff,#121315,#ff4729,#ffedcc)", text(-most), "0", text(most)],
-      negative: ["linear-gradient(90deg,#590d6b,#ff59ff)", "0", "below 0, cut off", text(-most / 8)],
-    } as const;
-    const [bar, left, middle, right] = bars[colour as keyof typeof bars];
-    place.innerHTML = `<i style="background:${bar}"></i><div><span>${left}</span><span>${middle}</span><span>${right}</span></div>`;
+  private showSpectrum(): void {
+    element("spectrum").hidden = !this.state.spectrum;
+    if (!this.state.spectrum || this.plotted === this.subject) return;
+    this.plotted = this.subject;
+    this.wait();
+    this.spectrum
+      .draw(this.subject)
+      .catch((error) => {
+        this.plotted = undefined;
+        this.state.spectrum = false;
+        say(lineOf(error));
+      })
+      .finally(() => this.done());
   }
 
   private status(): void {
-    const { asset, facts, references } = this.loaded;
-    const pace = this.paces.length < PACES ? "–" : [...this.paces].sort((a, b) => a - b)[PACES >> 1].toFixed(1);
-    const parts = [
-      `<b>${pace}</b> ms a frame`,
-      `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU`,
-    ];
-    if (this.compared >= 0 && references) {
-      const error = element("status").dataset.rmse;
-      parts.push(`baked light <b>${this.compared}</b> (${references.lights[this.compared].role})${error ? `, rmse <b>${error}</b>` : ""}`);
-    }
-    if (asset.manifest.transport === "indirect") parts.push("indirect light alone");
-    element("status").innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
-  }
-
-  private title(): void {
-    const { facts, asset } = this.loaded;
-    const { manifest } = asset;
-    const many = manifest.scalars === undefined ? `${asset.layers.count} maps` : `${manifest.scalars} planes`;
-    const name = document.createElement("h1");
-    name.textContent = facts.title;
-    const line = document.createElement("p");
-    line.textContent = [manifest.method.replaceAll("-", " "), many, `${manifest.width} × ${manifest.height} ${facts.kind === "view" ? "pixels" : "texels"}`, manifest.quantity].join(" · ");
-    element("title").replaceChildren(name, line);
-    element("help").innerHTML = `<h2>Keys</h2><table>${KEYS.map(([key, what]) => `<tr><td>${key}</td><td>${what}</td></tr>`).join("")}</table>`;
+    const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace);
   }
 
   private events(changed: Changed): void {
@@ -360,10 +404,12 @@ export class Viewer {
     window.addEventListener("hashchange", () => {
       if (location.hash === this.written) return;
       this.readUrl(location.hash);
+      if (this.loaded.facts.assets[this.state.asset] !== this.subject.facts) this.chooseAsset();
       this.stage.resetTo();
       changed({ lights: true, panel: true });
     });
     const help = element<HTMLDialogElement>("help");
+    help.innerHTML = tabled();
     help.addEventListener("click", () => help.close());
     element("keys").addEventListener("click", () => help.showModal());
     const next = <T>(list: readonly T[], now: T) => list[(list.indexOf(now) + 1) % list.length];
@@ -375,11 +421,16 @@ export class Viewer {
         if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
-        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.planes : this.state.map;
+        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.planes : this.state.map;
         this.state.show = "map";
       },
       nextView: () => {
-        if (this.stage.canShowMesh) this.state.view = this.state.view === "mesh" ? "texels" : "mesh";
+        const views = VIEWS.filter((view) => view !== "scene" || this.stage.canShowScene);
+        if (this.stage.canShowMesh) this.state.view = next(views, this.state.view === "scene" && !this.stage.canShowScene ? "mesh" : this.state.view);
+      },
+      nextAsset: () => {
+        this.state.asset = (this.state.asset + 1) % this.loaded.facts.assets.length;
+        this.chooseAsset();
       },
     });
     const canvas = this.renderer.domElement;
@@ -390,8 +441,8 @@ export class Viewer {
     });
     canvas.addEventListener("dblclick", (event) => this.place(event.offsetX, event.offsetY));
     canvas.addEventListener("webglcontextlost", () => say("the GPU gave up on this page: reload it"));
-    this.dragSplit(changed);
-    this.dropEnvironments();
+    dragSplit(this.state, changed);
+    dropFiles((file) => void this.environment(file));
   }
 
   /** Put the selected lamp above what is seen at a place of the canvas, or a new one. */
@@ -405,55 +456,6 @@ export class Viewer {
       if (light.kind === "spot") light.target = rounded(place as Triple);
       this.changed({ lights: true });
     } else if (this.state.lights.length < MOST_LIGHTS) this.panel.add("point", over, over[2] - place[2]);
-  }
-
-  private dragSplit(changed: Changed): void {
-    const handle = element("split").querySelector("i") as HTMLElement;
-    const to = (fraction: number) => {
-      this.state.split = Math.round(1e4 * Math.min(0.98, Math.max(0.02, fraction))) / 1e4;
-      changed();
-    };
-    handle.addEventListener("pointerdown", (event) => {
-      handle.setPointerCapture(event.pointerId);
-      event.preventDefault();
-    });
-    handle.addEventListener("pointermove", (event) => {
-      if (!handle.hasPointerCapture(event.pointerId)) return;
-      const { left, width } = element("stage").getBoundingClientRect();
-      to((event.clientX - left) / width);
-    });
-    handle.addEventListener("keydown", (event) => {
-      if (event.key !== "ArrowLeft" && event.key !== "ArrowRight") return;
-      to(this.state.split + (event.key === "ArrowLeft" ? -0.02 : 0.02));
-      event.preventDefault();
-      event.stopPropagation();
-    });
-  }
-
-  private dropEnvironments(): void {
-    const over = (on: boolean) => document.body.classList.toggle("dropping", on);
-    window.addEventListener("dragover", (event) => {
-      event.preventDefault();
-      over(true);
-    });
-    window.addEventListener("dragleave", (event) => {
-      if (!event.relatedTarget) over(false);
-    });
-    window.addEventListener("drop", (event) => {
-      event.preventDefault();
-      over(false);
-      for (const file of event.dataTransfer?.files ?? []) void this.environment(file);
-    });
-  }
-
-  private chooseEnvironment(): void {
-    const input = document.createElement("input");
-    input.type = "file";
-    input.accept = ".exr,.hdr,.png";
-    input.onchange = () => {
-      if (input.files?.[0]) void this.environment(input.files[0]);
-    };
-    input.click();
   }
 
   /** A dropped sky; the first takes the suns' place. */
@@ -470,12 +472,12 @@ export class Viewer {
     } catch (error) {
       say(lineOf(error));
     } finally {
-      --this.waiting;
+      this.done();
     }
   }
 
   private savePicture(): void {
-    savePng(`${this.loaded.facts.title}.png`, this.stage.pixels());
+    savePng(`${this.loaded.facts.title}.png`, this.stage.pixels(this.shining));
     this.changed({});
   }
 

@@ -16,11 +16,15 @@ uniform vec4 srbfBias[SRBF_LAYERS];
 uniform vec4 srbfLamps[4 * SRBF_LAMPS];
 uniform int srbfLampCount;
 
-vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
+// Signed: before the clamp.
+vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
     ivec2 texel = ivec2(uv * vec2(textureSize(srbfLayers, 0).xy));
-    vec3 sum = srbfClusteredLights(srbfLayers, srbfClusters, texel, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
-                                   srbfLamps, srbfLampCount);
-    return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+    return srbfClusteredLights(srbfLayers, srbfClusters, texel, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
+                               srbfLamps, srbfLampCount);
+}
+
+vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
+    return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
 // At a place on a surface: the level of mip maps that fits the pixel.

@@ -13,10 +13,14 @@ uniform vec4 srbfBias[SRBF_LAYERS];
 uniform vec4 srbfLamps[4 * SRBF_LAMPS];
 uniform int srbfLampCount;
 
+// Signed: before the clamp.
+vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
+    return srbfEigenMapLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
+                              srbfLamps, srbfLampCount);
+}
+
 vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
-    vec3 sum = srbfEigenMapLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
-                                  srbfLamps, srbfLampCount);
-    return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+    return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
 // At a place on a surface: the level of mip maps that fits the pixel.

@@ -13,10 +13,14 @@ uniform vec4 srbfBias[SRBF_K];
 uniform vec4 srbfLamps[4 * SRBF_LAMPS];
 uniform int srbfLampCount;
 
-vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
-    vec3 sum = srbfRelightLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfCenters, srbfScale, srbfBias, receiver,
+// Signed: before the clamp.
+vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
+    return srbfRelightLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfCenters, srbfScale, srbfBias, receiver,
                                  srbfLamps, srbfLampCount);
-    return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+}
+
+vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
+    return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
 // At a place on a surface: the level of mip maps that fits the pixel.

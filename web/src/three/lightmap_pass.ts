@@ -13,6 +13,7 @@ import {
   NoBlending,
   RawShaderMaterial,
   RGBAFormat,
+  type Texture,
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
@@ -31,6 +32,13 @@ export interface TargetOptions {
   anisotropy?: number;
 }
 
+/** What is added to the sum texel for texel, before the clamp: an indirect asset's direct light. */
+export interface Added {
+  texture: Texture;
+  /** Whether the maps' own light is left out. */
+  alone: boolean;
+}
+
 const VERTEX = `precision highp float;
 in vec3 position;
 void main() {
@@ -43,6 +51,7 @@ export class LightmapPass {
   private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
   private readonly camera = new Camera();
   private room = 0;
+  private added: Added | undefined;
 
   constructor(
     private readonly asset: Asset,
@@ -67,7 +76,9 @@ export class LightmapPass {
   }
 
   /** Draw it with the numbers that the uniforms hold; the renderer is left as it was. */
-  draw(renderer: WebGLRenderer): void {
+  draw(renderer: WebGLRenderer, added?: Added): void {
+    if (added?.texture !== this.added?.texture || added?.alone !== this.added?.alone) this.room = 0;
+    this.added = added;
     const room = (this.uniforms.srbfLamps.value as Float32Array).length / 16;
     if (room !== this.room) this.compile(room);
     const kept = { target: renderer.getRenderTarget(), autoClear: renderer.autoClear, xr: renderer.xr.enabled, shadows: renderer.shadowMap.autoUpdate };
@@ -91,10 +102,12 @@ export class LightmapPass {
   private compile(room: number): void {
     this.mesh.material.dispose();
     const { srbfPositions } = this.uniforms;
+    const sum = this.added?.alone ? "vec3(0.0)" : "srbfSum(uv, 0.0, receiver)";
+    const added = this.added ? " + texelFetch(srbfAdded, ivec2(gl_FragCoord.xy), 0).rgb" : "";
     const receiver = srbfPositions ? "texelFetch(srbfPositions, ivec2(gl_FragCoord.xy), 0).xyz" : "vec3(0.0)";
     this.mesh.material = new RawShaderMaterial({
       glslVersion: GLSL3,
-      uniforms: this.uniforms,
+      uniforms: { ...this.uniforms, srbfAdded: { value: this.added?.texture } },
       vertexShader: VERTEX,
       fragmentShader: `precision highp float;
 precision highp int;
@@ -102,10 +115,12 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 ${shaderText(this.asset, room)}
 ${srbfPositions ? "uniform highp sampler2D srbfPositions;" : ""}
+${this.added ? "uniform highp sampler2D srbfAdded;" : ""}
 out vec4 relit;
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(srbfLayers, 0).xy);
-    relit = vec4(srbfRelit(uv, 0.0, ${receiver}), 1.0);
+    vec3 receiver = ${receiver};
+    relit = vec4(srbfFinish(${sum}${added}, textureLod(srbfAmbient, uv, 0.0).rgb), 1.0);
 }`,
       blending: NoBlending,
       depthTest: false,

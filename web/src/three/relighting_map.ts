@@ -5,7 +5,7 @@ import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
 import { lampRoom } from "../lamp";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
-import { LightmapPass, type TargetOptions } from "./lightmap_pass";
+import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
 import { SceneAsset } from "./scene_asset";
 import { SrbfTextures } from "./textures";
@@ -34,6 +34,7 @@ export class SrbfRelightingMap extends SceneAsset {
   private readonly patched = new Map<Material, Patch>();
   private room = 1;
   private drawn = "";
+  private added: Added | undefined;
 
   /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
   constructor(asset: Asset, options: RelightingMapOptions = {}) {
@@ -59,6 +60,15 @@ export class SrbfRelightingMap extends SceneAsset {
   /** The lightmap that `update` draws (v downwards), for shaders of your own; only with `source: "lightmap"`. */
   get lightmap(): Texture | undefined {
     return this.pass?.target.texture;
+  }
+
+  /**
+   * Add `texture` of the asset's size to the sum of its maps before the clamp, or show it `alone`: direct light of an indirect asset, in its quantity.
+   * Only with `source: "lightmap"`; the next `update` draws it.
+   */
+  add(texture?: Texture, alone = false): void {
+    this.added = texture && { texture, alone };
+    this.drawn = "";
   }
 
   /** Light `material` by this asset. @throws SrbfError on a material of another kind than Standard, Physical, Lambert, Basic. */
@@ -119,7 +129,7 @@ export class SrbfRelightingMap extends SceneAsset {
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
     const state = JSON.stringify([[...frame.weights], frame.lamps]);
     if (state === this.drawn) return;
-    this.pass?.draw(renderer);
+    this.pass?.draw(renderer, this.added);
     this.drawn = state;
   }
 

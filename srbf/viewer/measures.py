@@ -1,0 +1,87 @@
+"""What the page asks to be measured when it is asked to show it: the error of every light, and spectra; of a few thousand texels."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import cached_property
+from threading import Lock
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float64, Int
+from srbf.asset import Asset
+from srbf.capture import COVERED, Capture
+from srbf.evaluation import PEAK_QUANTILE, psnr, squared_errors
+from srbf.methods import directional_responses
+from srbf.motion import sampled_texels
+from srbf.quality import scalars_of, singular_values, spectrum
+from srbf.sphere import point_set
+
+DIRECTIONS = 192  # that an asset is asked for where its own spectrum is taken: as many as it has light to tell apart
+
+
+class Measures:
+    """Figures of assets of one scene, and of their capture where there is one; each is taken once, when it is first asked for."""
+
+    def __init__(self, assets: Sequence[Asset], capture: Capture | None = None) -> None:
+        self._assets = assets
+        self._capture = capture
+        self._lock = Lock()
+        self._made: dict[tuple[str, int], bytes] = {}
+
+    def errors(self, index: int) -> bytes:
+        """JSON of asset `index` against every light of the capture: `rmse` and `psnr` (dB; of the peak of the train references) by light,
+        and `texels`, how many were looked at. Both are clamped at 0, but of indirect light, where the clamp comes later."""
+        return self._once("errors", index)
+
+    def spectrum(self, index: int) -> bytes:
+        """JSON of asset `index`: singular values, largest first, of what it answers (`asset`) and of what the capture did (`capture`, or
+        null), both of the same texels and over the root of the number of answers; `scalars`: numbers that the asset keeps of a texel."""
+        return self._once("spectrum", index)
+
+    def _once(self, what: str, index: int) -> bytes:
+        with self._lock:
+            if (what, index) not in self._made:
+                made = self._errors(index) if what == "errors" else self._spectrum(index)
+                self._made[what, index] = json.dumps(made).encode()
+            return self._made[what, index]
+
+    @cached_property
+    def _texels(self) -> Int[ndarray, " n"]:
+        covered = self._assets[0].covered if self._capture is None else self._capture.coverage() >= COVERED
+        return sampled_texels(covered)
+
+    @cached_property
+    def _sample(self) -> Capture:
+        assert self._capture is not None
+        return self._capture.kept(self._texels)
+
+    def _errors(self, index: int) -> dict[str, object]:
+        sample, asset = self._sample, self._assets[index].at(self._texels)
+        floor = -np.inf if sample.transport == "indirect" else 0.0
+        every = range(len(sample.lights))
+        answers = sample.sample(sample.indices("train") or every, np.arange(len(self._texels)))
+        peak = 1.0 if sample.source_bits == 8 else float(np.quantile(np.maximum(answers, 0), PEAK_QUANTILE))
+        errors = []
+        for first, block in sample.blocks(every):
+            relit = directional_responses(asset, sample.directions(every[first : first + len(block)]))
+            for answer, true in zip(relit.reshape(block.shape), block, strict=True):
+                errors.append(float(np.sqrt(squared_errors(answer, true, floor)[0] / true.size)))
+        return {"texels": len(self._texels), "peak": peak, "rmse": errors, "psnr": [psnr(peak, error) for error in errors]}
+
+    def _spectrum(self, index: int) -> dict[str, object]:
+        asset = self._assets[index].at(self._texels)
+        answers = directional_responses(asset, point_set("fibonacci", DIRECTIONS, asset.domain))[:, 0]  # (b, n, 3)
+        own = singular_values(answers.transpose(1, 0, 2).reshape(len(self._texels), -1)) / np.sqrt(answers.size)
+        captured = None
+        if self._capture is not None:
+            captured = spectrum(self._sample) / np.sqrt(len(self._texels) * 3 * len(self._sample.indices("train")))
+        return {"scalars": scalars_of(asset), "asset": _listed(own), "capture": None if captured is None else _listed(captured)}
+
+
+def _listed(values: Float64[ndarray, " r"]) -> list[float]:
+    """All but what is rounding: six digits are enough for a plot."""
+    kept = values[values > 1e-6 * max(float(values[0]), 1e-30)]
+    return [float(f"{value:.6g}") for value in kept]

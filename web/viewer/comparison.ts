@@ -1,0 +1,107 @@
+/** The capture's picture that stands beside what is relit: of the baked light that is nearest to the sun; and every light's error. */
+import type { WebGLRenderer } from "three";
+import type { DirectionalLight, Triple } from "../src";
+import { fetched } from "../src/files";
+import { Copy } from "./copy";
+import { type DirectionalState, linearColor } from "./light_state";
+import { lineOf, say } from "./messages";
+import type { Receivers } from "./receivers";
+import { type References, rmse } from "./reference";
+import type { ScreenUniforms } from "./screen";
+import type { Subject } from "./subject";
+
+/** `srbf/viewer/measures.py`'s errors, by light. */
+export interface LightErrors {
+  texels: number;
+  rmse: number[];
+  psnr: number[];
+}
+
+export class Comparison {
+  /** The baked light that is compared with; none yet: -1. */
+  compared = -1;
+  /** Of what is shown now, three digits; empty while it is not known. */
+  error = "";
+  private wanted = -1;
+  private readonly errorsOf = new Map<string, Promise<LightErrors>>();
+
+  constructor(
+    private readonly references: References | undefined,
+    private readonly uniforms: ScreenUniforms,
+    private readonly copy: Copy,
+    private readonly receivers: Receivers,
+    /** Called around what takes a while, and when there is something new to draw. */
+    private readonly page: { wait(): void; done(): void; changed(): void; told(): void },
+  ) {}
+
+  get possible(): boolean {
+    return this.references !== undefined;
+  }
+
+  off(): void {
+    this.compared = this.wanted = -1;
+    this.error = "";
+  }
+
+  /** The light to relight by in the sun's stead; none while its picture is on its way. */
+  light(sun: DirectionalState): DirectionalLight | undefined {
+    const references = this.references as References;
+    this.error = "";
+    this.want(references.nearest(sun.direction));
+    const color = linearColor(sun);
+    this.uniforms.referenceColour.value = color;
+    return this.compared < 0 ? undefined : { kind: "directional", direction: references.lights[this.compared].direction, color };
+  }
+
+  /** After the light of `light` was drawn: how far it is from the capture's picture. */
+  measure(subject: Subject, sun: DirectionalState, renderer: WebGLRenderer): void {
+    const [index, color] = [this.compared, linearColor(sun)];
+    void this.references?.image(index).then((image) => {
+      if (index !== this.compared) return;
+      const relit = this.copy.read(renderer, subject.lightmap);
+      this.error = rmse(relit, image, color, subject.asset.ambient, (texel) => this.receivers.covered(texel)).toPrecision(3);
+      this.page.told();
+    });
+  }
+
+  /** Likewise. */
+  get role(): string {
+    return this.references?.lights[this.compared]?.role ?? "";
+  }
+
+  /** Of the baked light that is compared with. */
+  get direction(): Triple | undefined {
+    return this.references?.lights[this.compared]?.direction;
+  }
+
+  /** Every light's error of `subject`, measured by the server when it is first asked for. @throws SrbfError where it cannot be. */
+  errors(subject: Subject): Promise<LightErrors> {
+    const { errors: url } = subject.facts;
+    if (!url) return Promise.reject(new Error("expected a capture to tell errors by, found none; give it to srbf view"));
+    let found = this.errorsOf.get(url);
+    if (!found) {
+      found = fetched(fetch.bind(window), url).then((response) => response.json());
+      found.catch(() => this.errorsOf.delete(url));
+      this.errorsOf.set(url, found);
+    }
+    return found;
+  }
+
+  /** Compare with light `index` as soon as its picture is there. */
+  private want(index: number): void {
+    const { references } = this;
+    if (!references || index === this.wanted) return;
+    this.wanted = index;
+    this.page.wait();
+    references
+      .image(index)
+      .then((image) => {
+        if (this.wanted !== index) return;
+        this.uniforms.reference.value = references.asTexture(index, image);
+        this.compared = index;
+        this.page.changed();
+      })
+      .catch((error) => say(lineOf(error)))
+      .finally(() => this.page.done());
+  }
+}

@@ -1,0 +1,321 @@
+/**
+ * Direct light of suns on an indirect asset, by one orthographic shadow map each: the passes of `srbf/gl/shadow_map.py`, with the same shaders.
+ * Translucent walls multiply a second map by their tint. Lamps and skies add none.
+ */
+import {
+  AddEquation,
+  BufferAttribute,
+  BufferGeometry,
+  Camera,
+  Color,
+  CustomBlending,
+  DataTexture,
+  DstColorFactor,
+  FloatType,
+  GLSL3,
+  HalfFloatType,
+  LinearFilter,
+  type Material,
+  MaxEquation,
+  Mesh,
+  NearestFilter,
+  NoColorSpace,
+  type Object3D,
+  OneFactor,
+  type PixelFormat,
+  RawShaderMaterial,
+  RedFormat,
+  RGBAFormat,
+  Scene,
+  type Texture,
+  type TextureDataType,
+  type TextureFilter,
+  Vector3,
+  Vector4,
+  type WebGLRenderer,
+  WebGLRenderTarget,
+  ZeroFactor,
+} from "three";
+import directFragment from "../../glsl/stages/direct.frag";
+import fullscreenVertex from "../../glsl/stages/fullscreen.vert";
+import heightFragment from "../../glsl/stages/shadow_height.frag";
+import shadowVertex from "../../glsl/stages/shadow.vert";
+import tintFragment from "../../glsl/stages/shadow_tint.frag";
+import { type Asset, type DirectionalLight, type FloatImage, type Light, SrbfError, type Triple } from "../src";
+import { turned } from "../src/matrix";
+import { type DirectReceivers, directReceivers } from "./direct_points";
+import { fromThree } from "./frames";
+
+const SIZE = 2048; // texels a side of a shadow map
+const NOTHING = -1e30; // height where no occluder is
+const KNOTS = 8; // of a tint by the cosine
+// Of a sun that has a size: sixteen points that fill the unit disc evenly [Sobol1967], its area kept.
+const DISC = [
+  [0, 0], [-0.70710678, 0], [0, 0.5], [0, -0.8660254], [0.55901699, -0.55901699], [-0.25, 0.25], [-0.66143783, -0.66143783], [0.4330127, 0.4330127],
+  [-0.89454251, 0.37053164], [0.61108887, -0.2531213], [0.31730434, 0.76604044], [-0.16570679, -0.40005157], [-0.51646436, -0.21392654], [0.83277376, 0.34494618],
+  [0.09567086, -0.23096988], [-0.28701257, 0.69290965],
+] as const; // prettier-ignore
+
+/** What direct light needs beside the maps: images of the asset, and the scene that casts. */
+export interface DirectInputs {
+  normal: FloatImage;
+  coverage?: FloatImage;
+  /** Of radiance. */
+  albedo?: FloatImage;
+  scene: Object3D;
+}
+
+interface Frame {
+  across: Triple;
+  up: Triple;
+  toLight: Triple;
+  low: [number, number];
+  extent: number;
+}
+
+export class DirectLight {
+  private readonly receivers: DirectReceivers;
+  private readonly corners: { points: DataTexture; normals: DataTexture }[];
+  private readonly heights = target(SIZE, SIZE, RedFormat, FloatType);
+  private readonly wallHeights = target(SIZE, SIZE, RedFormat, FloatType);
+  private readonly tints = target(SIZE, SIZE, RGBAFormat, HalfFloatType, LinearFilter);
+  private readonly sum: WebGLRenderTarget;
+  private readonly occluders = new Scene();
+  private readonly walls = new Scene();
+  private readonly tinted = new Scene();
+  private readonly quad = new Scene();
+  private readonly camera = new Camera();
+  private readonly frame = { across: { value: [0, 0, 0] }, up: { value: [0, 0, 0] }, toLight: { value: [0, 0, 0] }, low: { value: [0, 0] }, extent: { value: 1 } };
+  private readonly lookup: RawShaderMaterial;
+  private readonly sunAngle: number;
+  private readonly reflectance: DataTexture;
+  private drawn = "";
+
+  /** @throws SrbfError where the GPU cannot blend floats. */
+  constructor(
+    private readonly asset: Asset,
+    inputs: DirectInputs,
+    private readonly renderer: WebGLRenderer,
+  ) {
+    if (!renderer.extensions.has("EXT_color_buffer_float") || !renderer.extensions.has("EXT_float_blend")) {
+      throw new SrbfError("expected a GPU that blends floats for direct light, found one without: the indirect light is shown alone");
+    }
+    const { width, height, direct } = asset.manifest;
+    this.sunAngle = direct?.sun_angle ?? 0;
+    this.receivers = directReceivers(asset, asset.position as FloatImage, inputs.normal, inputs.coverage, direct?.footprint ?? 1);
+    this.corners = this.receivers.corners.map(({ points, normals }) => ({ points: texture(points, width, height), normals: texture(normals, width, height) }));
+    this.reflectance = texture(reflectance(asset, inputs.albedo), width, height);
+    this.sum = target(width, height, RGBAFormat, FloatType);
+    this.readScene(inputs.scene);
+    this.lookup = new RawShaderMaterial({
+      glslVersion: GLSL3,
+      vertexShader: fullscreenVertex,
+      fragmentShader: coloured(directFragment),
+      uniforms: {
+        ...this.frame,
+        points: { value: null },
+        normals: { value: null },
+        heights: { value: this.heights.texture },
+        wallHeights: { value: this.wallHeights.texture },
+        tints: { value: this.tints.texture },
+        reflectance: { value: this.reflectance },
+        weight: { value: [0, 0, 0] },
+      },
+      ...blending("add"),
+    });
+    const corner = new BufferGeometry();
+    corner.setAttribute("corner", new BufferAttribute(new Float32Array([-1, -1, 3, -1, -1, 3]), 2));
+    corner.setDrawRange(0, 3);
+    this.quad.add(unculled(corner, this.lookup));
+  }
+
+  /** The direct light of the directional ones of `lights`, in the asset's quantity, drawn anew where they changed. */
+  draw(lights: readonly Light[]): Texture {
+    const suns = lights.filter((light): light is DirectionalLight => light.kind === "directional");
+    const state = JSON.stringify(suns);
+    if (state === this.drawn) return this.sum.texture;
+    this.drawn = state;
+    const { renderer } = this;
+    const kept = { color: renderer.getClearColor(new Color()), alpha: renderer.getClearAlpha(), autoClear: renderer.autoClear };
+    renderer.autoClear = false;
+    this.clear(this.sum, 0);
+    for (const sun of suns) this.add(sun);
+    renderer.setRenderTarget(null);
+    renderer.setClearColor(kept.color, kept.alpha);
+    renderer.autoClear = kept.autoClear;
+    return this.sum.texture;
+  }
+
+  private add(sun: DirectionalLight): void {
+    const towards = unit(turned(this.asset.assetFromWorld, sun.direction));
+    const suns = disc(towards, this.sunAngle);
+    for (const direction of suns) {
+      this.setFrame(this.around(direction));
+      this.clear(this.heights, NOTHING);
+      this.renderer.render(this.occluders, this.camera);
+      this.clear(this.wallHeights, NOTHING);
+      this.clear(this.tints, 1);
+      if (this.walls.children.length) {
+        this.renderer.setRenderTarget(this.wallHeights);
+        this.renderer.render(this.walls, this.camera);
+        this.renderer.setRenderTarget(this.tints);
+        this.renderer.render(this.tinted, this.camera);
+      }
+      const { uniforms } = this.lookup;
+      uniforms.weight.value = sun.color.map((value) => value / (suns.length * this.corners.length));
+      this.renderer.setRenderTarget(this.sum);
+      for (const { points, normals } of this.corners) {
+        uniforms.points.value = points;
+        uniforms.normals.value = normals;
+        this.renderer.render(this.quad, this.camera);
+      }
+    }
+  }
+
+  private clear(place: WebGLRenderTarget, value: number): void {
+    this.renderer.setRenderTarget(place);
+    this.renderer.setClearColor(new Color(value, value, value), 1);
+    this.renderer.clear(true, false, false);
+  }
+
+  private setFrame(frame: Frame): void {
+    for (const key of ["across", "up", "toLight", "low", "extent"] as const) this.frame[key].value = frame[key] as never;
+  }
+
+  /** A square across the light that holds every point, and a hundredth more on every side. */
+  private around(toLight: Triple): Frame {
+    const across = unit(cross(toLight, Math.abs(toLight[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
+    const up = cross(toLight, across);
+    const [least, most] = [[Infinity, Infinity], [-Infinity, -Infinity]];
+    const texels = this.asset.manifest.width * this.asset.manifest.height;
+    for (const { points } of this.receivers.corners) {
+      for (let i = 0; i < texels; ++i) {
+        if (!this.receivers.covered(i)) continue;
+        const [x, y, z] = [points[4 * i], points[4 * i + 1], points[4 * i + 2]];
+        const flat = [x * across[0] + y * across[1] + z * across[2], x * up[0] + y * up[1] + z * up[2]];
+        for (const a of [0, 1]) {
+          least[a] = Math.min(least[a], flat[a]);
+          most[a] = Math.max(most[a], flat[a]);
+        }
+      }
+    }
+    const extent = Math.max(most[0] - least[0], most[1] - least[1], 1e-6) * 1.02;
+    return { across, up, toLight, low: [(least[0] + most[0] - extent) / 2, (least[1] + most[1] - extent) / 2], extent };
+  }
+
+  /** Sort the triangles that cast by whether they stop the light, or tint it. */
+  private readScene(scene: Object3D): void {
+    scene.updateMatrixWorld(true);
+    const height = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: shadowVertex, fragmentShader: heightFragment, uniforms: this.frame, ...blending("max") });
+    scene.traverse((object) => {
+      const mesh = object as Mesh<BufferGeometry, Material>;
+      if (!mesh.isMesh || casts(mesh) === false) return;
+      const geometry = this.geometry(mesh);
+      const curve = tintOf(mesh.material);
+      if (!curve) {
+        this.occluders.add(unculled(geometry, height));
+        return;
+      }
+      const tint = new RawShaderMaterial({
+        glslVersion: GLSL3,
+        vertexShader: shadowVertex,
+        fragmentShader: tintFragment,
+        uniforms: { ...this.frame, curve: { value: curve } },
+        ...blending("multiply"),
+      });
+      this.walls.add(unculled(geometry, height));
+      this.tinted.add(unculled(geometry, tint));
+    });
+  }
+
+  /** In the asset's frame, z up, about the receivers' centre. */
+  private geometry(mesh: Mesh): BufferGeometry {
+    const { centre } = this.receivers;
+    const source = mesh.geometry;
+    const position = source.getAttribute("position");
+    const normal = source.getAttribute("normal");
+    const corner = new Float32Array(3 * position.count);
+    const cornerNormal = new Float32Array(3 * position.count);
+    const normalMatrix = mesh.matrixWorld.clone().invert().transpose();
+    const place = new Vector3();
+    for (let i = 0; i < position.count; ++i) {
+      const p = fromThree(place.fromBufferAttribute(position, i).applyMatrix4(mesh.matrixWorld));
+      corner.set([p[0] - centre[0], p[1] - centre[1], p[2] - centre[2]], 3 * i);
+      if (normal) cornerNormal.set(fromThree(place.fromBufferAttribute(normal, i).transformDirection(normalMatrix)), 3 * i);
+    }
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("corner", new BufferAttribute(corner, 3));
+    geometry.setAttribute("cornerNormal", new BufferAttribute(cornerNormal, 3));
+    geometry.setIndex(source.getIndex());
+    if (!source.getIndex()) geometry.setDrawRange(0, position.count);
+    return geometry;
+  }
+}
+
+/** The pack's stage with a light's colour, and with what a texel answers to irradiance. */
+function coloured(stage: string): string {
+  return stage
+    .replace("uniform float weight;", "uniform vec3 weight;\nuniform sampler2D reflectance;")
+    .replace("visibility) * weight", "visibility) * weight * texelFetch(reflectance, at, 0).rgb");
+}
+
+function casts(object: Object3D): boolean {
+  for (let at: Object3D | null = object; at; at = at.parent) if (at.userData.casts_shadow === false) return false;
+  return true;
+}
+
+/** What one wall lets through at eight cosines; none where it is opaque. */
+function tintOf(material: Material): Vector4[] | undefined {
+  const told = material.userData.tint_by_cosine as number[][] | undefined;
+  if (told) return told.some((row) => row.some((x) => x > 0)) ? told.map(([r, g, b]) => new Vector4(r, g, b, 0)) : undefined;
+  const { transmission = 0, color } = material as Material & { transmission?: number; color?: Color };
+  if (!(transmission > 0)) return undefined;
+  const { r, g, b } = color ?? new Color(1, 1, 1);
+  return Array.from({ length: KNOTS }, () => new Vector4(transmission * r, transmission * g, transmission * b, 0));
+}
+
+/** 1, or albedo / pi, RGBA. */
+function reflectance(asset: Asset, albedo: FloatImage | undefined): Float32Array {
+  const { width, height, quantity } = asset.manifest;
+  const out = new Float32Array(4 * width * height).fill(1);
+  if (quantity === "irradiance" || !albedo) return out;
+  for (let i = 0; i < width * height; ++i) for (let c = 0; c < 3; ++c) out[4 * i + c] = albedo.data[albedo.channels * i + c] / Math.PI;
+  return out;
+}
+
+/** Unit directions that fill a sun's disc of the angular diameter `angle` (rad). */
+function disc(direction: Triple, angle: number): Triple[] {
+  if (angle === 0) return [direction];
+  const across = unit(cross(direction, Math.abs(direction[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
+  const up = cross(direction, across);
+  const t = Math.tan(angle / 2);
+  return DISC.map(([x, y]) => unit([0, 1, 2].map((c) => direction[c] + t * (x * across[c] + y * up[c])) as unknown as Triple));
+}
+
+function blending(kind: "add" | "max" | "multiply") {
+  const factors = kind === "multiply" ? { blendSrc: DstColorFactor, blendDst: ZeroFactor } : { blendSrc: OneFactor, blendDst: OneFactor };
+  return { blending: CustomBlending, blendEquation: kind === "max" ? MaxEquation : AddEquation, ...factors, depthTest: false, depthWrite: false, side: 2 } as const;
+}
+
+function target(width: number, height: number, format: PixelFormat, type: TextureDataType, filter: TextureFilter = NearestFilter): WebGLRenderTarget {
+  return new WebGLRenderTarget(width, height, { format, type, depthBuffer: false, magFilter: filter as never, minFilter: filter as never, colorSpace: NoColorSpace });
+}
+
+function texture(data: Float32Array, width: number, height: number): DataTexture {
+  const made = new DataTexture(data as never, width, height, RGBAFormat, FloatType);
+  made.needsUpdate = true;
+  return made;
+}
+
+function unculled(geometry: BufferGeometry, material: RawShaderMaterial): Mesh {
+  const mesh = new Mesh(geometry, material);
+  mesh.frustumCulled = false;
+  return mesh;
+}
+
+const cross = (a: Triple, b: Triple): Triple => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+
+function unit(v: Triple): Triple {
+  const length = Math.hypot(...v);
+  return [v[0] / length, v[1] / length, v[2] / length];
+}

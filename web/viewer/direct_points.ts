@@ -1,0 +1,104 @@
+/** Where an asset's texels are lit: four points of each texel's footprint, with their normals. `srbf/direct/receivers.py` says the same in numpy. */
+import type { Asset, FloatImage } from "../src";
+
+const SAME_SURFACE_COS = 0.9; // of the normals of two neighbours that lie on one smooth surface
+const OFF_PLANE = 0.2; // of their distance: how far a neighbour may lie off the tangent plane
+const LONGER = 2.0; // a neighbour farther off than this many times the other side's lies across a seam
+const CORNERS = [
+  [-0.25, -0.25],
+  [0.25, -0.25],
+  [-0.25, 0.25],
+  [0.25, 0.25],
+];
+
+/** Points less `centre`, and unit normals, RGBA floats of every texel. */
+export interface LitPoints {
+  points: Float32Array;
+  normals: Float32Array;
+}
+
+export interface DirectReceivers {
+  /** Metres, of the covered texels: single precision is finest about the origin. */
+  centre: [number, number, number];
+  corners: LitPoints[];
+  /** Which texels are real. */
+  covered: (texel: number) => boolean;
+}
+
+/** The points that `asset` is lit at; `footprint` is how much of a texel counts. */
+export function directReceivers(asset: Asset, position: FloatImage, normal: FloatImage, coverage: FloatImage | undefined, footprint: number): DirectReceivers {
+  const { width, height } = asset.manifest;
+  const real = (i: number) => coverage === undefined || coverage.data[coverage.channels * i] > 0;
+  const some = coverage === undefined || coverage.data.some((value, i) => i % coverage.channels === 0 && value > 0);
+  const covered = some ? real : () => true;
+  const centre: [number, number, number] = [0, 0, 0];
+  let count = 0;
+  for (let i = 0; i < width * height; ++i) {
+    if (!covered(i)) continue;
+    for (let c = 0; c < 3; ++c) centre[c] += position.data[position.channels * i + c];
+    ++count;
+  }
+  for (let c = 0; c < 3; ++c) centre[c] /= count;
+  const along = gradients(width, height, position, normal, real);
+  const corners = CORNERS.map(([x, y]) => {
+    const points = new Float32Array(4 * width * height);
+    const normals = new Float32Array(4 * width * height);
+    for (let i = 0; i < width * height; ++i) {
+      const turned = [0, 0, 0];
+      for (let c = 0; c < 3; ++c) {
+        points[4 * i + c] = position.data[position.channels * i + c] - centre[c] + footprint * (x * along.position[0][3 * i + c] + y * along.position[1][3 * i + c]);
+        turned[c] = normal.data[normal.channels * i + c] + footprint * (x * along.normal[0][3 * i + c] + y * along.normal[1][3 * i + c]);
+      }
+      const length = Math.max(Math.hypot(...turned), 1e-20);
+      for (let c = 0; c < 3; ++c) normals[4 * i + c] = turned[c] / length;
+    }
+    return { points, normals };
+  });
+  return { centre, corners, covered };
+}
+
+type Pair = [Float32Array, Float32Array];
+
+/** Change of position and normal a texel to the right, and a texel down; 0 where no neighbour lies on the same surface. */
+function gradients(width: number, height: number, position: FloatImage, normal: FloatImage, real: (i: number) => boolean): { position: Pair; normal: Pair } {
+  const of = (image: FloatImage, i: number, c: number) => image.data[image.channels * i + c];
+  const pair = (): Pair => [new Float32Array(3 * width * height), new Float32Array(3 * width * height)];
+  const found = { position: pair(), normal: pair() };
+  /** The neighbour's index, and how far it is where it lies on the same surface, else -1. */
+  const neighbour = (r: number, c: number, axis: number, sign: number): { at: number; length: number; same: boolean } => {
+    const [row, column] = axis === 0 ? [r, c + sign] : [r + sign, c];
+    const i = r * width + c;
+    if (row < 0 || column < 0 || row >= height || column >= width) return { at: i, length: 0, same: false };
+    const at = row * width + column;
+    let length = 0;
+    let off = 0;
+    let cosine = 0;
+    for (let k = 0; k < 3; ++k) {
+      const step = of(position, at, k) - of(position, i, k);
+      length += step * step;
+      off += step * of(normal, i, k);
+      cosine += of(normal, at, k) * of(normal, i, k);
+    }
+    length = Math.sqrt(length);
+    return { at, length, same: Math.abs(off) <= OFF_PLANE * length && cosine >= SAME_SURFACE_COS && length > 0 && real(i) && real(at) };
+  };
+  for (let r = 0; r < height; ++r) {
+    for (let c = 0; c < width; ++c) {
+      const i = r * width + c;
+      for (const axis of [0, 1]) {
+        const [ahead, behind] = [neighbour(r, c, axis, 1), neighbour(r, c, axis, -1)];
+        const useAhead = ahead.same && !(behind.same && ahead.length > LONGER * behind.length);
+        const useBehind = behind.same && !(useAhead && behind.length > LONGER * ahead.length);
+        const weight = Math.max(1, Number(useAhead) + Number(useBehind));
+        for (const [image, out] of [[position, found.position], [normal, found.normal]] as const) {
+          for (let k = 0; k < 3; ++k) {
+            const forward = useAhead ? of(image, ahead.at, k) - of(image, i, k) : 0;
+            const backward = useBehind ? of(image, i, k) - of(image, behind.at, k) : 0;
+            out[axis][3 * i + k] = (forward + backward) / weight;
+          }
+        }
+      }
+    }
+  }
+  return found;
+}

@@ -1,0 +1,297 @@
+/**
+ * The lit mesh among the rest of its scene, in linear light: the relit lightmap on the receivers, three.js's own materials and shadows on what else the
+ * file holds, and glass last, refracting what is behind it [Wong2005, fig. 12].
+ */
+import {
+  BackSide,
+  Box3,
+  type BufferGeometry,
+  Color,
+  DataTexture,
+  DirectionalLight,
+  EquirectangularReflectionMapping,
+  FloatType,
+  GLSL3,
+  HalfFloatType,
+  type IUniform,
+  LinearFilter,
+  type Material,
+  Mesh,
+  type MeshPhysicalMaterial,
+  type MeshStandardMaterial,
+  type Object3D,
+  type PerspectiveCamera,
+  PMREMGenerator,
+  PointLight,
+  RawShaderMaterial,
+  RGBAFormat,
+  Scene,
+  ShaderMaterial,
+  Sphere,
+  SphereGeometry,
+  SpotLight,
+  type Texture,
+  Vector3,
+  type WebGLRenderer,
+  WebGLRenderTarget,
+} from "three";
+import type { EnvironmentLight, LampLight, Light } from "../src";
+import { toThree } from "./frames";
+import type { ScreenUniforms } from "./screen";
+
+const SHADOW_SIZE = 2048;
+const SHADOWED_LAMPS = 2; // lamps that cast shadows on what is no receiver; each draws the scene six times
+const FILL = 0.12; // of the lights' irradiance: a dim sky for what the lightmap does not light, and for glass to reflect
+const SAMPLES = 4;
+
+export class Surroundings {
+  private readonly scene = new Scene();
+  private readonly lit: Object3D[] = [];
+  private readonly target: WebGLRenderTarget;
+  private readonly bounds: Sphere;
+  private readonly sky: Texture;
+  private readonly skies = new WeakMap<object, Texture>();
+  private readonly pmrem: PMREMGenerator;
+  private drawn = "";
+
+  /** `model` is the glTF's scene, in three's world; the receivers' materials take what `uniforms` show. */
+  constructor(
+    model: Object3D,
+    uniforms: ScreenUniforms,
+    quantity: "irradiance" | "radiance",
+    private readonly renderer: WebGLRenderer,
+  ) {
+    this.scene.add(model);
+    model.updateMatrixWorld(true);
+    this.bounds = new Box3().setFromObject(model).getBoundingSphere(new Sphere());
+    model.traverse((object) => {
+      const mesh = object as Mesh<BufferGeometry, Material>;
+      if (!mesh.isMesh) return;
+      if (mesh.geometry.getAttribute("lightmapUv")) {
+        mesh.material = receiverMaterial(mesh, uniforms, quantity);
+        mesh.castShadow = true;
+      } else if (isGlass(mesh.material)) mesh.receiveShadow = true;
+      else mesh.castShadow = mesh.receiveShadow = true;
+    });
+    this.target = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES, minFilter: LinearFilter, magFilter: LinearFilter });
+    this.pmrem = new PMREMGenerator(renderer);
+    this.sky = this.pmrem.fromScene(daylight(), 0.02).texture;
+  }
+
+  /** Whether a file holds more than receivers. */
+  static in(model: Object3D): boolean {
+    let found = false;
+    model.traverse((object) => {
+      const mesh = object as Mesh<BufferGeometry>;
+      if (mesh.isMesh && !mesh.geometry.getAttribute("lightmapUv")) found = true;
+    });
+    return found;
+  }
+
+  /** Linear radiance, alpha where there is something; of so many pixels, row 0 at the bottom. */
+  draw(camera: PerspectiveCamera, lights: readonly Light[], width: number, height: number): Texture {
+    const { renderer } = this;
+    this.target.setSize(width, height);
+    this.setLights(lights);
+    const kept = { enabled: renderer.shadowMap.enabled, color: renderer.getClearColor(new Color()), alpha: renderer.getClearAlpha() };
+    renderer.shadowMap.enabled = true;
+    renderer.setClearColor(0x000000, 0);
+    renderer.setRenderTarget(this.target);
+    renderer.autoClear = true;
+    renderer.render(this.scene, camera);
+    renderer.setRenderTarget(null);
+    renderer.shadowMap.enabled = kept.enabled;
+    renderer.setClearColor(kept.color, kept.alpha);
+    return this.target.texture;
+  }
+
+  private setLights(lights: readonly Light[]): void {
+    const state = JSON.stringify(lights, (key, value) => (key === "pixels" ? value.length : value));
+    if (state === this.drawn) return;
+    this.drawn = state;
+    for (const light of this.lit) {
+      this.scene.remove(light);
+      (light as DirectionalLight).dispose?.();
+    }
+    this.lit.length = 0;
+    let lamps = 0;
+    let fill = 0;
+    let sky: EnvironmentLight | undefined;
+    for (const light of lights) {
+      if (light.kind === "environment") {
+        sky ??= light;
+        continue;
+      }
+      const made = light.kind === "directional" ? this.sun(light.direction, light.color) : this.lamp(light, lamps++ < SHADOWED_LAMPS);
+      const strength = (light.color[0] + light.color[1] + light.color[2]) / 3;
+      fill += light.kind === "directional" ? strength * Math.max(0, light.direction[2]) : 0.3 * strength;
+      this.lit.push(made);
+      this.scene.add(made);
+    }
+    this.scene.environment = sky ? this.skyOf(sky) : this.sky;
+    this.scene.environmentIntensity = sky ? (sky.color[0] + sky.color[1] + sky.color[2]) / 3 : (FILL * fill) / Math.PI;
+    this.renderer.shadowMap.needsUpdate = true;
+  }
+
+  private sun(direction: readonly [number, number, number], color: readonly number[]): DirectionalLight {
+    const { center, radius } = this.bounds;
+    const sun = new DirectionalLight(new Color(...(color as [number, number, number])), 1);
+    sun.target.position.copy(center);
+    sun.position.copy(center).addScaledVector(toThree(direction as never).normalize(), 2 * radius);
+    sun.target.updateMatrixWorld();
+    sun.castShadow = true;
+    const { camera } = sun.shadow;
+    camera.left = camera.bottom = -radius;
+    camera.right = camera.top = radius;
+    camera.near = radius * 0.5;
+    camera.far = radius * 3.5;
+    sun.shadow.mapSize.set(SHADOW_SIZE, SHADOW_SIZE);
+    sun.shadow.normalBias = (3 * radius) / SHADOW_SIZE;
+    return sun;
+  }
+
+  /** Irradiance color at the distance a0, as three has candelas. */
+  private lamp(light: LampLight, shadow: boolean): PointLight | SpotLight {
+    const [decay, intensity] = light.falloff === "linear" ? [1, light.a0] : [2, light.a0 ** 2];
+    const color = new Color(...(light.color as [number, number, number]));
+    const lamp =
+      light.kind === "spot"
+        ? new SpotLight(color, intensity, 0, Math.min(light.outer, Math.PI / 2 - 1e-3), 1 - Math.min(1, light.inner / Math.max(light.outer, 1e-6)), decay)
+        : new PointLight(color, intensity, 0, decay);
+    lamp.position.copy(toThree(light.position as never));
+    if (lamp instanceof SpotLight && light.kind === "spot") {
+      lamp.target.position.copy(lamp.position).add(toThree(light.direction as never));
+      lamp.target.updateMatrixWorld();
+    }
+    lamp.castShadow = shadow;
+    lamp.shadow.mapSize.set(SHADOW_SIZE / 2, SHADOW_SIZE / 2);
+    lamp.shadow.camera.near = this.bounds.radius * 0.005;
+    lamp.shadow.camera.far = this.bounds.radius * 6;
+    lamp.shadow.normalBias = (6 * this.bounds.radius) / SHADOW_SIZE;
+    return lamp;
+  }
+
+  /** A dropped environment, its top row +z and its middle column +x of Blender's world. */
+  private skyOf(light: EnvironmentLight): Texture {
+    const key = light.pixels as object;
+    let found = this.skies.get(key);
+    if (!found) {
+      const { width, height, pixels } = light;
+      const data = new Float32Array(4 * width * height);
+      for (let r = 0; r < height; ++r) {
+        for (let x = 0; x < width; ++x) {
+          for (let c = 0; c < 3; ++c) data[4 * ((height - 1 - r) * width + x) + c] = pixels[3 * (r * width + x) + c];
+        }
+      }
+      const image = new DataTexture(data as never, width, height, RGBAFormat, FloatType);
+      image.mapping = EquirectangularReflectionMapping;
+      image.magFilter = image.minFilter = LinearFilter;
+      image.needsUpdate = true;
+      found = this.pmrem.fromEquirectangular(image).texture;
+      image.dispose();
+      this.skies.set(key, found);
+    }
+    return found;
+  }
+}
+
+function isGlass(material: Material): boolean {
+  return ((material as MeshPhysicalMaterial).transmission ?? 0) > 0;
+}
+
+/** A sky that is bright about the zenith over a dim ground: for reflections. */
+function daylight(): Scene {
+  const scene = new Scene();
+  const material = new ShaderMaterial({
+    side: BackSide,
+    depthWrite: false,
+    vertexShader: "varying vec3 towards; void main() { towards = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }",
+    fragmentShader: `varying vec3 towards;
+void main() {
+    float h = normalize(towards).y;
+    vec3 sky = mix(vec3(0.95, 0.97, 1.0), vec3(1.6, 1.75, 2.0), smoothstep(0.0, 0.9, h));
+    gl_FragColor = vec4(mix(vec3(0.16, 0.15, 0.14), sky, smoothstep(-0.05, 0.08, h)), 1.0);
+}`,
+  });
+  scene.add(new Mesh(new SphereGeometry(10, 32, 16), material));
+  return scene;
+}
+
+const RECEIVER_VERTEX = `precision highp float;
+in vec3 position;
+in vec2 lightmapUv;
+#ifdef COLOURED
+in vec4 color;
+#endif
+uniform mat4 modelViewMatrix, projectionMatrix;
+#ifdef TEXTURED
+in vec2 surfaceUv;
+uniform mat3 surfaceTransform;
+out vec2 vSurfaceUv;
+#endif
+out vec2 vUv;
+out vec3 vColour;
+void main() {
+    vUv = lightmapUv;
+    vColour = vec3(1.0);
+#ifdef COLOURED
+    vColour = color.rgb;
+#endif
+#ifdef TEXTURED
+    vSurfaceUv = (surfaceTransform * vec3(surfaceUv, 1.0)).xy;
+#endif
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+}`;
+
+const RECEIVER_FRAGMENT = `precision highp float;
+precision highp sampler2D;
+in vec2 vUv;
+in vec3 vColour;
+uniform sampler2D relit, reference, ambient;
+uniform vec3 referenceColour, albedo;
+uniform float split;
+#ifdef TEXTURED
+in vec2 vSurfaceUv;
+uniform sampler2D surface;
+#endif
+out vec4 radiance;
+void main() {
+    vec3 light = gl_FragCoord.x < split
+        ? textureLod(reference, vUv, 0.0).rgb * referenceColour + textureLod(ambient, vUv, 0.0).rgb
+        : textureLod(relit, vUv, 0.0).rgb;
+#ifdef IRRADIANCE
+    light *= albedo * vColour / 3.14159265358979;
+#ifdef TEXTURED
+    light *= texture(surface, vSurfaceUv).rgb;
+#endif
+#endif
+    radiance = vec4(max(light, vec3(0.0)), 1.0);
+}`;
+
+/** The relit lightmap in the colours of the material that the mesh had: irradiance × albedo / π; radiance as it is. */
+function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): RawShaderMaterial {
+  const surface = mesh.userData.surface as MeshStandardMaterial | undefined;
+  const { geometry } = mesh;
+  const map = surface?.map ?? null;
+  const own: Record<string, IUniform> = { albedo: { value: new Vector3(1, 1, 1) } };
+  if (surface?.color) own.albedo.value.set(surface.color.r, surface.color.g, surface.color.b);
+  const uv = map && geometry.getAttribute(map.channel ? `uv${map.channel}` : "uv");
+  if (map && uv) {
+    geometry.setAttribute("surfaceUv", uv);
+    map.updateMatrix();
+    own.surface = { value: map };
+    own.surfaceTransform = { value: map.matrix };
+  }
+  const defines: Record<string, string> = {};
+  if (quantity === "irradiance") defines.IRRADIANCE = "";
+  if (map && uv) defines.TEXTURED = "";
+  if (geometry.getAttribute("color")) defines.COLOURED = "";
+  return new RawShaderMaterial({
+    glslVersion: GLSL3,
+    defines,
+    uniforms: { ...uniforms, ...own },
+    vertexShader: RECEIVER_VERTEX,
+    fragmentShader: RECEIVER_FRAGMENT,
+    side: surface?.side ?? 2,
+  });
+}
