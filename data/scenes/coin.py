@@ -19,7 +19,7 @@ import numpy as np
 from mathutils import Vector
 
 RASTER = 1600  # heights a side, over [-1, 1]²
-QUADS = 340  # of the mesh, a side
+QUADS = 480  # of the mesh, a side
 EDGE = 0.13  # m from the field down to the felt
 FACE = 0.315  # m, radius of the sun's face
 LEGEND = 0.735  # m, radius of the letters' feet
@@ -150,8 +150,8 @@ def filled(triangles):
 
 def legend():
     """The letters, raised with rounded shoulders."""
-    upper = bent(text_triangles("SOL OMNIBVS LVCET", 0.165), LEGEND - 0.035, below=False)
-    lower = bent(text_triangles("* S R B F *", 0.165), LEGEND + 0.082, below=True)
+    upper = bent(text_triangles("SOL OMNIBVS LVCET", 0.155), LEGEND - 0.024, below=False)
+    lower = bent(text_triangles("* S R B F *", 0.155), LEGEND + 0.084, below=True)
     solid = filled(np.concatenate([upper, lower]))
     return 0.026 * step(blurred(solid, 0.0055), 0.25, 0.85)
 
@@ -193,7 +193,7 @@ def relief(seed):
     heights -= 0.35 * np.maximum(0, heights - 0.043)  # what stands highest is rubbed down
     cloth = blurred(rng.standard_normal(x.shape), 0.045)
     grain = blurred(rng.standard_normal(x.shape), 0.006)
-    heights += 0.0022 * cloth / cloth.std() + 0.00016 * grain / grain.std() - 0.012 * r**2  # a die is never quite flat
+    heights += 0.0022 * cloth / cloth.std() + 0.00016 * grain / grain.std() - 0.02 * r**2  # a die is never quite flat
     smooth = heights.copy()
     heights = heights - wear(x, y, rng)
     spots = blurred(rng.standard_normal(x.shape), 0.03)
@@ -299,13 +299,13 @@ def bronze():
     kept = kept.outputs["Fac"]
     color = ramp(tree, kept, (0.0, (0.93, 0.66, 0.36)), (1.0, (0.12, 0.17, 0.12)), (0.35, (0.72, 0.43, 0.20)), (0.7, (0.27, 0.14, 0.07)))
     speckle = node(tree, "TexNoise", Vector=node(tree, "TexCoord").outputs["Object"], Scale=38.0, Detail=2.0).outputs[0]
-    dull = node(tree, "MapRange", Value=kept, **{"To Min": 0.34, "To Max": 0.50}).outputs[0]
+    dull = node(tree, "MapRange", Value=kept, **{"To Min": 0.41, "To Max": 0.50}).outputs[0]
     rough = node(tree, "Math")
     rough.operation = "MULTIPLY_ADD"
     tree.links.new(speckle, rough.inputs[0])
-    rough.inputs[1].default_value = 0.12
+    rough.inputs[1].default_value = 0.10
     tree.links.new(dull, rough.inputs[2])
-    metal = node(tree, "MapRange", Value=kept, **{"To Min": 0.85, "To Max": 0.25}).outputs[0]
+    metal = node(tree, "MapRange", Value=kept, **{"To Min": 0.75, "To Max": 0.25}).outputs[0]
     shader = node(tree, "BsdfPrincipled", **{"Base Color": color, "Roughness": rough.outputs[0], "Metallic": metal})
     tree.links.new(shader.outputs[0], surface)
     return material
