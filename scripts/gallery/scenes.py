@@ -79,7 +79,8 @@ class Scene:
     samples: int = 2
     transport: Transport = "combined"
     soft_sun: bool = False
-    holdout: int = 24
+    validation: int = 0
+    holdout: int = 20
     holdout_samples: int = 24
     dome: Dome | None = None
     tested: tuple[tuple[float, float], ...] = ((60, 65), (200, 40), (320, 18))
@@ -96,14 +97,14 @@ class Scene:
             *self.size,
             lights=self.lights,
             samples=self.samples,
-            validation=8,
+            validation=self.validation,
             holdout=self.holdout,
             holdout_samples=self.holdout_samples,
             quantity="radiance" if receiver.kind == "view" else "irradiance",
             transport=self.transport,
         )
         if self.dome is not None:
-            return replace(settings, validation=0, holdout=0)
+            return replace(settings, holdout=0)
         return settings.with_matched_sun() if self.soft_sun else settings
 
     def lamp_settings(self, samples: int = 64) -> BakeSettings | None:
@@ -120,7 +121,17 @@ class Scene:
         size = (max(24, 64 * self.size[0] // largest), max(24, 64 * self.size[1] // largest))
         dome = self.dome and replace(self.dome, lamps=24, tests=4)
         return replace(
-            self, size=size, lights=64, samples=1, holdout=6, holdout_samples=4, frames=6, clip_width=160, dome=dome, contest_texels=512
+            self,
+            size=size,
+            lights=64,
+            samples=1,
+            validation=min(2, self.validation),
+            holdout=6,
+            holdout_samples=4,
+            frames=6,
+            clip_width=160,
+            dome=dome,
+            contest_texels=512,
         )
 
 
@@ -141,6 +152,8 @@ SCENES = (
         receiver="lightmap:Table",
         size=(512, 512),
         samples=4,
+        validation=8,
+        holdout=24,
         soft_sun=True,
         fits=(MAPS, SMALL),
         clip=Sun(25, 60, 2),
@@ -193,7 +206,7 @@ SCENES = (
         fails="",
         receiver="view",
         size=(384, 384),
-        samples=32,
+        samples=16,
         fits=(MAPS, SMALL),
         dome=Dome(80, 20, 12),
         clip=Sun(15, 22, 2),
