@@ -18,7 +18,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-RASTER = 1600  # heights a side, over [-1, 1]²
+RASTER = 1250  # heights a side, over [-1, 1]²
 QUADS = 480  # of the mesh, a side
 EDGE = 0.13  # m from the field down to the felt
 FACE = 0.315  # m, radius of the sun's face
@@ -86,18 +86,17 @@ def face(x, y):
     return h
 
 
-def rays(x, y, count=16):
+def rays(x, y, pairs=8):
     """Straight rays with a roof's ridge and waved ones with a groove, in turn, about the face."""
-    r, turn, h = np.hypot(x, y), np.arctan2(x, y), np.zeros_like(x)
-    for i in range(count):
-        waved, top = i % 2, 0.64 - 0.03 * (i % 2)
+    r, turn, pitch, h = np.hypot(x, y), np.arctan2(x, y), 2 * pi / pairs, np.zeros_like(x)
+    for waved in (False, True):
+        top = 0.61 if waved else 0.64
         t = np.clip((r - FACE) / (top - FACE), 0, 1)
+        bearing = (turn - waved * pitch / 2 + pitch / 2) % pitch - pitch / 2  # from the nearest ray of its kind
         sway = waved * 0.022 * np.sin(2 * pi * 1.5 * t) * (1 - 0.5 * t)
-        bearing = (turn - 2 * pi * i / count + pi) % (2 * pi) - pi
         off = np.abs(bearing * r - sway) / (0.062 * (1 - 0.93 * t) * (0.85 if waved else 1.0))
         section = np.sqrt(np.maximum(0, 1 - off**2)) - 0.4 * np.exp(-0.5 * (off / 0.22) ** 2) if waved else np.maximum(0, 1 - off)
-        inside = (np.cos(bearing) > 0) & (r > 0.8 * FACE) & (r < top)
-        h = np.maximum(h, np.where(inside, section * (0.034 - 0.012 * t), 0))
+        h = np.maximum(h, np.where((r > 0.8 * FACE) & (r < top), section * (0.034 - 0.012 * t), 0))
     return h
 
 
@@ -185,7 +184,8 @@ def relief(seed):
     rng = np.random.default_rng(seed)
     x, y = raster()
     r = np.hypot(x, y)
-    struck = FACE * 0.54 * np.where(r < FACE, face(x / FACE, y / FACE), 0)
+    struck, middle = np.zeros_like(x), _window(np.zeros(2), FACE)
+    struck[middle] = FACE * 0.54 * np.where(r[middle] < FACE, face(x[middle] / FACE, y[middle] / FACE), 0)
     struck = np.maximum(struck, np.where(r < FACE, 0.016, 0) + rays(x, y))
     struck += 0.010 * np.exp(-0.5 * ((r - 0.675) / 0.006) ** 2)  # a thread between the sun and its legend
     rim = 0.043 * step(r, 0.905, 0.925)
@@ -205,7 +205,7 @@ def relief(seed):
 
 
 def disc_of_square(n):
-    """Points (n + 1, n + 1, 2) of a square grid drawn out to the unit disc [Shirley1997]."""
+    """Points (n + 1, n + 1, 2) of a square grid drawn out to the unit disc, squares to circles."""
     line = np.linspace(-1, 1, n + 1)
     a, b = np.meshgrid(line, line)
     wide = np.abs(a) > np.abs(b)

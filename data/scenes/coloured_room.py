@@ -60,7 +60,7 @@ def circle(radius, z=0.0, segments=64):
 
 
 def smoothed(points, times=3):
-    """A polyline with its corners cut, again and again [Chaikin]: a lathe's curve from few points."""
+    """A polyline with its corners cut, again and again (Chaikin): a lathe's curve from few points."""
     for _ in range(times):
         cut = [(a * t + b * (1 - t)) for a, b in zip(points, points[1:], strict=False) for t in (0.75, 0.25)]
         points = [points[0], *cut, points[-1]]
