@@ -6,8 +6,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import srbf
 from srbf import files
@@ -17,6 +18,8 @@ from srbf.budget import within_budget
 from srbf.capture import Capture, Quantity
 from srbf.errors import BakeError, InputError, OutputExistsError
 from srbf.evaluation import TrainWatch, evaluate
+from srbf.export.scene_mesh import write_scene_mesh
+from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 
 
@@ -27,12 +30,25 @@ class DemoScene:
     receiver: Receiver
     size: tuple[int, int]
     quantity: Quantity
+    published: tuple[int, int]
+
+    def settings(self, lights: int, quality: Quality) -> BakeSettings:
+        """A `draft` takes a minute or two; what is to be published has more texels, twice the samples, and on a lightmap a sun as
+        wide as the lights stand apart, so that shadows are as soft as so many lights can tell."""
+        draft = BakeSettings(self.receiver, *self.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=self.quantity)
+        if quality == "draft":
+            return draft
+        finer = replace(draft, width=self.published[0], height=self.published[1], samples=SAMPLES)
+        return finer.with_matched_sun() if self.receiver.kind == "lightmap" else finer
 
 
+Quality = Literal["draft", "publish"]
+SAMPLES = 4  # of what is to be published
+MAPS = 25  # of the article's own asset of the scene, beside the smallest good one
 HOLDOUT_SAMPLES = 24  # fewer than a bake's default: both scenes are clean by then, and the demo is to take minutes
 SCENES = {
-    "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance"),
-    "house": DemoScene(Receiver("view"), (256, 192), "radiance"),
+    "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
+    "house": DemoScene(Receiver("view"), (256, 192), "radiance", (512, 384)),
 }
 
 
@@ -58,8 +74,21 @@ def build_scene(name: str, path: Path) -> None:
     temporary.replace(path)
 
 
-def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress: Callable[[int, int, str], None]) -> Path:
-    """Build, bake, fit, evaluate and report the scene `name` in `folder`; returns the page. Run again, it goes on where it stopped."""
+@dataclass(frozen=True)
+class Demo:
+    """What a demo left in its folder: the report's page, the smallest good asset, the article's, the capture, and a lightmap's scene."""
+
+    page: Path
+    asset: Path
+    maps: Path
+    capture: Path
+    mesh: Path | None
+
+
+def run_demo(
+    name: str, folder: Path, lights: int, reporter: Reporter, progress: Callable[[int, int, str], None], quality: Quality = "draft"
+) -> Demo:
+    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Run again, it goes on where it stopped."""
     scene = SCENES[name]
     files.make_folder(folder)
     blend, capture_folder, asset_folder = folder / f"{name}.blend", folder / "capture", folder / "asset"
@@ -69,8 +98,8 @@ def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress:
     if not blend.is_file():
         reporter.say(f"building {blend}")
         build_scene(name, blend)
-    settings = BakeSettings(scene.receiver, *scene.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=scene.quantity)
-    reporter.say(f"baking {lights} directions at {scene.size[0]}x{scene.size[1]} with Cycles")
+    settings = scene.settings(lights, quality)
+    reporter.say(f"baking {lights} directions at {settings.width}x{settings.height} with Cycles")
     try:
         baked = Bake(blend, capture_folder, settings).run(reporter)
     except OutputExistsError as error:
@@ -90,9 +119,14 @@ def run_demo(name: str, folder: Path, lights: int, reporter: Reporter, progress:
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
     asset.save(asset_folder, force=True)
+    RelightingMap(k=MAPS).encode(capture).save(folder / "maps", force=True)
+    mesh = None
+    if scene.receiver.kind == "lightmap":
+        mesh = folder / "scene.glb"
+        write_scene_mesh(blend, mesh, capture_folder, force=True, say=reporter.say)
     reporter.say("drawing the report")
     files.make_folder(folder / "report")
     page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
     holdout, size = asset.manifest["error"]["holdout"], asset.bytes_per_texel()["directional"]
     reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes a texel")
-    return page
+    return Demo(page, asset_folder, folder / "maps", capture_folder, mesh)

@@ -126,10 +126,11 @@ def spectrum(sample: Capture) -> Float64[ndarray, " r"]:
 
 
 def singular_values(answers: Float32[ndarray, "n m"]) -> Float64[ndarray, " r"]:
-    """Singular values of `answers` less their mean row, largest first; by the smaller side's Gram matrix, good to 1e-4 of the first."""
+    """Singular values of `answers` less their mean row, largest first; by the smaller side's Gram matrix, good to 1e-6 of the first."""
     centred: Float32[ndarray, "n m"] = answers - answers.mean(axis=0, dtype=np.float64).astype(np.float32)
     smaller = centred.T if len(centred) > centred.shape[1] else centred
-    gram = (smaller @ smaller.T).astype(np.float64)
+    double = smaller.astype(np.float64)
+    gram = double @ double.T
     return np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[::-1], 0))
 
 

@@ -9,16 +9,26 @@ import typer
 from srbf.bake.run import Reporter
 from srbf.cli.parameters import Output
 from srbf.cli.terminal import note, progress_bar
+from srbf.cli.view import serve
 from srbf.demo import run_demo
+from srbf.viewer.contents import contents_of
 
 
 def demo(
     output: Output,
     scene: Annotated[Literal["caustics", "house"], typer.Option(help="A table with glass on it, or a room by daylight.")] = "caustics",
     lights: Annotated[int, typer.Option(help="Directions to bake.")] = 400,
+    quality: Annotated[
+        Literal["draft", "publish"], typer.Option(help="publish: more texels, twice the samples, softer shadows; a quarter of an hour.")
+    ] = "draft",
+    view: Annotated[bool, typer.Option("--view", help="Open the viewer at the end; Ctrl-C ends it.")] = False,
 ) -> None:
     """Bake a scene, fit its maps, relight it by unseen directions and lamps, and write a report to look at."""
     with progress_bar(scene) as update:
-        page = run_demo(scene, output, lights, Reporter(update, note), update)
-    note(f"look at {page}")
-    note(f"drag its lights: srbf view {page.parents[1] / 'asset'} {page.parents[1] / 'capture'}")
+        made = run_demo(scene, output, lights, Reporter(update, note), update, quality)
+    note(f"look at {made.page}")
+    if view:
+        serve(contents_of([made.asset, made.maps], made.capture, made.mesh))
+        return
+    mesh = f" --mesh {made.mesh}" if made.mesh else ""
+    note(f"drag its lights: srbf view {made.asset} {made.maps} {made.capture}{mesh}")

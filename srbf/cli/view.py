@@ -47,7 +47,12 @@ def view(
     if save is not None:
         _save(save, contents_of(assets, None, mesh), capture, force)
         return
-    server = ViewerServer(contents_of(assets, capture, mesh), port)
+    serve(contents_of(assets, capture, mesh), port, browser)
+
+
+def serve(contents: dict[str, Content], port: int = 0, browser: bool = True) -> None:
+    """Hand out `contents` until Ctrl-C, and open the page."""
+    server = ViewerServer(contents, port)
     try:
         typer.echo(server.url)
         if browser:

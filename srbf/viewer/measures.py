@@ -83,5 +83,5 @@ class Measures:
 
 def _listed(values: Float64[ndarray, " r"]) -> list[float]:
     """All but what is rounding: six digits are enough for a plot."""
-    kept = values[values > 1e-6 * max(float(values[0]), 1e-30)]
+    kept = values[values > 1e-5 * max(float(values[0]), 1e-30)]
     return [float(f"{value:.6g}") for value in kept]

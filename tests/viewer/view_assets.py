@@ -1,13 +1,16 @@
-"""A made view of a room whose camera is known, and a made lightmap that a mesh shows."""
+"""A made view of a room whose camera is known, and meshes of things in a scene."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from closed_forms import TURN, flat_normals
 from web_assets import complete
 
 from srbf.asset import Asset
+from srbf.export.glb import Document
 
 EYE = np.array([0.3, -4.0, 1.2])
 FORWARD = np.array([-0.05, 1.0, -0.15]) / np.linalg.norm([-0.05, 1.0, -0.15])
@@ -34,3 +37,20 @@ def project(place: np.ndarray) -> np.ndarray:
     """(u, v) of a place in the room."""
     seen = LENS @ (ROTATION @ (np.asarray(place) - EYE))
     return seen[:2] / seen[2]
+
+
+def scene_glb(*things: tuple[str, np.ndarray, dict[str, Any]], uv: tuple[str, np.ndarray] | None = None) -> bytes:
+    """A .glb of things (name, triangles (T, 3, 3) in Blender's world, glTF material), a node each; `uv`: of one thing, a corner each."""
+    document = Document()
+    nodes = []
+    for name, corners, material in things:
+        points = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
+        attributes = {"POSITION": document.accessor(points, bounds=True)}
+        attributes["NORMAL"] = document.accessor(np.ascontiguousarray(flat_normals(corners).reshape(-1, 3)))
+        if uv and uv[0] == name:
+            attributes["TEXCOORD_0"] = document.accessor(np.ascontiguousarray(uv[1], np.float32))
+        mesh = document.add("meshes", {"primitives": [{"attributes": attributes, "material": document.add("materials", material)}]})
+        nodes.append(document.add("nodes", {"name": name, "mesh": mesh}))
+    root = document.add("nodes", {"rotation": TURN, "children": nodes})
+    document.json.update(scenes=[{"nodes": [root]}], scene=0)
+    return document.pack()

@@ -24,7 +24,8 @@ let page;
 const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 20_000, polling: 20 });
 
 const commands = {
-  async open({ url, width = 900, height = 700, touch = false }) {
+  /** `moving`: what plays is never at rest. */
+  async open({ url, width = 900, height = 700, touch = false, moving = false }) {
     await context?.close();
     context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, hasTouch: touch });
     context.setDefaultTimeout(10_000);
@@ -36,7 +37,7 @@ const commands = {
       if (!request.url().startsWith(home) && !/^(blob|data):/.test(request.url())) said.push(`error: asked for ${request.url()}`);
     });
     await page.goto(url);
-    await settled();
+    if (!moving) await settled();
   },
   async run({ script }) {
     const value = await page.evaluate(script);

@@ -24,9 +24,9 @@ const KEYS: [string, string][] = [
 export const tabled = () => `<h2>Keys</h2><table>${KEYS.map(([key, what]) => `<tr><td>${key}</td><td>${what}</td></tr>`).join("")}</table>`;
 
 export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void; nextAsset(): void }): void {
-  window.addEventListener("keydown", (event) => {
+  const heard = (event: KeyboardEvent) => {
     const target = event.target as HTMLElement;
-    if (/^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (/^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || target.role === "slider" || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === " " && target.tagName === "BUTTON") return;
     const step = event.shiftKey ? LARGE_STEP : STEP;
     const turns: Record<string, [number, number]> = { ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
@@ -51,7 +51,8 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
     else return;
     event.preventDefault();
     changed({ lights: true });
-  });
+  };
+  window.addEventListener("keydown", heard, { capture: true }); // the panel keeps to itself what is pressed on its buttons
 }
 
 /** The selected sun, or the first, by azimuth and elevation (rad); never over the zenith. */

@@ -1,0 +1,70 @@
+"""Direct light on an indirect asset: in the browser what `--direct shadow-map` adds, with it, without it, or alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_forms import ball, build_plane, quad
+from test_page import HEIGHT, WIDTH, shown_as
+from view_assets import scene_glb
+from web_assets import complete
+
+from srbf.asset import Asset
+from srbf.direct.choice import Added
+from srbf.lights import DirectionalLight
+from srbf.methods import relight
+
+SIDE, ZOOM = 24, 16
+TINT = np.linspace(0.2, 1.2, 24).reshape(8, 3)
+MOST_APART, MEAN_APART = 6.0, 0.4  # bytes: one shadow map's texel may fall on either side of an edge on another GPU
+
+
+@pytest.fixture(params=["irradiance", "radiance"])
+def split(request: pytest.FixtureRequest, make_asset: Callable[..., Asset]) -> Asset:
+    """Indirect maps of a plane below a ball and two tinted panes."""
+    quantity = request.param
+    pane = quad([0.2, -0.9, 0.3], [0.9, -0.9, 0.5], [0.9, 0.9, 0.5], [0.2, 0.9, 0.3])
+    occluder = ball(0.35, [-0.4, 0.1, 0.6], 24)
+    receivers = build_plane(occluder, panes=(pane,), size=SIDE, albedo=(0.8, 0.5, 0.3) if quantity == "radiance" else None)
+    plain = {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}, "doubleSided": True}
+    ground = quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])
+    scene = scene_glb(
+        ("Ground", ground, plain), ("Ball", occluder, plain), ("Pane", pane, {**plain, "extras": {"tint_by_cosine": TINT.tolist()}})
+    )
+    made = make_asset(k=4, height=SIDE, width=SIDE, encoding="half", position=False)
+    stored = (made.stored.astype(np.float32) * 0.1).astype(np.float16)  # signed: what leaves the clamp depends on the direct light
+    images = {**receivers.images, "coverage": np.ones((SIDE, SIDE), np.float32)}
+    names = {"transport": "indirect", "quantity": quantity, "scene": "scene.glb", "direct": {"sun_angle": 0.05, "footprint": 0.5}}
+    return complete(replace(made, stored=stored, images=images, scene=scene), **names)
+
+
+def test_terms_are_the_shadow_map_s_and_the_maps(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    split.save(tmp_path / "asset")
+    lights = [DirectionalLight((-0.45, -0.5, 0.74))]
+    with Added(split, "shadow-map") as added:
+        direct = added.answer(lights)
+    expected = {"both": relight(split, lights, direct), "direct": direct, "indirect": relight(split, lights)}
+    assert np.abs(expected["both"] - expected["direct"]).max() > 0.05
+    url = serve(tmp_path / "asset")
+    for terms, picture in expected.items():
+        chromium(
+            "open",
+            url=f"{url}#{{'zoom':{ZOOM},'middle':[{SIDE / 2},{SIDE / 2}],'terms':'{terms}','exposure':0}}",
+            width=WIDTH,
+            height=HEIGHT,
+        )
+        apart = np.abs(chromium.texels(SIDE, SIDE, ZOOM) - shown_as(picture))
+        assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART), terms
+
+
+def test_lamps_say_that_their_direct_light_is_missing(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    split.save(tmp_path / "asset")
+    chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
+    assert "indirect light alone" not in chromium("run", script="document.getElementById('status').textContent")
+    chromium("choose", selector=".chip.add", value="point")
+    assert "lamps and skies: indirect light alone" in chromium("run", script="document.getElementById('status').textContent")
