@@ -48,7 +48,7 @@ class Gallery:
 
     def written(self) -> dict[Path, int]:
         """When each of its files was."""
-        found = [p for folder in (self.out, self.docs.parent) for p in folder.rglob("*") if p.is_file()]
+        found = [p for folder in (self.out, self.docs.parent) for p in folder.rglob("*") if p.is_file() and p.suffix != ".lock"]
         return {path: path.stat().st_mtime_ns for path in found}
 
 

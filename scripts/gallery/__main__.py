@@ -19,9 +19,11 @@ from scripts.gallery.places import Places
 from scripts.gallery.scenes import SCENES
 from scripts.gallery.steps import Steps
 from srbf import files
+from srbf.bake.folder import locked
 from srbf.bake.run import Reporter
 from srbf.errors import SrbfError
 
+LOCK = ".gallery.lock"
 EVERY = 20.0  # seconds between two lines about a bake's progress
 
 
@@ -34,6 +36,11 @@ def main() -> int:
     parser.add_argument("--small", action="store_true", help="tiny, in seconds")
     given = parser.parse_args()
     warnings.showwarning = lambda message, *_rest, **_named: say(f"  {message}")
+    files.make_folder(given.output)
+    held = locked(given.output, LOCK)  # until this process ends
+    if held is None:
+        say(f"gallery: another process is making {given.output}; wait for it, or choose another -o")
+        return 1
     steps = Steps(given.output, say)
     scenes = [scene.small() if given.small else scene for scene in SCENES]
     everything = [Places(scene, given.output / scene.name, given.docs) for scene in scenes]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
@@ -29,6 +29,20 @@ from srbf.methods.relighting_map import RelightingMap
 from srbf.motion import sampled_texels
 from srbf.quality import METHODS, Score, contest
 
+FITTING = (
+    "methods/*",
+    "solve/*",
+    "basis/*",
+    "model_selection",
+    "light_space",
+    "scalar_planes",
+    "fitting",
+    "budget",
+    "stitch",
+    "quantization",
+)
+MEASURING = ("evaluation", "direct/*")
+COMPARING = (*FITTING, "evaluation", "quality", "motion")
 PTM = RelightingMap(k=6, basis="ptm")
 
 
@@ -44,10 +58,10 @@ def make(places: Places, steps: Steps, reporter: Reporter) -> None:
     baked = _bake(places, steps, reporter, built)
     scored = []
     for fit in scene.fits:
-        source: list[Any] = [baked, srbf.__version__, asdict(fit)]
+        source: list[Any] = [baked, library(FITTING), fit.method, fit.settings, fit.light]
         fitted = step(f"fit {fit.folder}", source, [places.asset(fit)], partial(_fit, places, fit, reporter.say))
-        scored.append(step(f"evaluate {fit.folder}", fitted, [places.errors(fit)], partial(_evaluate, places, fit)))
-    source = [baked, srbf.__version__, scene.contest_texels]
+        scored.append(step(f"evaluate {fit.folder}", [fitted, library(MEASURING)], [places.errors(fit)], partial(_evaluate, places, fit)))
+    source = [baked, library(COMPARING), scene.contest_texels]
     step("compare methods", source, [places.scores], partial(_compare, places))
     source = [scored, _source(strip, drawing), scene.tested, [asdict(fit) for fit in scene.fits]]
     step("strip", source, [places.strip], lambda anew: strip.draw(places))
@@ -131,10 +145,20 @@ def _lamps(places: Places, steps: Steps, reporter: Reporter, built: str, scored:
     split = scene.fits[-1]
     errors = [places.lamp_errors(split)]
     measured = steps.run(
-        f"{scene.name}/evaluate true lamps", [baked, scored, _source(lamps)], errors, lambda anew: lamps.evaluate_lamps(places, split)
+        f"{scene.name}/evaluate true lamps",
+        [baked, scored, library(MEASURING), _source(lamps)],
+        errors,
+        lambda anew: lamps.evaluate_lamps(places, split),
     )
     source = [measured, _source(lamps, strip, drawing)]
     steps.run(f"{scene.name}/lamp strip", source, [places.lamp_strip], lambda anew: lamps.draw(places, split))
+
+
+def library(patterns: Sequence[str]) -> str:
+    """A checksum of the library's modules that make something: it is made again when they change."""
+    root = Path(srbf.__file__).parent
+    found = sorted({path for pattern in patterns for path in root.glob(f"{pattern}.py")})
+    return hashlib.sha256("".join(map(files.sha256_of, found)).encode()).hexdigest()
 
 
 def _source(*modules: ModuleType) -> list[str]:

@@ -124,7 +124,8 @@ def _time(made: Sequence[Places], steps: Steps) -> str:
         rows.append([kind, *map(duration, seconds), duration(sum(seconds))])
     rows.append(["**together**", *map(duration, totals[:-1]), f"**{duration(totals[-1])}**"])
     whole = steps.total([places.scene.name for places in made])
-    stopped = "" if not whole.interrupted else f" It was stopped and gone on with {whole.interrupted} times."
+    times = "once" if whole.interrupted == 1 else f"{_number(whole.interrupted)} times"
+    stopped = "" if not whole.interrupted else f" It was stopped, and gone on with, {times}."
     source = Capture.open(made[0].rendered).manifest["source"]
     cores = f"{_number(os.cpu_count() or 1)} {platform.machine()} cores that other work shared"
     versions = f"srbf {srbf.__version__}, Blender {blender_version(source)}, Python {platform.python_version()}, numpy {np.__version__}"
