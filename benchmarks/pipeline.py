@@ -1,10 +1,12 @@
 """Fit against reading, and relighting by numpy against the shaders, as ratios in one run: `python benchmarks/pipeline.py`.
 
-A synthetic capture of 400 noisy half-float EXRs of 256² texels is made in a temporary folder; every row is the best of several runs.
+A synthetic capture of 400 noisy half-float EXRs of 256² texels, or as many as `--lights` and `--side` say, is made in a temporary folder;
+every row is the best of several runs.
 """
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 import time
 from collections.abc import Callable
@@ -22,22 +24,22 @@ from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
 from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
-SIDE, LIGHTS, K = 256, 400, 25
+K = 25
 
 
-def make_capture(folder: Path) -> Capture:
+def make_capture(folder: Path, count: int, side: int) -> Capture:
     """Noisy cosines: EXR's ZIP finds as little to squeeze in them as in a render of few samples."""
     (folder / "lights").mkdir(parents=True)
     rng = np.random.default_rng(0)
-    x = np.linspace(-1, 1, SIDE, dtype=np.float32)
-    positions = np.stack([*np.meshgrid(x, -x), np.zeros((SIDE, SIDE), np.float32)], axis=-1)
+    x = np.linspace(-1, 1, side, dtype=np.float32)
+    positions = np.stack([*np.meshgrid(x, -x), np.zeros((side, side), np.float32)], axis=-1)
     write_image(folder / "position.exr", positions, "float")
     lights = []
-    for i, direction in enumerate(point_set("hammersley", LIGHTS, "hemisphere")):
-        pixels = direction[2] * rng.random((SIDE, SIDE, 3), np.float32)
+    for i, direction in enumerate(point_set("hammersley", count, "hemisphere")):
+        pixels = direction[2] * rng.random((side, side, 3), np.float32)
         write_image(folder / f"lights/{i:04d}.exr", pixels, "half")
         lights.append({"kind": "directional", "direction": direction.tolist(), "role": "train", "file": f"lights/{i:04d}.exr"})
-    manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": SIDE, "height": SIDE, "lights": lights}
+    manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": side, "height": side, "lights": lights}
     files.write_json(folder / "capture.json", {**manifest, "position": "position.exr"})
     return Capture.open(folder)
 
@@ -53,14 +55,18 @@ def best(work: Callable[[], object], runs: int = 3) -> float:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--lights", type=int, default=400)
+    parser.add_argument("--side", type=int, default=256)
+    wanted = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        capture = make_capture(Path(name) / "capture")
+        capture = make_capture(Path(name) / "capture", wanted.lights, wanted.side)
         indices = capture.indices("train")
         reading = best(lambda: [None for _ in capture.blocks(indices)])
         fitting = best(lambda: RelightingMap(k=K).encode(capture))
         asset = RelightingMap(k=K).encode(capture)
         evaluating = best(lambda: evaluate(asset, capture), 1)
-        print(f"{LIGHTS} lights of {SIDE}², k = {K}, half floats\n")
+        print(f"{wanted.lights} lights of {wanted.side}², k = {K}, half floats\n")
         print(f"{'step':<34}{'seconds':>10}{'of reading':>12}")
         for step, seconds in (
             ("reading all images", reading),

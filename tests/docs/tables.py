@@ -1,0 +1,79 @@
+"""What to write where the documentation has a placeholder, how a run is made short, and who runs what cannot be run here in seconds.
+
+A new command of `srbf` or a new script needs no line here: it is run as it stands, in the folder of `workplace.py`, which holds files of
+the documented names. A line is needed for a placeholder that is no file's name, for what takes long, and for other programs.
+"""
+
+from __future__ import annotations
+
+# A placeholder in capitals, also within a word (lightmap:OBJECT), or a whole word -> what is run in its place. A word of several parts
+# becomes several words. Choices, A|B and [A], need no line: each is run.
+STAND_INS = {
+    "N": "2",
+    "K": "2",
+    "T": "exr",
+    "DB": "20",
+    "dB": "20",
+    "BYTES": "16",
+    "TARGET": "exr",
+    "OBJECT": "Table",
+    "CAMERA": "Camera",
+    "LIGHTS": "--directional 0,0.5,1",
+    "PATH": "asset",
+    "FILE.lp": "dome/dirs.lp",
+    "FILE.glb": "model.glb",
+}
+
+# The same in one script's calls alone.
+STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one whose direct light is apart
+
+# The tables below are by the words of a command: all of them, in any order, with ` *` at the end also among others.
+
+# What is appended; the last value of a flag is the one that counts.
+SHORTER = {
+    "srbf bake *": "--lights 28 --size 24 --samples 1 --validation 4 --holdout 2 --holdout-samples 1",
+    "srbf demo *": "--lights 28",  # its scenes are made smaller, too
+    "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
+    "srbf evaluate --point-reference *": "--point-reference 2 --samples 1",
+    "srbf view *": "--port 0",
+    "python benchmarks/fit.py *": "--lights 12 --side 16 -k 4 --rounds 1",
+    "python benchmarks/motion.py *": "--lights 26",
+    "python benchmarks/pipeline.py *": "--lights 30 --side 16",
+    "python benchmarks/shader.py *": "--sides 16 --runs 1 --lamps 1",
+}
+
+# The test, or fixture, that runs the same. Flags of our own scripts and commands are checked all the same.
+FARM, WEB = "tests/bake/test_farm.py", "tests/web/test_web_core.py"
+ELSEWHERE = {
+    "dask scheduler": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
+    "dask worker *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
+    "srbf bake --dask *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
+    "srbf fit --dask *": f"{FARM}::test_dask_workers_fit_tiles",
+    "openjd run *": f"{FARM}::test_an_openjd_job_bakes_the_same_bits_and_fits",
+    "python -m blender_bake *": "tests/bake/test_end_to_end.py::test_scene_to_image",  # as every bake does
+    "python -m scripts.gallery *": "tests/test_gallery.py::test_it_goes_on_after_a_kill",
+    "python benchmarks/torture.py *": "tests/bake/test_torture.py::test_nothing_is_lost",
+    "python scripts/build_extension.py *": "tests/extension/test_zip.py::test_the_zip_builds_and_validates",
+    "blender --command srbf bake *": "tests/extension/test_extension.py::test_the_command_bakes_the_open_file",
+    "blender --command srbf fit *": "tests/extension/test_extension.py::test_what_the_command_adds",
+    "npm ci *": "tests/npm_package.py::npm",
+    "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
+    "npm run check *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
+    "npm run build *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
+    "npm run build:viewer *": "tests/viewer/conftest.py::viewer_page",
+}
+
+# Why nothing here runs it to its end. Flags of our own scripts, names of npm's scripts and the files named are checked all the same.
+NOT_RUN = {
+    "python benchmarks/bake.py": "four bakes and twelve fits of each scene, half a minute at their smallest",
+    "python benchmarks/quality.py": "its own scene of 300 lights takes minutes",
+    "python benchmarks/quality.py REALRTI": "fits anew for each light left out: minutes for one small item",
+    "python scripts/test_godot.py": "wants the chroot with Godot that scripts/godot-chroot makes, as root",
+    "godot *": "the same",
+    "blender --command extension install-file *": "wants a Blender with a user's folder; the zip itself is built and validated by a test",
+    "npm install *": "asks the registry",
+    "npx vite": "a server of the project that the guide has one make",
+}
+
+# A span that begins with one of these shows a flag of another program.
+OTHERS_FLAGS = {"--command": "Blender's"}

@@ -1,0 +1,219 @@
+"""A folder in which the documented names exist, made once, and the running of documented commands in copies of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pytest
+from classes import shortened, variants
+from documented import ROOT, Command
+from npm_package import ENVIRONMENT, WEB
+from typer.testing import CliRunner
+
+import srbf.demo
+from srbf.cli import app
+from srbf.image import write_image
+from srbf.report import canvas, tiles
+from srbf.sphere import random_directions
+from srbf.viewer.server import ViewerServer
+
+BLENDS = {"scene": "Table", "room": "Room"}  # NAME.blend -> its receiver's name in the documentation
+SAME = {
+    "scene.blend": ["SCENE.blend", "their.blend"],
+    "capture": ["CAPTURE", "out/caustics/capture"],
+    "asset": ["ASSET", "out/caustics/asset"],
+    "model.glb": ["SCENE.glb", "ROOM.glb"],
+}
+RENAME = """
+import bpy, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+bpy.data.objects["Table"].name = sys.argv[2]
+bpy.ops.wm.save_as_mainfile(filepath=sys.argv[3])
+"""
+FRAMES = {"frames": [{"lights": [{"kind": "directional", "direction": [0, 0.5, 1], "color": [1, 1, 1]}]}, {"lights": []}]}
+OUTPUTS = ("-o", "--output", "--save")
+PATH = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # as activated
+LONGEST = 120  # s, of one command that is not ours to shorten
+
+
+def prepare(folder: Path) -> None:
+    """Fill a folder with all that the documented commands start from, each as small as it can be."""
+    place = Workplace(folder)
+    for name, receiver in BLENDS.items():
+        scene = folder / f"{name}.blend"
+        place.python("data/scenes/caustics.py", str(scene))
+        if receiver != "Table":
+            place.process([sys.executable, "-c", RENAME, str(scene), receiver, str(scene)])
+    place.python("data/scenes/known_answers.py", "torus", "torus.blend")
+    for text in (
+        "srbf bake scene.blend -o capture --receiver lightmap:Table",
+        "srbf bake scene.blend -o indirect --receiver lightmap:Table --transport indirect",
+        "srbf bake torus.blend -o torus --receiver lightmap:Torus --domain sphere",
+        "srbf fit capture -o asset -k 25",
+        "srbf export asset --target gltf -o gltf",
+    ):
+        place.run(Command("workplace.py", 0, text))
+    shutil.move(folder / "gltf" / "model.glb", folder)
+    for source, names in SAME.items():
+        for name in names:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (shutil.copytree if (folder / source).is_dir() else shutil.copy)(folder / source, folder / name)
+    (folder / "FRAMES.json").write_text(json.dumps(FRAMES))
+    for name, lights in {"dome": 12, "SYNTHRTI/Object/Dome": 49, "SYNTHRTI/Object/Test": 4}.items():
+        photograph(folder / name, lights)
+
+
+def photograph(folder: Path, lights: int) -> None:
+    """Pictures of a wavy plane, and their light list."""
+    folder.mkdir(parents=True)
+    waves = np.linspace(0, 20, 96)
+    normals = np.stack([0.3 * np.sin(waves), 0.3 * np.cos(waves), np.full(96, 0.9)], axis=1)
+    lines = [str(lights)]
+    for i, direction in enumerate(random_directions(lights, "hemisphere", np.random.default_rng(lights))):
+        lit = np.clip(normals @ direction, 0, 1)[:, None] * [255, 200, 130]
+        write_image(folder / f"{i:02d}.png", lit.reshape(8, 12, 3).astype(np.uint8), "uint8")
+        lines.append(f"{i:02d}.png " + " ".join(map(str, direction)))
+    (folder / "dirs.lp").write_text("\n".join(lines) + "\n")
+
+
+class Workplace:
+    """A folder in which documented commands run one after the other, each with the outputs of those before."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.made: set[str] = set()
+
+    def run(self, command: Command) -> None:
+        """Run a command of class `run`, once for each of its choices; AssertionError that names it where it fails."""
+        program = command.words[0]
+        before = frozenset(self.made)
+        for words in variants(command):
+            self.made = set(before)  # a choice does not go on with what another has written
+            self._make_room(words)
+            words = [*words, *shortened(command)]
+            if program == "srbf":
+                said = self.srbf(words)
+            elif program == "python":
+                said = self.python(*words)
+            elif program == "npm":
+                said = self.npm(words, command.variables)
+            else:
+                said = self.process([shutil.which(program, path=PATH) or program, *words])
+            assert said is None, f"{command}\n  run as: {program} {' '.join(words)}\n{said}"
+
+    def _make_room(self, words: Sequence[str]) -> None:
+        """Take away what was prepared under the name of an output, unless a command before has written it."""
+        for flag, name in zip(words, words[1:], strict=False):
+            if flag in OUTPUTS:
+                path = self.folder / name
+                if name not in self.made and path.exists():
+                    shutil.rmtree(path) if path.is_dir() else path.unlink()
+                path.parent.mkdir(parents=True, exist_ok=True)
+                self.made.add(name)
+
+    def srbf(self, words: list[str]) -> str | None:
+        """Run `srbf` in this process, demos small, a page that it serves fetched once and left by Ctrl-C; what it said if it failed."""
+        fetched: list[bytes] = []
+        serve = ViewerServer.serve_forever
+
+        def visited(server: ViewerServer, *_args: Any, **_named: Any) -> None:
+            thread = Thread(target=serve, args=(server, 0.02), daemon=True)
+            thread.start()
+            with urllib.request.urlopen(server.url, timeout=20) as answer:
+                fetched.append(answer.read())
+            server.shutdown()
+            thread.join()
+            raise KeyboardInterrupt
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(self.folder)
+            patch.setenv("PATH", PATH)
+            patch.setenv("PWD", str(self.folder))
+            patch.setattr("webbrowser.open", lambda url: True)
+            patch.setattr(ViewerServer, "serve_forever", visited)
+            patch.setattr(srbf.demo, "SCENES", {name: replace(scene, size=(24, 18)) for name, scene in srbf.demo.SCENES.items()})
+            patch.setattr(srbf.demo, "HOLDOUT_SAMPLES", 1)
+            for module in (canvas, tiles):
+                patch.setattr(module, "DPI", 40)
+            done = CliRunner().invoke(app, words)
+        if done.exit_code:
+            return f"{done.output}{done.exception!r}"
+        if words[0] == "view" and "--save" not in words and not (fetched and b"<html" in fetched[0]):
+            return "expected a page to be served, found none"
+        return None
+
+    def python(self, script: str, *words: str) -> str | None:
+        """Run a script of ours in a process; what it said if it failed."""
+        return self.process([sys.executable, str(ROOT / script), *words])
+
+    def process(self, words: Sequence[str]) -> str | None:
+        """Run a program; what it said if it failed. 1 is what benchmarks end with where a bar is missed, as they are here."""
+        environment = {**os.environ, "PATH": PATH, "PYTHONPATH": str(ROOT), "PWD": str(self.folder)}  # Blender believes PWD
+        done = subprocess.run(
+            list(words),
+            cwd=self.folder,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LONGEST,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+        bars = done.returncode == 1 and "Traceback" not in done.stderr and re.search(r"\b(bar|miss)", done.stdout + done.stderr)
+        return (
+            None
+            if done.returncode == 0 or (bars and "benchmarks" in words[1])
+            else f"status {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        )
+
+    def npm(self, words: Sequence[str], variables: dict[str, str]) -> str | None:
+        """Run npm in web/: the package packed as it stands, or the examples served, fetched once and ended; what was wrong."""
+        program = shutil.which("npm", path=PATH)
+        assert program is not None
+        if words[0] == "pack":
+            done = subprocess.run(
+                [program, "pack", "--ignore-scripts", "--pack-destination", str(self.folder)],
+                cwd=WEB, env=ENVIRONMENT, capture_output=True, text=True, timeout=LONGEST, check=False,
+            )  # fmt: skip
+            version = json.loads((WEB / "package.json").read_text())["version"]
+            return None if (self.folder / f"srbf-{version}.tgz").is_file() else done.stderr
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        given = {name: str(self.folder / value) for name, value in variables.items()}
+        command = [program, *words, "--", "--host", "127.0.0.1", "--port", str(port), "--strictPort"]
+        log = self.folder / "example.log"
+        with log.open("w") as output:
+            process = subprocess.Popen(command, cwd=WEB, env=ENVIRONMENT | given, stdout=output, stderr=output, start_new_session=True)
+        try:
+            return None if b"<script" in fetched(f"http://127.0.0.1:{port}/", process) else log.read_text()
+        finally:
+            os.killpg(process.pid, signal.SIGTERM)
+            process.wait(20)
+
+
+def fetched(url: str, server: subprocess.Popen[bytes]) -> bytes:
+    """What a server that is about to start answers; nothing where it ends or half a minute is up."""
+    until = time.monotonic() + 30
+    while time.monotonic() < until and server.poll() is None:
+        try:
+            with urllib.request.urlopen(url, timeout=5) as answer:
+                return answer.read()
+        except OSError:
+            time.sleep(0.1)
+    return b""
