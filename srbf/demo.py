@@ -45,6 +45,7 @@ class DemoScene:
 Quality = Literal["draft", "publish"]
 SAMPLES = 4  # of what is to be published
 MAPS = 25  # of the article's own asset of the scene, beside the smallest good one
+FINE_MAPS = 100  # bytes, of what is to be published: neither seams of clusters nor much blur, at 400 bytes a texel
 HOLDOUT_SAMPLES = 24  # fewer than a bake's default: both scenes are clean by then, and the demo is to take minutes
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
@@ -76,11 +77,10 @@ def build_scene(name: str, path: Path) -> None:
 
 @dataclass(frozen=True)
 class Demo:
-    """What a demo left in its folder: the report's page, the smallest good asset, the article's, the capture, and a lightmap's scene."""
+    """What a demo left in its folder: the report's page, assets with the one to look at first, their capture, and a lightmap's scene."""
 
     page: Path
-    asset: Path
-    maps: Path
+    assets: tuple[Path, ...]
     capture: Path
     mesh: Path | None
 
@@ -119,7 +119,11 @@ def run_demo(
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
     timings["evaluate"] = clock() - started
     asset.save(asset_folder, force=True)
-    RelightingMap(k=MAPS).encode(capture).save(folder / "maps", force=True)
+    fits = {"maps": RelightingMap(k=MAPS)}
+    if quality == "publish":
+        fits = {"fine": RelightingMap(k=FINE_MAPS, encoding="uint8"), **fits}
+    for fit, maps in fits.items():
+        maps.encode(capture).save(folder / fit, force=True)
     mesh = None
     if scene.receiver.kind == "lightmap":
         mesh = folder / "scene.glb"
@@ -129,4 +133,6 @@ def run_demo(
     page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
     holdout, size = asset.manifest["error"]["holdout"], asset.bytes_per_texel()["directional"]
     reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes a texel")
-    return Demo(page, asset_folder, folder / "maps", capture_folder, mesh)
+    assets = [folder / fit for fit in fits]
+    assets.insert(1 if quality == "publish" else 0, asset_folder)
+    return Demo(page, tuple(assets), capture_folder, mesh)

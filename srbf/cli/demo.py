@@ -28,7 +28,7 @@ def demo(
         made = run_demo(scene, output, lights, Reporter(update, note), update, quality)
     note(f"look at {made.page}")
     if view:
-        serve(contents_of([made.asset, made.maps], made.capture, made.mesh))
+        serve(contents_of(made.assets, made.capture, made.mesh))
         return
     mesh = f" --mesh {made.mesh}" if made.mesh else ""
-    note(f"drag its lights: srbf view {made.asset} {made.maps} {made.capture}{mesh}")
+    note(f"drag its lights: srbf view {' '.join(map(str, made.assets))} {made.capture}{mesh}")

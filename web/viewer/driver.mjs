@@ -21,14 +21,14 @@ const said = [];
 let context;
 let page;
 
-const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 20_000, polling: 20 });
+const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 60_000, polling: 20 });
 
 const commands = {
   /** `moving`: what plays is never at rest. */
   async open({ url, width = 900, height = 700, touch = false, moving = false }) {
     await context?.close();
     context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, hasTouch: touch });
-    context.setDefaultTimeout(10_000);
+    context.setDefaultTimeout(30_000);
     page = await context.newPage();
     page.on("console", (message) => said.push(`${message.type()}: ${message.text()}`));
     page.on("pageerror", (error) => said.push(`error: ${error}`));
@@ -45,7 +45,7 @@ const commands = {
   },
   /** The address once it says what is shown. */
   async address() {
-    await page.waitForFunction(() => document.body.dataset.address !== "old", undefined, { timeout: 20_000, polling: 20 });
+    await page.waitForFunction(() => document.body.dataset.address !== "old", undefined, { timeout: 60_000, polling: 20 });
     return page.url();
   },
   async drag({ path }) {
@@ -113,7 +113,7 @@ const commands = {
     });
   },
   async shot({ path }) {
-    await page.screenshot({ path });
+    await page.screenshot({ path, timeout: 60_000 });
   },
 };
 

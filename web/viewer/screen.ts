@@ -66,15 +66,9 @@ vec3 srgb(vec3 c) {
     return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
 }
 
-#ifdef DEVELOPED
-// A picture with its own alpha, on the background.
-uniform vec3 background;
-#endif
-
 void main() {
 #ifdef DEVELOPED
-    vec4 seen = textureLod(relit, vUv, 0.0);
-    vec3 v = seen.rgb / max(seen.a, 1e-4);
+    vec3 v = textureLod(relit, vUv, 0.0).rgb;
 #else
     vec3 v = valueAt();
 #endif
@@ -90,9 +84,6 @@ void main() {
     else if (colour == ${COLOURS.agx}) c = srgb(AgXToneMapping(v));
     else if (colour == ${COLOURS.aces}) c = srgb(ACESFilmicToneMapping(v));
     else c = srgb(LinearToneMapping(v));
-#ifdef DEVELOPED
-    c = mix(background, c, min(seen.a, 1.0));
-#endif
     shown = vec4(c, 1.0);
 }`;
 
@@ -147,12 +138,12 @@ export function screenUniforms(relit: Texture, textures: SrbfTextures): ScreenUn
   };
 }
 
-/** Onto a `mesh`, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom, with alpha. */
+/** Onto a `mesh`, a `picture` of texels, or the whole `screen`, where `relit` is of pixels, row 0 at the bottom. */
 export function screenMaterial(uniforms: ScreenUniforms, onto: "mesh" | "picture" | "screen"): RawShaderMaterial {
   return new RawShaderMaterial({
     glslVersion: GLSL3,
     defines: onto === "screen" ? { DEVELOPED: "" } : {},
-    uniforms: { ...uniforms, background: { value: BACKGROUND.clone().convertLinearToSRGB() } },
+    uniforms,
     vertexShader: { mesh: MESH, picture: PICTURE, screen: WHOLE }[onto],
     fragmentShader: FRAGMENT,
     depthTest: onto === "mesh",

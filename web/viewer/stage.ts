@@ -54,8 +54,9 @@ export class Stage {
     this.quad = new Mesh(new PlaneGeometry(2, 2), screenMaterial(uniforms, "picture"));
     this.quad.frustumCulled = false;
     this.picture.add(this.quad);
+    const among = model && Surroundings.in(model);
     if (model) this.addModel(model);
-    if (model && this.lit.length && Surroundings.in(model)) {
+    if (model && among && this.lit.length) {
       this.surroundings = new Surroundings(model, uniforms, quantity, renderer);
       const developer = new Mesh(new PlaneGeometry(2, 2), screenMaterial({ ...uniforms, relit: this.developedFrom }, "screen"));
       developer.frustumCulled = false;
@@ -169,7 +170,8 @@ export class Stage {
   /** What is shown, without gizmos, into `target` or on the canvas, of so many pixels. */
   private render(lights: readonly Light[], target: WebGLRenderTarget | null, width: number, height: number): void {
     const { renderer } = this;
-    const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, width, height) : undefined;
+    const behind = BACKGROUND.clone().multiplyScalar(1 / this.uniforms.toneMappingExposure.value); // to be shown as it is elsewhere
+    const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;
     renderer.setRenderTarget(target);

@@ -80,22 +80,22 @@ export class Surroundings {
 
   /** Whether a file holds more than receivers. */
   static in(model: Object3D): boolean {
-    let found = false;
+    const [receivers, others] = [0, 0].map(() => [] as Object3D[]);
     model.traverse((object) => {
-      const mesh = object as Mesh<BufferGeometry>;
-      if (mesh.isMesh && !mesh.geometry.getAttribute("lightmapUv")) found = true;
+      const mesh = object as Mesh<BufferGeometry, Material>;
+      if (mesh.isMesh) (mesh.material.userData.gltfExtensions?.SRBF_relighting_map ? receivers : others).push(mesh);
     });
-    return found;
+    return receivers.length > 0 && others.length > 0;
   }
 
-  /** Linear radiance, alpha where there is something; of so many pixels, row 0 at the bottom. */
-  draw(camera: PerspectiveCamera, lights: readonly Light[], width: number, height: number): Texture {
+  /** Linear radiance over `background`; of so many pixels, row 0 at the bottom. */
+  draw(camera: PerspectiveCamera, lights: readonly Light[], background: Color, width: number, height: number): Texture {
     const { renderer } = this;
     this.target.setSize(width, height);
     this.setLights(lights);
     const kept = { enabled: renderer.shadowMap.enabled, color: renderer.getClearColor(new Color()), alpha: renderer.getClearAlpha() };
     renderer.shadowMap.enabled = true;
-    renderer.setClearColor(0x000000, 0);
+    renderer.setClearColor(background, 1);
     renderer.setRenderTarget(this.target);
     renderer.autoClear = true;
     renderer.render(this.scene, camera);

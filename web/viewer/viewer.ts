@@ -22,6 +22,7 @@ import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects } from "./subject";
+import { Surroundings } from "./surroundings";
 
 const FRAMES_A_SECOND = 24;
 const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
@@ -35,6 +36,7 @@ export class Viewer {
   private readonly subjects: Subjects;
   private subject!: Subject;
   private readonly uniforms;
+  private readonly inScene: boolean; // at first, and so as radiance
   private readonly receivers: Receivers;
   private readonly stage: Stage;
   private readonly sky: SkyWidget;
@@ -70,6 +72,7 @@ export class Viewer {
     this.uniforms = screenUniforms(first.lightmap, first.relighting.textures);
     this.receivers = new Receivers(asset, coverage);
     this.copy = new Copy(asset.manifest.width, asset.manifest.height);
+    this.inScene = model !== undefined && Surroundings.in(model);
     this.state = this.begun();
     this.readUrl(location.hash);
     this.state.asset = facts.assets.indexOf(first.facts);
@@ -166,7 +169,7 @@ export class Viewer {
       asset: 0,
       lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
       selected: 0,
-      exposure: asset.manifest.quantity === "radiance" ? 1.65 : 0,
+      exposure: asset.manifest.quantity === "radiance" || this.inScene ? 1.65 : 0,
       tone: "linear",
       show: "picture",
       map: 0,
@@ -175,7 +178,7 @@ export class Viewer {
       spectrum: false,
       compare: "off",
       split: 0.5,
-      view: this.loaded.facts.mesh ? "scene" : "texels",
+      view: this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels",
       zoom: 0,
       middle: [asset.manifest.width / 2, asset.manifest.height / 2],
       path: "none",
