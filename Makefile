@@ -9,7 +9,7 @@ MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
 PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.glsl)
 
-.PHONY: setup setup-test demo test test-fast test-godot check torture bench extension web clean
+.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check torture bench extension web clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
@@ -28,6 +28,13 @@ $(VENV)/.tested-by: $(VENV)/.installed
 
 demo: setup $(PAGE)
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
+
+# The article's figure 12 live: a bake that one would publish (a quarter of an hour, resumable), then the viewer.
+variable-lightmap: setup $(PAGE)
+	$(BIN)/srbf demo --scene caustics --quality publish -o out/variable-lightmap --view
+
+gallery: setup
+	$(BIN)/python -m scripts.gallery
 
 test: setup-test
 	$(BIN)/pytest -n 2 --dist loadfile
