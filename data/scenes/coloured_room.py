@@ -6,8 +6,8 @@ matte block and ball, and their reflections in steel, copper and gold of several
 stage has no roof and no front, its side walls fall towards the camera and all three are pierced, so that a sun from
 anywhere above finds a way in: over the walls as a slanted edge, through them as arches and discs.
 
-Nothing is smoother than POLISH: what shines must find a sun of angle 0 by the width of its own highlight. Metals cast no
-caustics, so that few samples are clean.
+Nothing is smoother than POLISH, and metals not by far: what shines finds a sun of angle 0 only by the width of its own
+highlight, and the narrower that is, the more it outshines all else. Metals cast no caustics, so that few samples are clean.
 
     python data/scenes/coloured_room.py OUT.blend
 """
@@ -294,7 +294,7 @@ def add_things():
     block.location, block.rotation_euler = (0.88, 0.36, 0), (0, 0, radians(24))
     gold = glossy("Gold", (0.92, 0.62, 0.20), 0.3, 1.0)
     mesh_object("GoldBall", [ball(0.16)], gold, True, (0.88, 0.36, 0.42))
-    mesh_object("SteelBall", [ball(0.235)], glossy("Steel", (0.74, 0.75, 0.77), POLISH, 1.0), True, (0.1, -0.22, 0))
+    mesh_object("SteelBall", [ball(0.235)], glossy("Steel", (0.74, 0.75, 0.77), 0.24, 1.0), True, (0.1, -0.22, 0))
     mesh_object("CopperBall", [ball(0.15)], glossy("Copper", (0.86, 0.42, 0.26), 0.42, 1.0), True, (-0.36, -0.62, 0))
     mesh_object("ChalkBall", [ball(0.16)], matte("ChalkToo", (0.80, 0.79, 0.76)), True, (-0.86, -0.30, 0))
     add_toy(0.72, -0.46)

@@ -168,20 +168,20 @@ def add_floor():
 
 
 def hill(x, y):
-    """Height of the ground: flat about the terrace, rising behind its wall."""
-    return max(0.0, y - 4) * 0.24 + 1.6 * sin(x * 0.09 + 1.0) * min(1.0, max(0.0, y - 6) / 12) - 0.14
+    """Height of the ground: flat about the terrace, rising a little behind its wall, less than low suns do."""
+    return max(0.0, y - 4) * 0.045 + 0.5 * sin(x * 0.15 + 1.0) * min(1.0, max(0.0, y - 6) / 12) - 0.14
 
 
 def add_surroundings(rng):
-    """A step around the floor, grass, a hill behind the wall with olive trees and cypresses on it."""
+    """A step around the floor, grass, a slope behind the wall with olive trees and cypresses on it."""
     stone = surface("Kerb", mottled((0.36, 0.32, 0.28), (0.52, 0.47, 0.41), 6))
     w, h = 0.22, HALF + 0.002
     rims = [box((-h - w, -h - w, -0.14), (h + w, -h, 0.0)), box((-h - w, -h, -0.14), (-h, h, 0.0)), box((h, -h, -0.14), (h + w, h, 0.0))]
     mesh_object("Kerb", rims, stone)
     rows, columns, points = 30, 40, []
     for j in range(rows + 1):
-        y = -14 + 90 * (j / rows) ** 1.5
-        points += [Vector((x, y, hill(x, y))) for x in (-60 + 120 * i / columns for i in range(columns + 1))]
+        y = -14 + 160 * (j / rows) ** 1.5
+        points += [Vector((x, y, hill(x, y))) for x in (-100 + 200 * i / columns for i in range(columns + 1))]
     n = columns + 1
     faces = [(j * n + i, j * n + i + 1, (j + 1) * n + i + 1, (j + 1) * n + i) for j in range(rows) for i in range(columns)]
     mesh_object("Meadow", [(points, faces)], surface("Meadow", mottled((0.20, 0.21, 0.07), (0.40, 0.35, 0.16), 0.9)), smooth=True)
@@ -399,7 +399,7 @@ def build(seed=5):
     mesh_object("Leaves", vine.leaves, surface("Leaves", greens, passes=0.35))
     pinks = each((0.0, (0.48, 0.03, 0.20)), (1.0, (0.75, 0.10, 0.36)))
     mesh_object("Flowers", vine.flowers, surface("Flowers", pinks, passes=0.35))
-    add_camera((2.75, -5.3, 2.75), (-0.38, 0.7, 0.88), 40)
+    add_camera((2.75, -5.4, 3.25), (-0.38, 0.7, 0.80), 40.5)
     add_daylight((-0.55, -0.35, 0.75), 3.5)
     set_cycles(bpy.context.scene)
 
