@@ -187,16 +187,13 @@ export class DirectLight {
     const across = unit(cross(toLight, Math.abs(toLight[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
     const up = cross(toLight, across);
     const [least, most] = [[Infinity, Infinity], [-Infinity, -Infinity]];
-    const texels = this.asset.manifest.width * this.asset.manifest.height;
-    for (const { points } of this.receivers.corners) {
-      for (let i = 0; i < texels; ++i) {
-        if (!this.receivers.covered(i)) continue;
-        const [x, y, z] = [points[4 * i], points[4 * i + 1], points[4 * i + 2]];
-        const flat = [x * across[0] + y * across[1] + z * across[2], x * up[0] + y * up[1] + z * up[2]];
-        for (const a of [0, 1]) {
-          least[a] = Math.min(least[a], flat[a]);
-          most[a] = Math.max(most[a], flat[a]);
-        }
+    const { bounds } = this.receivers;
+    for (let i = 0; i < bounds.length; i += 3) {
+      const [x, y, z] = [bounds[i], bounds[i + 1], bounds[i + 2]];
+      const flat = [x * across[0] + y * across[1] + z * across[2], x * up[0] + y * up[1] + z * up[2]];
+      for (const a of [0, 1]) {
+        least[a] = Math.min(least[a], flat[a]);
+        most[a] = Math.max(most[a], flat[a]);
       }
     }
     const extent = Math.max(most[0] - least[0], most[1] - least[1], 1e-6) * 1.02;

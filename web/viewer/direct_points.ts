@@ -4,6 +4,8 @@ import type { Asset, FloatImage } from "../src";
 const SAME_SURFACE_COS = 0.9; // of the normals of two neighbours that lie on one smooth surface
 const OFF_PLANE = 0.2; // of their distance: how far a neighbour may lie off the tangent plane
 const LONGER = 2.0; // a neighbour farther off than this many times the other side's lies across a seam
+const FEW = 1 << 14; // texels
+const BLOCK = 8; // texels a side
 const CORNERS = [
   [-0.25, -0.25],
   [0.25, -0.25],
@@ -21,8 +23,8 @@ export interface DirectReceivers {
   /** Metres, of the covered texels: single precision is finest about the origin. */
   centre: [number, number, number];
   corners: LitPoints[];
-  /** Which texels are real. */
-  covered: (texel: number) => boolean;
+  /** Points, xyz, whose bounds along any axis hold those of all covered texels' points. */
+  bounds: Float32Array;
 }
 
 /** The points that `asset` is lit at; `footprint` is how much of a texel counts. */
@@ -54,7 +56,35 @@ export function directReceivers(asset: Asset, position: FloatImage, normal: Floa
     }
     return { points, normals };
   });
-  return { centre, corners, covered };
+  return { centre, corners, bounds: bounding(width, height, corners, covered) };
+}
+
+/** All points where they are few, else the corners of a box about each block of texels. */
+function bounding(width: number, height: number, corners: readonly LitPoints[], covered: (texel: number) => boolean): Float32Array {
+  const block = width * height <= FEW ? 1 : BLOCK;
+  const out: number[] = [];
+  for (let top = 0; top < height; top += block) {
+    for (let left = 0; left < width; left += block) {
+      const least = [Infinity, Infinity, Infinity];
+      const most = [-Infinity, -Infinity, -Infinity];
+      for (let r = top; r < Math.min(top + block, height); ++r) {
+        for (let c = left; c < Math.min(left + block, width); ++c) {
+          if (!covered(r * width + c)) continue;
+          for (const { points } of corners) {
+            const at = 4 * (r * width + c);
+            if (block === 1) out.push(points[at], points[at + 1], points[at + 2]);
+            for (let k = 0; k < 3; ++k) {
+              least[k] = Math.min(least[k], points[at + k]);
+              most[k] = Math.max(most[k], points[at + k]);
+            }
+          }
+        }
+      }
+      if (block === 1 || least[0] > most[0]) continue;
+      for (let i = 0; i < 8; ++i) out.push(i & 1 ? most[0] : least[0], i & 2 ? most[1] : least[1], i & 4 ? most[2] : least[2]);
+    }
+  }
+  return new Float32Array(out);
 }
 
 type Pair = [Float32Array, Float32Array];

@@ -53,6 +53,7 @@ export class Surroundings {
   private readonly skies = new WeakMap<object, Texture>();
   private readonly pmrem: PMREMGenerator;
   private drawn = "";
+  private drawnSky: object | undefined;
 
   /** `model` is the glTF's scene, in three's world; the receivers' materials take what `uniforms` show. */
   constructor(
@@ -74,6 +75,7 @@ export class Surroundings {
       else mesh.castShadow = mesh.receiveShadow = true;
     });
     this.target = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES, minFilter: LinearFilter, magFilter: LinearFilter });
+    renderer.shadowMap.autoUpdate = false; // a camera that moves changes no shadow
     this.pmrem = new PMREMGenerator(renderer);
     this.sky = this.pmrem.fromScene(daylight(), 0.02).texture;
   }
@@ -107,8 +109,10 @@ export class Surroundings {
 
   private setLights(lights: readonly Light[]): void {
     const state = JSON.stringify(lights, (key, value) => (key === "pixels" ? value.length : value));
-    if (state === this.drawn) return;
+    const shown = lights.find((light) => light.kind === "environment")?.pixels;
+    if (state === this.drawn && shown === this.drawnSky) return;
     this.drawn = state;
+    this.drawnSky = shown;
     for (const light of this.lit) {
       this.scene.remove(light);
       (light as DirectionalLight).dispose?.();
