@@ -86,7 +86,8 @@ class ClusteredEigenMap:
             raise InputError(f"expected train lights in {capture.folder}, found none")
         if self.scalars > 3 * len(train):
             raise InputError(f"expected at most {3 * len(train)} scalars for {len(train)} lights, found {self.scalars}")
-        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_A_CLUSTER * self.clusters))
+        # From every row: clusters are of places, and those of a few strips of rows serve the rows between badly.
+        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_A_CLUSTER * self.clusters), share=1.0)
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
         space = LightSpace.of(sample, "plain")

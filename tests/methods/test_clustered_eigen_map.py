@@ -106,3 +106,24 @@ def test_more_clusters_than_texels(make_capture) -> None:
     asset = ClusteredEigenMap(clusters=16, scalars=3).encode(capture)
     assert asset.tables["cluster_index"].max() < asset.clusters <= 16
     assert np.isfinite(directional_responses(asset, capture.directions())).all()
+
+
+def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
+    """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbours' clusters."""
+    height, width, band = 512, 256, 16
+    facing = np.random.default_rng(5).normal(size=(height // band, 3))
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    plane = np.random.default_rng(6).random((height, width, 1), np.float32)
+
+    def answer(direction: np.ndarray) -> np.ndarray:
+        bump = np.repeat(np.exp(4 * (facing @ direction - 1)), band)[:, None, None]
+        return (bump * (1 + plane)).repeat(3, axis=2)
+
+    capture = make_capture(answer, lights=24, holdout=0, encoding="half")
+    asset = ClusteredEigenMap(2 * height // band, 2, spread=0.3, ridge=1e-9).encode(capture)
+    error = np.zeros(height)
+    for i in capture.indices("train"):
+        relit = directional_responses(asset, capture.directions([i]))[0]
+        error += ((relit - capture.image(i)) ** 2).mean(axis=(1, 2))
+    by_band = np.sqrt(error.reshape(-1, band).mean(axis=1) / 24)
+    assert by_band.max() < 0.05 * np.sqrt(np.mean([(capture.image(i) ** 2).mean() for i in capture.indices("train")]))
