@@ -146,7 +146,9 @@ class Workplace:
             patch.setenv("PWD", str(self.folder))
             patch.setattr("webbrowser.open", lambda url: True)
             patch.setattr(ViewerServer, "serve_forever", visited)
-            patch.setattr(srbf.demo, "SCENES", {name: replace(scene, size=(24, 18)) for name, scene in srbf.demo.SCENES.items()})
+            patch.setattr(
+                srbf.demo, "SCENES", {name: replace(scene, size=(24, 18), published=(28, 20)) for name, scene in srbf.demo.SCENES.items()}
+            )
             patch.setattr(srbf.demo, "HOLDOUT_SAMPLES", 1)
             for module in (canvas, tiles):
                 patch.setattr(module, "DPI", 40)
