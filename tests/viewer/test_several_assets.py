@@ -124,3 +124,18 @@ def test_the_command_wants_an_asset_and_at_most_one_capture(fitted: tuple[Captur
     named = {"capture": str(capture.folder), "asset": str(folders[0])}
     done = CliRunner().invoke(app, ["view", *(named[name] for name in given), "--no-browser"])
     assert done.exit_code == (2 if not given else 1)
+
+
+def test_an_asset_that_cannot_be_read_is_said_and_the_other_stays(
+    chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]
+) -> None:
+    capture, folders = fitted
+    url = serve(folders, capture.folder)
+    chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT)
+    before = chromium.texels(14, 10, ZOOM)
+    chromium.may_fail = True
+    next(folders[1].glob("plane_*")).unlink()
+    chromium("press", keys=["a"])
+    assert "plane_" in chromium("run", script="document.getElementById('toast').textContent")
+    assert chromium.state()["asset"] == 0
+    assert (chromium.texels(14, 10, ZOOM) == before).all()

@@ -34,7 +34,7 @@ export class Viewer {
   private readonly state: State;
   private readonly renderer: WebGLRenderer;
   private readonly subjects: Subjects;
-  private subject!: Subject;
+  private subject: Subject;
   private readonly uniforms;
   private readonly inScene: boolean; // at first, and so as radiance
   private readonly receivers: Receivers;
@@ -159,7 +159,11 @@ export class Viewer {
         titles(element("title"), this.loaded.facts, this.subject);
         this.changed({ lights: true, panel: true });
       })
-      .catch((error) => say(lineOf(error)))
+      .catch((error) => {
+        this.state.asset = this.loaded.facts.assets.indexOf(this.subject.facts);
+        this.changed({ panel: true });
+        say(lineOf(error));
+      })
       .finally(() => this.done());
   }
 
