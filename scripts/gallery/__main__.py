@@ -63,7 +63,7 @@ def main() -> int:
 
 def finish(made: list[Places], steps: Steps, docs: Path) -> None:
     """The figure of all scenes that are done, and the page, which is written only where its text changes."""
-    steps.run("figure", figure.made_from(made, steps), [docs / page.FIGURE], lambda anew: figure.draw(made, docs / page.FIGURE))
+    steps.run("figure", figure.made_from(made, steps), [docs / page.FIGURE], lambda: figure.draw(made, docs / page.FIGURE))
     path = docs.with_suffix(".md")
     written = page.text(made, steps, docs.name)
     if not path.is_file() or path.read_text(encoding="utf-8") != written:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from functools import partial
@@ -22,6 +21,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings
 from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.demo import build_scene, scene_script
+from srbf.errors import OutputExistsError
 from srbf.evaluation import evaluate
 from srbf.fitting import encode, method_for
 from srbf.importing import LightListImport
@@ -50,11 +50,11 @@ def make(places: Places, steps: Steps, reporter: Reporter) -> None:
     """All steps of a scene; what is there already is kept."""
     scene = places.scene
 
-    def step(name: str, made_from: Any, outputs: list[Path], work: Callable[[bool], object]) -> str:
+    def step(name: str, made_from: Any, outputs: list[Path], work: Callable[[], object]) -> str:
         return steps.run(f"{scene.name}/{name}", made_from, outputs, work)
 
     script = hashlib.sha256(scene_script(scene.name).read_bytes()).hexdigest()
-    built = step("build", script, [places.blend], lambda anew: build_scene(scene.name, places.blend))
+    built = step("build", script, [places.blend], lambda: build_scene(scene.name, places.blend))
     baked = _bake(places, steps, reporter, built)
     scored = []
     for fit in scene.fits:
@@ -64,9 +64,9 @@ def make(places: Places, steps: Steps, reporter: Reporter) -> None:
     source = [baked, library(COMPARING), scene.contest_texels]
     step("compare methods", source, [places.scores], partial(_compare, places))
     source = [scored, _source(strip, drawing), scene.tested, [asdict(fit) for fit in scene.fits]]
-    step("strip", source, [places.strip], lambda anew: strip.draw(places))
+    step("strip", source, [places.strip], lambda: strip.draw(places))
     source = [scored, _source(clip, drawing), asdict(scene)["clip"], scene.moving, scene.frames, scene.clip_width]
-    step("clip", source, [places.clip], lambda anew: clip.draw(places))
+    step("clip", source, [places.clip], lambda: clip.draw(places))
     _lamps(places, steps, reporter, built, scored)
 
 
@@ -92,34 +92,35 @@ def _bake(places: Places, steps: Steps, reporter: Reporter, built: str) -> str:
         return baked
     taken = partial(photographs.photograph, places.rendered, scene.dome, places.photographs)
     lists = [places.photographs / name for name in (photographs.DIRS, photographs.TEST)]
-    taken_from = steps.run(f"{scene.name}/photograph", [baked, _source(photographs)], lists, lambda anew: taken())
+    taken_from = steps.run(f"{scene.name}/photograph", [baked, _source(photographs)], lists, lambda: taken())
     importing = LightListImport(lists[0], "srgb", lists[1])
     known = [places.capture / MANIFEST]
-    return steps.run(
-        f"{scene.name}/import", [taken_from, srbf.__version__], known, lambda anew: importing.write(places.capture, force=True)
-    )
+    return steps.run(f"{scene.name}/import", [taken_from, srbf.__version__], known, lambda: importing.write(places.capture, force=True))
 
 
-def _render(folder: Path, blend: Path, settings: BakeSettings, reporter: Reporter, anew: bool) -> None:
-    if anew and folder.exists():
-        shutil.rmtree(folder)
-    Bake(blend, folder, settings).run(reporter)
+def _render(folder: Path, blend: Path, settings: BakeSettings, reporter: Reporter) -> None:
+    """Bake, or go on with it; what is of another scene or other settings is replaced."""
+    bake = Bake(blend, folder, settings)
+    try:
+        bake.run(reporter)
+    except OutputExistsError:
+        bake.run(reporter, force=True)
 
 
-def _fit(places: Places, fit: Fit, say: Callable[[str], None], anew: bool) -> None:
+def _fit(places: Places, fit: Fit, say: Callable[[str], None]) -> None:
     settings = {"domain": "auto", "spread": "auto", "ridge": "auto", **fit.settings}
     capture = places.answers(fit)
     asset = encode(method_for(capture, fit.method, settings, say), capture)
     asset.save(places.asset(fit), force=True)
 
 
-def _evaluate(places: Places, fit: Fit, anew: bool) -> None:
+def _evaluate(places: Places, fit: Fit) -> None:
     """The error on unseen lights, as `srbf evaluate` has it."""
     errors = evaluate(Asset.open(places.asset(fit)), Capture.open(places.capture), direct=fit.direct, roles=("holdout",))
     files.write_json(places.errors(fit), errors)
 
 
-def _compare(places: Places, anew: bool) -> None:
+def _compare(places: Places) -> None:
     """Methods by bytes on a sample of the texels under all light; the peak is that of the first fit's evaluation, which all share."""
     capture = Capture.open(places.capture).combined()
     sample = capture.kept(sampled_texels(capture.coverage() >= COVERED, places.scene.contest_texels))
@@ -148,10 +149,10 @@ def _lamps(places: Places, steps: Steps, reporter: Reporter, built: str, scored:
         f"{scene.name}/evaluate true lamps",
         [baked, scored, library(MEASURING), _source(lamps)],
         errors,
-        lambda anew: lamps.evaluate_lamps(places, split),
+        lambda: lamps.evaluate_lamps(places, split),
     )
     source = [measured, _source(lamps, strip, drawing)]
-    steps.run(f"{scene.name}/lamp strip", source, [places.lamp_strip], lambda anew: lamps.draw(places, split))
+    steps.run(f"{scene.name}/lamp strip", source, [places.lamp_strip], lambda: lamps.draw(places, split))
 
 
 def library(patterns: Sequence[str]) -> str:

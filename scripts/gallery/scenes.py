@@ -79,7 +79,7 @@ class Scene:
     samples: int = 2
     transport: Transport = "combined"
     soft_sun: bool = False
-    validation: int = 0
+    validation: int = 8
     holdout: int = 20
     holdout_samples: int = 24
     dome: Dome | None = None
@@ -139,9 +139,7 @@ MAPS = Fit("asset-25-maps", "25 maps of all light", "relighting-map", {"k": 25})
 SMALL = Fit("asset", "best of 16 bytes", "auto", {"budget": 16})
 MAPS_AND_RAYS = replace(MAPS, folder="asset-indirect-25-maps", label="25 maps + rays", light="indirect")
 SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, all light")
-CLUSTERS_AND_RAYS = Fit(
-    "asset", "64 clusters of 12 + rays", "clustered-eigen-map", {"clusters": 64, "scalars": 12, "encoding": "uint8"}, light="indirect"
-)
+SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"scalars": 16, "encoding": "uint8"}, light="indirect")
 
 SCENES = (
     Scene(
@@ -152,7 +150,6 @@ SCENES = (
         receiver="lightmap:Table",
         size=(512, 512),
         samples=4,
-        validation=8,
         holdout=24,
         soft_sun=True,
         fits=(MAPS, SMALL),
@@ -165,8 +162,9 @@ SCENES = (
         fails="",
         receiver="view",
         size=(384, 288),
+        validation=0,
         transport="indirect",
-        fits=(MAPS, MAPS_AND_RAYS, CLUSTERS_AND_RAYS),
+        fits=(MAPS, MAPS_AND_RAYS, SCALARS_AND_RAYS),
         clip=Lantern(
             ((-1.9, -1.6, 1.2), (-0.2, -1.7, 1.2), (1.1, -1.2, 1.2), (0.9, 0.6, 1.2), (0.5, 2.2, 1.2), (-1.2, 2.1, 1.2), (-1.8, 0.4, 1.2)),
             (2.6, 1.5, 0.62),
@@ -194,7 +192,7 @@ SCENES = (
         receiver="view",
         size=(384, 288),
         transport="indirect",
-        fits=(MAPS, SMALL_ALL, CLUSTERS_AND_RAYS),
+        fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
         clip=Sun(25, 60, 2),
         moving=("asset-25-maps", "asset-all", "asset"),
         clip_width=900,

@@ -46,11 +46,8 @@ class Steps:
         if (self.folder / TIMES).is_file():
             self._noted = files.read_json(self.folder / TIMES)["steps"]
 
-    def run(self, name: str, made_from: Any, outputs: Sequence[Path], make: Callable[[bool], object]) -> str:
-        """Do the step unless its outputs are there and were made from the same; returns the digest for steps that follow.
-
-        `make` is told whether what lies there is of another making, and so to be replaced rather than gone on with.
-        """
+    def run(self, name: str, made_from: Any, outputs: Sequence[Path], make: Callable[[], object]) -> str:
+        """Do the step unless its outputs are there and were made from the same; returns the digest for steps that follow."""
         digest = hashlib.sha256(json.dumps(made_from, sort_keys=True, default=str).encode()).hexdigest()[:16]
         before = self._noted.get(name)
         same = before is not None and before["digest"] == digest
@@ -67,7 +64,7 @@ class Steps:
         self._noted[name] = note
         used = _cpu_seconds()
         with self._beating(note):
-            make(before is not None and not same)
+            make()
         missing = [path.name for path in outputs if not path.exists()]
         assert not missing, f"{name} left no {missing}"
         note |= {"done": True, "cpu": round(_cpu_seconds() - used, 2)}
