@@ -63,7 +63,7 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
         contents[f"{CAPTURE}lights.json"] = json.dumps(references.lights()).encode()
         for index in range(len(references.capture.lights)):
             contents[f"{CAPTURE}{index}.exr"] = partial(references.image, index)
-    page_facts = facts.facts(assets[0], told, shown is not None, facts.title(folders[0]), CAPTURE if references else None, tuple(notes))
+    page_facts = facts.facts(assets[0], told, shown is not None, facts.title(folders), CAPTURE if references else None, tuple(notes))
     contents[facts.NAME] = json.dumps(page_facts).encode()
     return contents
 

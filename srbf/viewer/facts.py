@@ -64,7 +64,9 @@ def receiver_name(asset: Asset) -> str:
     return str(receiver.get("object") or receiver.get("camera") or asset.method)
 
 
-def title(folder: Path) -> str:
-    """What to call the asset in `folder`: the folder's name, or that of the one it lies in where it is just `asset`."""
-    path = folder.resolve()
-    return path.parent.name if path.name == "asset" and path.parent.name else path.name
+def title(folders: Sequence[Path]) -> str:
+    """What to call the assets in `folders`: the one folder's name; that of the folder it lies in where it is just `asset`, or where
+    several lie there together."""
+    paths = [folder.resolve() for folder in folders]
+    together = len(paths) > 1 and len({path.parent for path in paths}) == 1
+    return paths[0].parent.name if (together or paths[0].name == "asset") and paths[0].parent.name else paths[0].name

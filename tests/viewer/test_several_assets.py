@@ -24,6 +24,7 @@ from srbf.methods import relight
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.viewer.contents import contents_of
+from srbf.viewer.facts import title
 
 PICTURE = f"#{{'zoom':{ZOOM},'middle':[7,5]"
 SUN = [DirectionalLight((-0.45, -0.5, 0.74))]
@@ -139,3 +140,10 @@ def test_an_asset_that_cannot_be_read_is_said_and_the_other_stays(
     assert "plane_" in chromium("run", script="document.getElementById('toast').textContent")
     assert chromium.state()["asset"] == 0
     assert (chromium.texels(14, 10, ZOOM) == before).all()
+
+
+def test_assets_are_called_by_what_they_lie_in(tmp_path: Path) -> None:
+    assert title([tmp_path / "room" / "asset"]) == "room"
+    assert title([tmp_path / "room" / "maps"]) == "maps"
+    assert title([tmp_path / "room" / "maps", tmp_path / "room" / "planes"]) == "room"
+    assert title([tmp_path / "room" / "maps", tmp_path / "hall" / "planes"]) == "maps"
