@@ -54,9 +54,9 @@ def main() -> None:
             png = base64.b64decode(ask("download", text="Picture (PNG)")["bytes"])
             pictures.append(Image.open(io.BytesIO(png)).convert("RGB"))
             sys.stderr.write(f"{i + 1} of {given.frames}\n")
-    with atomic_path(given.output) as temporary:
-        film = {"save_all": True, "append_images": pictures[1:], "duration": MILLISECONDS, "loop": 0}
-        pictures[0].save(temporary, "WEBP", **film, quality=QUALITY, method=6)
+    with atomic_path(given.output) as temporary:  # whole frames: differences from the one before show as blocks
+        film = {"save_all": True, "append_images": pictures[1:], "duration": MILLISECONDS, "loop": 0, "kmin": 0, "kmax": 1}
+        pictures[0].save(temporary, "WEBP", **film, quality=QUALITY, method=4)
 
 
 def state(turn: float, target: np.ndarray, distance: float) -> str:
