@@ -104,7 +104,7 @@ class Scene:
             transport=self.transport,
         )
         if self.dome is not None:
-            return replace(settings, holdout=0)
+            return replace(settings, validation=0, holdout=0)
         return settings.with_matched_sun() if self.soft_sun else settings
 
     def lamp_settings(self, samples: int = 64) -> BakeSettings | None:
