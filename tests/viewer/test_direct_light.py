@@ -16,6 +16,7 @@ from web_assets import complete
 
 from srbf.asset import Asset
 from srbf.direct.choice import Added
+from srbf.export import export
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 
@@ -68,3 +69,14 @@ def test_lamps_say_that_their_direct_light_is_missing(chromium: Any, split: Asse
     assert "indirect light alone" not in chromium("run", script="document.getElementById('status').textContent")
     chromium("choose", selector=".chip.add", value="point")
     assert "lamps and skies: indirect light alone" in chromium("run", script="document.getElementById('status').textContent")
+
+
+def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[[Path], str], tmp_path: Path) -> None:
+    export(split, "web", tmp_path / "site")
+    lights = [DirectionalLight((-0.45, -0.5, 0.74))]
+    with Added(split, "shadow-map") as added:
+        expected = relight(split, lights, added.answer(lights))
+    where = f"#{{'zoom':{ZOOM},'middle':[{SIDE / 2},{SIDE / 2}],'exposure':0,'view':'texels'}}"
+    chromium("open", url=serve_static(tmp_path / "site") + where, width=WIDTH, height=HEIGHT)
+    apart = np.abs(chromium.texels(SIDE, SIDE, ZOOM) - shown_as(expected))
+    assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART)
