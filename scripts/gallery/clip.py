@@ -28,7 +28,7 @@ HALO = 4.0  # flames wide, a hundredth as bright
 def draw(places: Places) -> None:
     """Write the clip, one panel a moving fit."""
     scene = places.scene
-    fits = [next(fit for fit in scene.fits if fit.folder == folder) for folder in scene.moving]
+    fits = scene.moved
     lit = [frames_of(places, fit) for fit in fits]
     gain = drawing.gain_of(np.stack([image for images in lit for image in images[:: max(1, len(images) // 12)]]), 0.99)
     height, width = lit[0][0].shape[:2]

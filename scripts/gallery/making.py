@@ -143,7 +143,7 @@ def _lamps(places: Places, steps: Steps, reporter: Reporter, built: str, scored:
     source = [built, srbf.__version__, settings.record()]
     work = partial(_render, places.true_lamps, places.blend, settings, reporter)
     baked = steps.run(f"{scene.name}/bake true lamps", source, known, work)
-    split = scene.fits[-1]
+    split = scene.moved[0]
     errors = [places.lamp_errors(split)]
     measured = steps.run(
         f"{scene.name}/evaluate true lamps",

@@ -15,13 +15,14 @@ from scripts.gallery.lamps import ALONE
 from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit
 from scripts.gallery.steps import Steps
+from scripts.gallery.words import INTRODUCTION, TITLES, WORDS
 from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.quality import family_of, name_of, texel_bytes
 
 FIGURE = "error-by-bytes.webp"
-WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 
 
 def text(made: Sequence[Places], steps: Steps, folder: str) -> str:
@@ -32,27 +33,9 @@ def text(made: Sequence[Places], steps: Steps, folder: str) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-INTRODUCTION = """# Gallery
-Scenes that show what the maps hold and where they fail. `make gallery` builds, bakes, fits, measures and draws all of it and writes
-this page; stopped at any moment, it goes on where it was. Every figure below was measured by that run.
-
-In a strip each row is one light that no fit has seen, under one exposure; its direction stands beside it on the sky seen from above.
-The number under a relit picture is its PSNR against the one beside it on the left; the tables have the mean over all held-out lights.
-*25 maps* are the article's method at 200 bytes a texel, *best of 16 bytes* is `srbf fit --method auto --budget 16`. *+ rays*: baked with
-`--transport indirect`, the direct light added as by `srbf relight --direct ray`. Clips are relit from assets alone; they are lossy
-WebP, and no measure of anything.
-
-## What a byte buys
-![Held-out PSNR against bytes a texel, a panel a scene]({folder}/{figure})
-
-Curves: methods fitted to the same 4096 random texels under all light and asked there for the held-out lights, as `srbf report` does it
-(clusters hold so few texels a little better than a whole picture's many). Dashed and dotted: all captured images interpolated, and the
-nearest one, at the bytes of keeping every image. Stars: the assets of this page that leave the direct light to rays, on all texels."""
-
-
 def _scene(places: Places, steps: Steps, folder: str) -> str:
     scene = places.scene
-    parts = [f"## {scene.title}", f"{scene.shows} {scene.fails}".strip()]
+    parts = [f"## {TITLES[scene.name]}", WORDS[scene.name].strip()]
     parts.append(f"![{scene.name}: rendered and relit under held-out lights]({folder}/{places.strip.name})")
     parts.append(f"![{scene.name} under lights that move]({folder}/{places.clip.name})")
     parts.append(_lamps(places, folder))
@@ -62,7 +45,7 @@ def _scene(places: Places, steps: Steps, folder: str) -> str:
 
 
 def _lamps(places: Places, folder: str) -> str:
-    fit = places.scene.fits[-1]
+    fit = places.scene.moved[0]
     if not places.lamp_strip.is_file() or not places.lamp_errors(fit).is_file():
         return ""
     errors = files.read_json(places.lamp_errors(fit))
@@ -146,7 +129,7 @@ def _table(rows: Sequence[Sequence[str]]) -> str:
 
 
 def _number(count: int) -> str:
-    return WORDS[count] if count < len(WORDS) else str(count)
+    return NUMBERS[count] if count < len(NUMBERS) else str(count)
 
 
 def duration(seconds: float) -> str:

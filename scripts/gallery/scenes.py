@@ -64,13 +64,10 @@ class Sun:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that is decided of one scene. `shown` are the fits in the strip, `moving` those in the clip, `tested` (azimuth, elevation)
-    in degrees near which the strip's held-out lights are taken."""
+    """All that is decided of one scene. `moving` are the folders of the fits in the clip, `tested` directions (azimuth and elevation,
+    degrees) near which the strip's held-out lights are taken."""
 
     name: str
-    title: str
-    shows: str
-    fails: str
     receiver: str
     size: tuple[int, int]
     fits: tuple[Fit, ...]
@@ -88,6 +85,11 @@ class Scene:
     frames: int = 48
     clip_width: int = 480
     contest_texels: int = 4096
+
+    @property
+    def moved(self) -> tuple[Fit, ...]:
+        """The fits of the clip; the first carries the lantern."""
+        return tuple(next(fit for fit in self.fits if fit.folder == folder) for folder in self.moving)
 
     def bake_settings(self) -> BakeSettings:
         """As `srbf bake` takes them; a dome's light list is added by who writes it."""
@@ -144,9 +146,6 @@ SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"scalars": 16
 SCENES = (
     Scene(
         name="caustics",
-        title="Caustics and coloured shadows",
-        shows="A table's lightmap under tinted glass and one opaque pawn: the glass gathers light and colours its shadow.",
-        fails="The sun is as wide as the captured lights stand apart, so no shadow is crisp; the caustics are the scene's tinted stand-in.",
         receiver="lightmap:Table",
         size=(512, 512),
         samples=4,
@@ -157,14 +156,12 @@ SCENES = (
     ),
     Scene(
         name="house",
-        title="A lantern carried through a room at night",
-        shows="",
-        fails="",
         receiver="view",
         size=(384, 288),
         validation=0,
         transport="indirect",
         fits=(MAPS, MAPS_AND_RAYS, SCALARS_AND_RAYS),
+        moving=("asset-indirect-25-maps",),
         clip=Lantern(
             ((-1.9, -1.6, 1.2), (-0.2, -1.7, 1.2), (1.1, -1.2, 1.2), (0.9, 0.6, 1.2), (0.5, 2.2, 1.2), (-1.2, 2.1, 1.2), (-1.8, 0.4, 1.2)),
             (2.6, 1.5, 0.62),
@@ -175,9 +172,6 @@ SCENES = (
     ),
     Scene(
         name="coloured_room",
-        title="Glossy things in a coloured room",
-        shows="",
-        fails="",
         receiver="view",
         size=(384, 288),
         soft_sun=True,
@@ -186,9 +180,6 @@ SCENES = (
     ),
     Scene(
         name="lattice",
-        title="Shadows of a lattice and of leaves",
-        shows="",
-        fails="",
         receiver="view",
         size=(384, 288),
         transport="indirect",
@@ -199,9 +190,6 @@ SCENES = (
     ),
     Scene(
         name="coin",
-        title="A coin under a dome of lamps",
-        shows="",
-        fails="",
         receiver="view",
         size=(384, 384),
         samples=16,
