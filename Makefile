@@ -29,7 +29,7 @@ $(VENV)/.tested-by: $(VENV)/.installed
 demo: setup $(PAGE)
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 
-# The article's figure 12 live: a bake that one would publish (a quarter of an hour, resumable), then the viewer.
+# The article's figure 12 live: a bake that one would publish (half an hour on two cores, resumable), then the viewer.
 variable-lightmap: setup $(PAGE)
 	$(BIN)/srbf demo --scene caustics --quality publish -o out/variable-lightmap --view
 

@@ -19,7 +19,7 @@ def demo(
     scene: Annotated[Literal["caustics", "house"], typer.Option(help="A table with glass on it, or a room by daylight.")] = "caustics",
     lights: Annotated[int, typer.Option(help="Directions to bake.")] = 400,
     quality: Annotated[
-        Literal["draft", "publish"], typer.Option(help="publish: more texels, twice the samples, softer shadows; a quarter of an hour.")
+        Literal["draft", "publish"], typer.Option(help="publish: more texels, twice the samples, softer shadows; half an hour.")
     ] = "draft",
     view: Annotated[bool, typer.Option("--view", help="Open the viewer at the end; Ctrl-C ends it.")] = False,
 ) -> None:
