@@ -25,7 +25,8 @@ COLORS = {
     "spherical harmonics": "#1f2328",
     "ptm": "#8a929b",
 }
-OWN = "#c8501e"
+RED = "#c8501e"
+OWN = {"all": ("s", "shown here, on all texels"), "indirect": ("*", "shown here, direct light by rays")}  # marks of this page's assets
 BASELINES = {ALL: "--", NEAREST: ":"}
 TICKS = (2, 4, 8, 16, 32, 64, 128, 256, 512)
 ACROSS = 3
@@ -81,9 +82,20 @@ def _panel(axes: Any, places: Places) -> None:
         if score.family in BASELINES:
             axes.axhline(score.psnr, color="#8a929b", lw=1.1, ls=BASELINES[score.family], label=score.family)
     for fit in places.scene.fits:
-        if fit.light == "indirect":
-            own = own_point(places, fit.folder)
-            axes.plot(*own, "*", color=OWN, ms=11, mec="white", mew=0.6, label="direct light by rays", ls="none", zorder=5)
+        mark, name = OWN[fit.light]
+        bytes_per_texel, reached = own_point(places, fit.folder)
+        axes.plot(
+            bytes_per_texel,
+            reached,
+            mark,
+            mfc=RED if fit.light == "indirect" else "none",
+            mec=RED,
+            mew=1.2,
+            ms=9,
+            label=name,
+            ls="none",
+            zorder=5,
+        )
     axes.set_xticks([t for t in TICKS if axes.get_xlim()[0] <= t <= axes.get_xlim()[1]])
     axes.xaxis.set_major_formatter("{x:g}")
     axes.minorticks_off()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy import ndarray
 
 from scripts.gallery import drawing, strip
 from scripts.gallery.places import Places
@@ -16,23 +17,38 @@ from srbf.lights import PointLight
 from srbf.methods import linear_response
 
 SHOWN = 3  # lamps, evenly along the path
-ALONE = "rays_alone"
+WORST = 100  # one pixel in so many, those that err most, is left out of `rest`
 
 
 def evaluate_lamps(places: Places, fit: Fit) -> None:
-    """The relit lamps' error as `srbf evaluate` has it on a capture of lamps, and beside it that of their direct light alone."""
+    """The relit lamps' error as `srbf evaluate` has it on a capture of lamps, and beside it, of them and of their direct light `alone`:
+    relative RMSE of all pixels, of the `rest` but the worst in every picture, and the mean brightness over the true one."""
     asset, capture = Asset.open(places.asset(fit)), Capture.open(places.true_lamps)
     errors = evaluate(asset, capture, direct=fit.direct, roles=("train",))
     covered = capture.coverage() >= COVERED
-    squares, powers = [], []
+    true, relit, alone = [], [], []
     with Added(asset, fit.direct) as added:
         for index, position in enumerate(capture.positions()):
-            true = np.maximum(capture.image(index), 0)[covered].astype(np.float64)
-            direct = added.answer([_lamp(position)])
+            lamp = _lamp(position)
+            direct = added.answer([lamp])
             assert direct is not None
-            squares.append(((direct[covered] - true) ** 2).mean())
-            powers.append((true**2).mean())
-    files.write_json(places.lamp_errors(fit), {**errors, ALONE: {"relative_rmse": float(np.sqrt(sum(squares) / sum(powers)))}})
+            true.append(np.maximum(capture.image(index), 0)[covered])
+            relit.append(np.maximum(linear_response(asset, [lamp]) + direct, 0)[covered])
+            alone.append(direct[covered])
+    compared = {"relit": _compared(relit, true), "alone": _compared(alone, true)}
+    files.write_json(places.lamp_errors(fit), {**errors, **compared})
+
+
+def _compared(pictures: list[ndarray], true: list[ndarray]) -> dict[str, float]:
+    """Of all pictures together, each (P, 3)."""
+    squares = np.stack([((a - b).astype(np.float64) ** 2).sum(axis=1) for a, b in zip(pictures, true, strict=True)])
+    powers = np.stack([(b.astype(np.float64) ** 2).sum(axis=1) for b in true])
+    kept = squares <= np.quantile(squares, 1 - 1 / WORST, axis=1, keepdims=True)
+    return {
+        "relative_rmse": float(np.sqrt(squares.sum() / powers.sum())),
+        "rest": float(np.sqrt(squares[kept].sum() / powers[kept].sum())),
+        "brightness": float(sum(a.mean(dtype=np.float64) for a in pictures) / sum(b.mean(dtype=np.float64) for b in true)),
+    }
 
 
 def draw(places: Places, fit: Fit) -> None:

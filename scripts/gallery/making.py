@@ -147,7 +147,7 @@ def _lamps(places: Places, steps: Steps, reporter: Reporter, built: str, scored:
     errors = [places.lamp_errors(split)]
     measured = steps.run(
         f"{scene.name}/evaluate true lamps",
-        [baked, scored, library(MEASURING), _source(lamps)],
+        [baked, scored, split.folder, library(MEASURING), _source(lamps)],
         errors,
         lambda: lamps.evaluate_lamps(places, split),
     )

@@ -177,6 +177,8 @@ SCENES = (
         soft_sun=True,
         fits=(MAPS, SMALL),
         clip=Sun(25, 65, 2, second=(0.22, 0.3, 0.5), color=(1.0, 0.92, 0.8)),
+        moving=("asset-25-maps", "asset"),
+        clip_width=800,
     ),
     Scene(
         name="lattice",
