@@ -48,9 +48,9 @@ def _lamps(places: Places, folder: str) -> str:
     if not places.lamp_strip.is_file() or not places.lamp_errors(fit).is_file():
         return ""
     errors = files.read_json(places.lamp_errors(fit))
-    relit, alone = errors["relit"], errors["alone"]
+    relit, alone, count = errors["relit"], errors["alone"], _number(len(errors["lights"]))
     words = (
-        f"The lantern against {_number(len(errors['lights']))} true Cycles lamps on its path (a bake of point lights), and in brackets its\n"
+        f"The lantern against {count} true Cycles lamps on its path (a bake of point lights), and in brackets its\n"
         "direct light alone, without what the asset holds: "
         f"relative RMSE **{relit['relative_rmse']:.2f}** ({alone['relative_rmse']:.2f}),\n"
         f"without the worst pixel in a hundred, highlights and Cycles' own sparks, **{relit['rest']:.2f}** ({alone['rest']:.2f});\n"
