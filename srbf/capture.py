@@ -219,12 +219,13 @@ class Capture:
         """
         whole = np.arange(self.width * self.height) if texels is None else texels
         answers = self.sample(range(len(self.lights)), whole)
-        manifest = self.manifest
+        manifest, lights = self.manifest, self.lights
         if texels is not None:
+            lights = tuple(replace(light, direct=None) for light in lights)  # whole images, which no longer fit
             manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient", "seams")}
             manifest |= {"width": len(texels), "height": 1}
         coverage = self.coverage() if texels is None else self.coverage().reshape(1, -1)[:, texels]
-        return _KeptCapture(self.folder, manifest, self.lights, answers, coverage)
+        return _KeptCapture(self.folder, manifest, lights, answers, coverage)
 
     def with_roles(self, roles: Sequence[Role | None]) -> Capture:
         """The same images under other roles, one a light; lights of role None are left out."""

@@ -53,6 +53,14 @@ def test_an_indirect_asset_carries_its_scene(capture: Capture, asset: Path) -> N
     assert "damaged" in refused("relight", asset, "-o", asset.parent / "x.exr", "--directional", "0,0,1")
 
 
+def test_a_budget_is_found_for_indirect_light(capture: Capture, tmp_path: Path) -> None:
+    pytest.importorskip("sklearn")
+    ok("fit", capture.folder, "-o", tmp_path / "small", "--method", "auto", "--budget", 8)
+    opened = Asset.open(tmp_path / "small")
+    assert opened.transport == "indirect" and opened.scene == capture.scene()
+    assert opened.bytes_per_texel()["directional"] <= 8
+
+
 @pytest.mark.parametrize("renderer", ["numpy", "gl"])
 @pytest.mark.parametrize("direct", [None, "ray", "shadow-map", "none"])
 def test_relight_adds_direct_light_and_says_so(asset: Path, tmp_path: Path, direct: str | None, renderer: str) -> None:
