@@ -36,7 +36,7 @@ BLENDS = {"scene": "Table", "room": "Room"}  # NAME.blend -> its receiver's name
 SAME = {
     "scene.blend": ["SCENE.blend", "their.blend"],
     "capture": ["CAPTURE", "out/caustics/capture"],
-    "asset": ["ASSET", "out/caustics/asset"],
+    "asset": ["ASSET", "OTHER", "out/caustics/asset"],
     "model.glb": ["SCENE.glb", "ROOM.glb"],
 }
 RENAME = """
