@@ -16,7 +16,7 @@ uniform int srbfLampCount;
 // Signed: before the clamp.
 vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
     return srbfRelightLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfCenters, srbfScale, srbfBias, receiver,
-                                 srbfLamps, srbfLampCount);
+                             srbfLamps, srbfLampCount);
 }
 
 vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
