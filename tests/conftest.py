@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import pkgutil
 import signal
 import sys
@@ -37,9 +38,12 @@ Answer = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what compiles other languages, or drives a browser: minutes in all."""
+    """Mark what compiles other languages, or drives a browser: minutes in all; without bpy, skip what needs it."""
     here = Path(__file__).parent
+    lacks_blender = importlib.util.find_spec("bpy") is None
     for item in items:
+        if lacks_blender and item.get_closest_marker("blender"):
+            item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
         if item.path.is_relative_to(here) and item.path.relative_to(here).as_posix().startswith(OTHER_LANGUAGES):
             item.add_marker(pytest.mark.engines)
 

@@ -16,6 +16,7 @@ from math import cos, pi, radians, sin
 
 import bpy
 from mathutils import Euler, Matrix, Vector
+from staging import add_camera, add_daylight, start_cycles
 
 TABLE_SIDE = 2.0  # m
 TABLE_HEIGHT = 0.74  # m, the floor lies this far below the table's top
@@ -284,40 +285,11 @@ def add_pawn():
 # ---- the scene --------------------------------------------------------------------------------------------------
 
 
-def add_camera(location, target, lens):
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens
-    camera = bpy.data.objects.new("Camera", data)
-    camera.location = location
-    camera.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def add_daylight(direction, strength):
-    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle, data.color = strength, radians(0.5), (1.0, 0.93, 0.82)
-    sun = bpy.data.objects.new("Sun", data)
-    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(sun)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.30, 0.38, 0.50, 1)
-    background.inputs["Strength"].default_value = 0.35
-
-
 def set_cycles(scene, caustics):
     """Few bounces, caustics where they are traced, and transparent bounces enough for wings behind wings."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = 800, 600
-    cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = 64, False
+    cycles = start_cycles(scene)
     cycles.caustics_reflective = cycles.caustics_refractive = caustics
     cycles.blur_glossy = 0.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 10, 1, 4
     cycles.transmission_bounces, cycles.transparent_max_bounces = 10, 32
 
@@ -334,7 +306,7 @@ def build(traced):
     floor = [[Vector((x, y, z)) for x, y in corners] for z in (-TABLE_HEIGHT - 0.02, -TABLE_HEIGHT)]
     mesh_object("Floor", [floor], solid("Stone", (0.16, 0.15, 0.15), 0.6), smooth=False)
     add_camera((1.15, -2.35, 1.75), (0.0, -0.08, 0.12), 42)
-    add_daylight((-0.55, 0.35, 0.75), 3.0)
+    add_daylight((-0.55, 0.35, 0.75), 3.0, (0.30, 0.38, 0.50), 0.35)
     set_cycles(bpy.context.scene, caustics=traced)
     for thing in bpy.context.scene.objects:
         if thing.active_material and thing.active_material.name.endswith("Glass"):

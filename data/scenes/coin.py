@@ -12,11 +12,11 @@ The coin is a field of heights on a raster, sampled by a mesh of quads that fill
 """
 
 import sys
-from math import pi, radians
+from math import pi
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from staging import add_camera, add_daylight, start_cycles, write
 
 RASTER = 1250  # heights a side, over [-1, 1]²
 QUADS = 480  # of the mesh, a side
@@ -325,40 +325,9 @@ def felt():
 # ---- the scene ---------------------------------------------------------------------------------------------------
 
 
-def add_camera(height, width):
-    """Orthographic, straight down, +y up; `width` metres wide."""
-    data = bpy.data.cameras.new("Camera")
-    data.type, data.ortho_scale = "ORTHO", width
-    camera = bpy.data.objects.new("Camera", data)
-    camera.location.z = height
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def add_daylight(direction, strength):
-    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle, data.color = strength, radians(0.5), (1.0, 0.95, 0.88)
-    sun = bpy.data.objects.new("Sun", data)
-    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(sun)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.40, 0.45, 0.52, 1)
-    background.inputs["Strength"].default_value = 0.25
-
-
 def set_cycles(scene):
     """Two bounces, no caustics, no clamp; a square picture."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x = scene.render.resolution_y = 800
-    cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = 64, False
-    cycles.caustics_reflective = cycles.caustics_refractive = False
-    cycles.blur_glossy = 1.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles = start_cycles(scene, 800, 800)
     cycles.min_light_bounces = 2
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = 2, 1, 1, 0
 
@@ -367,20 +336,11 @@ def build(seed=7):
     """Fill the current, empty scene."""
     add_coin(seed)
     add_felt()
-    add_camera(4.0, 2.24)
-    add_daylight((-0.6, 0.45, 0.5), 3.0)
+    camera = add_camera((0, 0, 4), (0, 0, 0), 50)  # straight down, +y up
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.24
+    add_daylight((-0.6, 0.45, 0.5), 3.0, (0.40, 0.45, 0.52), 0.25, color=(1.0, 0.95, 0.88))
     set_cycles(bpy.context.scene)
 
 
-def main(arguments):
-    if len(arguments) != 1 or not arguments[0].endswith(".blend"):
-        print("usage: python data/scenes/coin.py OUT.blend", file=sys.stderr)
-        return 2
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    build()
-    bpy.ops.wm.save_as_mainfile(filepath=arguments[0], check_existing=False, compress=True)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write("coin", build, sys.argv[1:]))

@@ -17,6 +17,7 @@ from math import atan2, cos, pi, radians, sin
 
 import bpy
 from mathutils import Matrix, Vector
+from staging import add_camera, add_daylight, start_cycles, write
 
 HALF, FRONT, BACK = 1.28, -1.06, 1.12  # m: the floor is |x| < HALF, FRONT < y < BACK
 HIGH, LOW, THICK = 1.02, 0.48, 0.07  # m: the walls at the back, at the front, and their thickness
@@ -303,40 +304,9 @@ def add_things():
 # ---- the scene ---------------------------------------------------------------------------------------------------
 
 
-def add_camera(location, target, lens):
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens
-    camera = bpy.data.objects.new("Camera", data)
-    camera.location = location
-    camera.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def add_daylight(direction, strength):
-    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle, data.color = strength, radians(0.5), (1.0, 0.95, 0.88)
-    sun = bpy.data.objects.new("Sun", data)
-    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(sun)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.40, 0.45, 0.52, 1)
-    background.inputs["Strength"].default_value = 0.4
-
-
 def set_cycles(scene):
     """Four bounces, none of them left to Russian roulette, no caustics, no clamp."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = 800, 600
-    cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = 64, False
-    cycles.caustics_reflective = cycles.caustics_refractive = False
-    cycles.blur_glossy = 1.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles = start_cycles(scene)
     cycles.min_light_bounces = 4
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = 4, 3, 2, 0
 
@@ -346,19 +316,9 @@ def build():
     add_stage()
     add_things()
     add_camera((0.18, -4.8, 2.42), (0.0, 0.02, 0.34), 55)
-    add_daylight((-0.45, -0.55, 0.70), 3.0)
+    add_daylight((-0.45, -0.55, 0.70), 3.0, (0.40, 0.45, 0.52), 0.4, color=(1.0, 0.95, 0.88))
     set_cycles(bpy.context.scene)
 
 
-def main(arguments):
-    if len(arguments) != 1 or not arguments[0].endswith(".blend"):
-        print("usage: python data/scenes/coloured_room.py OUT.blend", file=sys.stderr)
-        return 2
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    build()
-    bpy.ops.wm.save_as_mainfile(filepath=arguments[0], check_existing=False)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write("coloured_room", build, sys.argv[1:]))

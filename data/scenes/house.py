@@ -14,6 +14,7 @@ from math import atan2, cos, hypot, pi, radians, sin
 
 import bpy
 from mathutils import Euler, Matrix, Vector
+from staging import add_camera, add_daylight, start_cycles, write
 
 HALF, FRONT, BACK, EAVES, RIDGE = 2.5, -2.6, 3.0, 2.9, 4.5  # m: the room is |x| < HALF, FRONT < y < BACK
 
@@ -400,40 +401,9 @@ def add_rug_and_ball():
 # ---- the scene ---------------------------------------------------------------------------------------------------
 
 
-def add_camera(location, target, lens):
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens
-    camera = bpy.data.objects.new("Camera", data)
-    camera.location = location
-    camera.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def add_moonlight(direction, strength):
-    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
-    data = bpy.data.lights.new("Moon", "SUN")
-    data.energy, data.angle, data.color = strength, radians(0.5), (0.80, 0.88, 1.0)
-    moon = bpy.data.objects.new("Moon", data)
-    moon.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(moon)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Night")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.10, 0.16, 0.28, 1)
-    background.inputs["Strength"].default_value = 0.8
-
-
 def set_cycles(scene):
     """Three bounces, no caustics, no clamp."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = 800, 600
-    cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = 64, False
-    cycles.caustics_reflective = cycles.caustics_refractive = False
-    cycles.blur_glossy = 1.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles = start_cycles(scene)
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = 3, 3, 1, 0
 
 
@@ -461,19 +431,9 @@ def build(seed=13):
     moor = box((-20, BACK + 0.3, -0.6), (20, 30, -0.5))
     mesh_object("Moor", [moor], surface("Moor", (0.09, 0.095, 0.07), 1.0))
     add_camera((-0.30, -4.25, 1.42), (0.08, 2.5, 1.40), 33)
-    add_moonlight((-0.62, -0.30, 0.72), 5.0)
+    add_daylight((-0.62, -0.30, 0.72), 5.0, (0.10, 0.16, 0.28), 0.8, color=(0.80, 0.88, 1.0))  # the moon, and night
     set_cycles(bpy.context.scene)
 
 
-def main(arguments):
-    if len(arguments) != 1 or not arguments[0].endswith(".blend"):
-        print("usage: python data/scenes/house.py OUT.blend", file=sys.stderr)
-        return 2
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    build()
-    bpy.ops.wm.save_as_mainfile(filepath=arguments[0], check_existing=False)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write("house", build, sys.argv[1:]))

@@ -13,10 +13,11 @@ The object `Floor` is one quad at z = 0 (UV layer "lightmap" = [0, 1]², u along
 
 import random
 import sys
-from math import cos, pi, radians, sin
+from math import cos, pi, sin
 
 import bpy
 from mathutils import Matrix, Vector
+from staging import add_camera, add_daylight, start_cycles, write
 
 HALF = 2.5  # m: the floor is |x|, |y| < HALF, the wall stands at its back
 LEFT, RIGHT, NEAR, FAR, ROOF = -2.15, 0.85, -0.55, 2.25, 2.3  # m: the pergola's posts, and its beams' height
@@ -345,40 +346,9 @@ def add_pots(vine):
 # ---- the scene ---------------------------------------------------------------------------------------------------
 
 
-def add_camera(location, target, lens):
-    data = bpy.data.cameras.new("Camera")
-    data.lens = lens
-    camera = bpy.data.objects.new("Camera", data)
-    camera.location = location
-    camera.rotation_euler = (Vector(target) - Vector(location)).to_track_quat("-Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(camera)
-    bpy.context.scene.camera = camera
-
-
-def add_daylight(direction, strength):
-    """The scene's own sun (`direction` points to it) and sky: for looking at, a bake removes both."""
-    data = bpy.data.lights.new("Sun", "SUN")
-    data.energy, data.angle, data.color = strength, radians(0.5), (1.0, 0.93, 0.82)
-    sun = bpy.data.objects.new("Sun", data)
-    sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
-    bpy.context.scene.collection.objects.link(sun)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.35, 0.45, 0.60, 1)
-    background.inputs["Strength"].default_value = 0.6
-
-
 def set_cycles(scene):
     """Three bounces, none of them left to Russian roulette, no clamp; nothing is glossy."""
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = 800, 600
-    cycles = scene.cycles
-    cycles.samples, cycles.use_adaptive_sampling = 64, False
-    cycles.caustics_reflective = cycles.caustics_refractive = False
-    cycles.blur_glossy = 1.0
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
+    cycles = start_cycles(scene)
     cycles.min_light_bounces = 3
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = 3, 3, 0, 2
 
@@ -400,19 +370,9 @@ def build(seed=5):
     pinks = each((0.0, (0.48, 0.03, 0.20)), (1.0, (0.75, 0.10, 0.36)))
     mesh_object("Flowers", vine.flowers, surface("Flowers", pinks, passes=0.35))
     add_camera((2.75, -5.4, 3.25), (-0.38, 0.7, 0.80), 40.5)
-    add_daylight((-0.55, -0.35, 0.75), 3.5)
+    add_daylight((-0.55, -0.35, 0.75), 3.5, (0.35, 0.45, 0.60), 0.6)
     set_cycles(bpy.context.scene)
 
 
-def main(arguments):
-    if len(arguments) != 1 or not arguments[0].endswith(".blend"):
-        print("usage: python data/scenes/lattice.py OUT.blend", file=sys.stderr)
-        return 2
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    build()
-    bpy.ops.wm.save_as_mainfile(filepath=arguments[0], check_existing=False)
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(write("lattice", build, sys.argv[1:]))

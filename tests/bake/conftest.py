@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,14 +16,6 @@ from srbf.capture import Capture
 ROOT = Path(__file__).parents[2]
 SCENES = ROOT / "data" / "scenes"
 sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them in
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Where this Python has no bpy at all, say so and skip what needs it."""
-    if importlib.util.find_spec("bpy") is None:
-        for item in items:
-            if item.get_closest_marker("blender"):
-                item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
 
 
 def built(script: str, folder: Path) -> Callable[[str], Path]:

@@ -19,7 +19,7 @@ from srbf.cli import app
 
 Class = Literal["run", "elsewhere", "mention", "not run", "checked"]
 CLICK = sys.modules[typer.BadParameter.__module__]  # click's errors, or those of typer's own copy
-COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+COMMANDS: dict[str, Any] = typer.main.get_group(app).commands
 CHECKED = ("pip", "pytest", "cd", "sh", "touch", "ruff", "mypy", "lint-imports")  # by looking at what they name
 RUN = ("srbf", "python", "openjd", "npm pack", "npm run example")
 

@@ -67,7 +67,7 @@ def prepare(folder: Path) -> None:
         "srbf fit capture -o asset -k 25",
         "srbf export asset --target gltf -o gltf",
     ):
-        place.run(Command("workplace.py", 0, text))
+        assert (said := place.failure_of(Command("workplace.py", 0, text))) is None, f"{text}\n  {said}"
     shutil.move(folder / "gltf" / "model.glb", folder)
     for source, names in SAME.items():
         for name in names:
@@ -98,8 +98,8 @@ class Workplace:
         self.folder = folder
         self.made: set[str] = set()
 
-    def run(self, command: Command) -> None:
-        """Run a command of class `run`, once for each of its choices; AssertionError that names it where it fails."""
+    def failure_of(self, command: Command) -> str | None:
+        """Run a command of class `run`, once for each of its choices; what the first that failed was, and said."""
         program = command.words[0]
         before = frozenset(self.made)
         for words in variants(command):
@@ -114,7 +114,9 @@ class Workplace:
                 said = self.npm(words, command.variables)
             else:
                 said = self.process([shutil.which(program, path=PATH) or program, *words])
-            assert said is None, f"{command}\n  run as: {program} {' '.join(words)}\n{said}"
+            if said is not None:
+                return f"run as: {program} {' '.join(words)}\n{said}"
+        return None
 
     def _make_room(self, words: Sequence[str]) -> None:
         """Take away what was prepared under the name of an output, unless a command before has written it."""

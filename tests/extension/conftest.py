@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -19,14 +18,6 @@ from srbf.quantization import layer_entries, quantize
 from srbf.sphere import point_set
 
 SCRIPT = Path(__file__).parent / "in_blender.py"
-
-
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Where this Python has no bpy, skip what needs it."""
-    if importlib.util.find_spec("bpy") is None:
-        for item in items:
-            if item.get_closest_marker("blender"):
-                item.add_marker(pytest.mark.skip(reason="this Python has no bpy"))
 
 
 @pytest.fixture

@@ -67,6 +67,7 @@ export class SrbfRelightingMap extends SceneAsset {
    * Only with `source: "lightmap"`; the next `update` draws it.
    */
   add(texture?: Texture, alone = false): void {
+    if (!texture && !this.added) return; // nothing to draw anew
     this.added = texture && { texture, alone };
     this.drawn = "";
   }
