@@ -117,3 +117,11 @@ def test_a_lost_picture_alone_is_made_anew(gallery: Gallery) -> None:
     assert lost.read_bytes() == content
     may_change = {lost, gallery.out / "times.json", gallery.docs.with_suffix(".md")}  # the latter two say how long it took
     assert {path for path in after if after[path] != before.get(path)} <= may_change and after.keys() == before.keys()
+
+
+def test_an_output_that_is_a_file_is_said_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    command = [sys.executable, "-m", "scripts.gallery", "-o", str(tmp_path / "taken")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert done.stdout.startswith("gallery: cannot make folder") and len(done.stdout.splitlines()) == 1

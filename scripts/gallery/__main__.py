@@ -36,7 +36,11 @@ def main() -> int:
     parser.add_argument("--small", action="store_true", help="tiny, in seconds")
     given = parser.parse_args()
     warnings.showwarning = lambda message, *_rest, **_named: say(f"  {message}")
-    files.make_folder(given.output)
+    try:
+        files.make_folder(given.output)
+    except SrbfError as error:
+        say(f"gallery: {error}")
+        return 1
     held = locked(given.output, LOCK)  # until this process ends
     if held is None:
         say(f"gallery: another process is making {given.output}; wait for it, or choose another -o")

@@ -23,7 +23,7 @@ def view(
     folders: Annotated[
         list[Path],
         typer.Argument(
-            metavar="ASSET... [CAPTURE]",
+            metavar="FOLDER",
             help="An asset's folder, or several of one capture to switch between; and the capture, to compare with.",
             show_default=False,
         ),

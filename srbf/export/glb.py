@@ -18,6 +18,7 @@ ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 FLOAT, UNSIGNED_INT = 5126, 5125
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
 ALIGNMENT = 4
+HEADER = 12  # bytes
 
 
 @dataclass
@@ -32,6 +33,8 @@ class Document:
         """A .glb whose buffer is its own; ManifestError, in one line, on anything else."""
         try:
             data = path.read_bytes()
+            if len(data) < HEADER:
+                raise ValueError("no glTF 2.0 header, or a file cut short")
             magic, version, length = struct.unpack_from("<III", data)
             if magic != MAGIC or version != 2 or length > len(data):
                 raise ValueError("no glTF 2.0 header, or a file cut short")
