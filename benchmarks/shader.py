@@ -27,9 +27,9 @@ from srbf.gl.programs import Programs
 from srbf.gl.relighter import PASSES
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_lamps, padded
+from srbf.light_function_fit import dense_centers
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import folded_weights
-from srbf.model_selection import dense_centers
 from srbf.sphere import point_set
 
 LIGHTS = 400  # of the capture that the light functions are as dense as

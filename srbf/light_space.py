@@ -68,17 +68,6 @@ class LightSpace:
         first = self.mean if mean is None else self.mean + mean.reshape(-1, 3) / weighed
         return np.concatenate([first[None], shaped]).transpose(1, 0, 2)
 
-    def validation_functions(self, planes: Float32[ndarray, "F n"]) -> Float64[ndarray, "V F 3"]:
-        """What the functions of the sample's `planes`, the first all 1, ought to be at the validation lights: least squares."""
-        answers = self.sample.answers[:, self.sample.train :]
-        if not answers.shape[1]:
-            return np.zeros((0, len(planes), 3))
-        rows = self.row_weights.astype(np.float64)
-        system = planes.T * rows[:, None]  # (n, F)
-        wanted = (answers * self.row_weights[:, None, None]).reshape(len(rows), -1)
-        found = np.linalg.lstsq(system, wanted.astype(np.float64), rcond=1e-8)[0]
-        return found.reshape(len(planes), -1, 3).transpose(1, 0, 2)
-
     def energy_kept(self, values: Float64[ndarray, " S"]) -> float:
         """Share of the weighted sample's squared distance from its mean that axes of these singular values hold."""
         rows = self.centered * self.row_weights[:, None]

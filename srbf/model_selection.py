@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,26 +10,18 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.basis.gaussian import weight
-from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, STRIP, Capture
+from srbf.cross_validation import HeldOut
 from srbf.errors import InputError
-from srbf.solve.ridge import RidgePath
-from srbf.sphere import Domain, mean_spacing, point_set
+from srbf.solve.kernel_ridge import KernelPath
 
 Rule = Literal["validation", "leave-one-light-out"]
 
-RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.25))
+RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
 SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighbouring centers
 WIDEST = 1.0  # rad: past it the R table has a cusp
 NARROWEST = 0.05  # rad
 SAMPLE_TEXELS = 1 << 13
-FUNCTION_RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
-FUNCTION_SPREADS = tuple(float(s) for s in np.geomspace(0.7, 5.0, 12))  # of the lights' spacing
-DENSE_LEAST = 100  # centers of light functions, where the lights are fewer
-BELOW = 3.0  # spacings: how far the centers of light functions go on below the horizon, or the cosine bends there
-FUNCTIONS_AT_A_TIME = 1024
-UNSEEN = 1e-4  # of the mean power: smaller errors are alike, or lights that leave all black would decide
 
 
 @dataclass(frozen=True)
@@ -86,33 +78,30 @@ def choose(
     ridges: Sequence[float] = RIDGES,
     noise: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> Choice:
-    """The candidate, (spread, basis functions at the sample's lights), and the ridge that predict best what they did not see.
+    """The candidate, (spread, basis functions at the sample's lights), and the ridge > 0 that predict best what they did not see.
 
-    With validation lights: least mean squared error on them. Without: least mean over train lights of the log of each one's squared
-    error when left out, which is the greatest mean PSNR; a border light, extrapolated when left out, must not drown the rest.
-    On a lattice of lights leaving one out is pessimistic, its neighbours being twice as far as a random direction's: hence validation.
+    Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation.HeldOut.score`).
     `noise(operator, weights)` adds a variance a light: what the maps' encoding loses.
     """
-    gram, train = sample.gram, sample.train
-    validated = len(gram) > train
-    least = UNSEEN * float(np.trace(gram)) / len(gram) + 1e-30
+    held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
+    middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
+    train = sample.train
     best: Choice | None = None
     best_score = np.inf
     for spread, weights in candidates:
-        path = RidgePath(weights[:train])
+        path = KernelPath(weights[:train] @ weights[:train].T)
         for ridge in ridges:
-            operator = path.operator(ridge)
-            if validated:
-                error = np.concatenate([-weights[train:] @ operator, np.eye(len(gram) - train)], axis=1)
-                squares = _quadratic(error, gram)
-            else:
-                squares = _quadratic(path.left_out(ridge), gram)
+            single, banded = held_out.single(path, ridge), held_out.in_bands(path, ridge)
+            unseen = held_out.validation(path, ridge, weights[train:] @ weights[:train].T) if held_out.validated else None
             if noise is not None:
-                squares = squares + noise(operator, weights[train:] if validated else weights)
-            score = float(squares.mean()) if validated else float(np.log(np.maximum(squares, least)).mean())
+                lost = noise(path.solve(ridge, weights[:train]).T, weights)
+                single, banded = single + lost[:train], banded + lost[middles]
+                unseen = None if unseen is None else unseen + lost[train:]
+            score = held_out.score(single, banded, unseen)
             if score < best_score or best is None:
                 best_score = score
-                best = Choice(spread, ridge, "validation" if validated else "leave-one-light-out", float(squares.mean()))
+                rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
+                best = Choice(spread, ridge, rule, float((single if unseen is None else unseen).mean()))
     assert best is not None, "no spread or no ridge to choose from"
     return best
 
@@ -120,80 +109,6 @@ def choose(
 def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:
     """Spreads around `typical` (rad) within the R table's reach."""
     return sorted({float(np.clip(typical * f, NARROWEST, WIDEST)) for f in factors})
-
-
-def dense_centers(directions: Float64[ndarray, "L 3"], domain: Domain) -> Float64[ndarray, "B 3"]:
-    """Centers for functions that may follow every light: as dense as the lights (at least DENSE_LEAST), Fibonacci.
-
-    On the hemisphere they go on for BELOW spacings under the horizon, where a cosine would otherwise be bent towards zero.
-    """
-    count = max(len(directions), DENSE_LEAST)
-    if domain == "sphere":
-        return point_set("fibonacci", count, "sphere")
-    spacing = np.sqrt(2 * np.pi / count)
-    points = point_set("fibonacci", 2 * count, "sphere")
-    return points[points[:, 2] > -np.sin(min(BELOW * spacing, np.pi / 2))]
-
-
-def choose_dense(sample: TexelSample, centers: Float64[ndarray, "B 3"], spread: float | None = None, ridge: float | None = None) -> Choice:
-    """`choose` for light functions on dense centers: one pair for all of them."""
-    spacing = mean_spacing(sample.directions[: sample.train]) if sample.train > 1 else 1.0
-    spreads = spread_candidates(spacing, FUNCTION_SPREADS) if spread is None else [spread]
-    candidates = ((s, weight(sample.directions @ centers.T, s)) for s in spreads)
-    return choose(sample, candidates, FUNCTION_RIDGES if ridge is None else [ridge])
-
-
-def fit_light_functions(
-    sample: TexelSample,
-    values: Float64[ndarray, "L F 3"],
-    validation: Float64[ndarray, "V F 3"],
-    centers: Float64[ndarray, "B 3"],
-    spread: float | None = None,
-    ridge: float | None = None,
-) -> LightFunctions:
-    """Smooth functions through `values` at the train lights, each with the spread and ridge that predict it best.
-
-    `validation` (V may be 0) holds what the functions ought to be at the validation lights; without it each value is left out in turn. A
-    number for `spread` or `ridge` fixes it for all.
-    """
-    directions = sample.directions
-    spacing = mean_spacing(directions[: sample.train]) if sample.train > 1 else 1.0
-    spreads = spread_candidates(spacing, FUNCTION_SPREADS) if spread is None else [spread]
-    ridges = FUNCTION_RIDGES if ridge is None else [ridge]
-    count = values.shape[1]
-    flat = values.reshape(len(values), -1)
-    best = np.full(count, np.inf)
-    chosen_spread = np.empty(count)
-    coefficients = np.empty((count, len(centers), 3), np.float32)
-    for candidate in spreads:
-        weights = weight(directions @ centers.T, candidate)
-        path = RidgePath(weights[: sample.train])
-        for penalty in ridges:
-            operator = path.operator(penalty)
-            predict = weights[sample.train :] @ operator if len(validation) else path.left_out(penalty)
-            for part in _parts(count):
-                columns = flat[:, 3 * part.start : 3 * part.stop]
-                residual = (predict @ columns).reshape(len(predict), -1, 3)
-                if len(validation):
-                    residual = residual - validation[:, part]
-                error = np.einsum("lfc,lfc->f", residual, residual)
-                better = np.flatnonzero(error < best[part]) + part.start
-                best[better] = error[better - part.start]
-                chosen_spread[better] = candidate
-                if len(better):
-                    fitted = operator @ values[:, better].reshape(len(values), -1)
-                    coefficients[better] = fitted.reshape(len(centers), -1, 3).transpose(1, 0, 2)
-    return LightFunctions(centers, chosen_spread, coefficients)
-
-
-def _parts(count: int) -> Iterator[slice]:
-    for start in range(0, count, FUNCTIONS_AT_A_TIME):
-        yield slice(start, min(start + FUNCTIONS_AT_A_TIME, count))
-
-
-def _quadratic(rows: np.ndarray, gram: np.ndarray) -> np.ndarray:
-    """The diagonal of rows gram rows^T."""
-    return np.einsum("ij,ij->i", rows @ gram, rows)
 
 
 def _in_strips(covered: Bool[ndarray, "H W"], count: int, share: float) -> Bool[ndarray, "H W"]:

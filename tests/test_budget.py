@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from srbf.budget import DEFAULT_BUDGET, UNSEEN, within_budget
+from srbf.budget import DEFAULT_BUDGET, LEAST_LIGHTS, within_budget
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
@@ -76,10 +76,10 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
 
 
 def test_train_lights_stand_in_for_validation(make_capture) -> None:
-    capture = make_capture(smooth(np.random.default_rng(2)), lights=UNSEEN + 1, holdout=3).kept()
+    capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).kept()
     assert isinstance(within_budget(capture, 4), EigenMap)
-    few = make_capture(smooth(np.random.default_rng(2)), lights=UNSEEN, holdout=3, name="few").kept()
-    with pytest.raises(InputError, match=f"more than {UNSEEN} train lights"):
+    few = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS - 1, holdout=3, name="few").kept()
+    with pytest.raises(InputError, match=f"at least {LEAST_LIGHTS} train lights"):
         within_budget(few, 4)
 
 

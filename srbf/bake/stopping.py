@@ -10,7 +10,8 @@ import numpy as np
 
 from srbf.bake.sums import Sum
 from srbf.capture import Capture
-from srbf.model_selection import TexelSample, choose_dense, dense_centers
+from srbf.light_function_fit import choose_functions, dense_centers
+from srbf.model_selection import TexelSample
 from srbf.sphere import domain_of
 
 TEXELS = 4096
@@ -33,12 +34,12 @@ class Measure:
 def measure(capture: Capture, samples: int, sums: Sequence[Sum]) -> Measure:
     """How well the capture as it stands predicts its validation lights; `sums` are theirs, in order, with their squares.
 
-    All train images are interpolated by dense SRBFs of the spread and ridge that predict best: of all that a fit can do with them the most
+    All train images are interpolated by dense SRBFs of the kernel and ridge that predict best: of all that a fit can do with them the most
     sensitive to noise. With v = t + n the error seen is E|f - t|^2 + E|n|^2, and the second is known from how the passes of v differ.
     """
     sample = TexelSample.of(capture, TEXELS)
     train = sample.directions[: sample.train]
-    choice = choose_dense(sample, dense_centers(train, domain_of(train)))
+    choice = choose_functions(sample, dense_centers(train, domain_of(train)))
     noise = float(np.mean([total.noise_variance().reshape(-1, 3)[sample.texels].mean(dtype=np.float64) for total in sums]))
     power = float((sample.answers[:, sample.train :].astype(np.float64) ** 2).mean()) - noise
     power = max(power, 1e-30)

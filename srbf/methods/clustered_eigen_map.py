@@ -11,12 +11,12 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.basis.light_functions import LightFunctions
 from srbf.capture import Capture, Look
 from srbf.errors import InputError
 from srbf.image import Encoding
+from srbf.light_function_fit import functions_through
 from srbf.light_space import LightSpace
-from srbf.model_selection import TexelSample, choose_dense, dense_centers, fit_light_functions
+from srbf.model_selection import TexelSample
 from srbf.receivers import covered_texels
 from srbf.scalar_planes import (
     SewnPlanes,
@@ -124,23 +124,10 @@ class ClusteredEigenMap:
         if stitch is not None:
             sewn = SewnPlanes(planes[:, texels:], index[texels:])
             planes, index = planes[:, :texels], index[:texels]
-        functions = self._functions(sample, values, dense_centers(directions, domain))
-        fit = {"chosen_by": "validation" if sample.validated else "leave-one-light-out"}
+        functions, fit = functions_through(sample, values, domain, self.spread, self.ridge)
         return planes_asset(
             capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index, stitch, sewn
         )
-
-    def _functions(self, sample: TexelSample, values: Float64[ndarray, "L F 3"], centers: Float64[ndarray, "B 3"]) -> LightFunctions:
-        """Light functions of all clusters: one spread and ridge that predict the validation lights best, or each its own by light left out.
-
-        A cluster's few texels cannot say for each of its functions what it ought to be at the validation lights.
-        """
-        spread = None if self.spread == "auto" else self.spread
-        ridge = None if self.ridge == "auto" else self.ridge
-        if sample.validated and (spread is None or ridge is None):
-            choice = choose_dense(sample, centers, spread, ridge)
-            spread, ridge = choice.spread, choice.ridge
-        return fit_light_functions(sample, values, np.zeros((0, values.shape[1], 3)), centers, spread, ridge)
 
 
 def _with_sewn(seen: Float32[ndarray, "D P"], stitch: Stitch) -> Float32[ndarray, "D Q"]:

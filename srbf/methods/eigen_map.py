@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Literal, get_args
 
-import numpy as np
-
 from srbf.asset import Asset
 from srbf.capture import Capture, Look
 from srbf.errors import InputError
 from srbf.image import Encoding
+from srbf.light_function_fit import functions_through
 from srbf.light_space import LightSpace, Weighting
-from srbf.model_selection import TexelSample, dense_centers, fit_light_functions
+from srbf.model_selection import TexelSample
 from srbf.scalar_planes import check_plane_settings, directional_responses, folded_weights, linear_response, planes_asset, relight
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct
@@ -32,11 +31,11 @@ class EigenMap:
     T(p, L, c) ~ w_0(L, c) + sum_j a_j(p) w_j(L, c), j = 1 … `scalars`
 
     The rows of T, (L x 3) numbers a texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
-    number a texel for all three colours. What an axis holds at the lights becomes a function of every direction by ridge
-    regression on a dense set of spherical Gaussians, whose spread and ridge are chosen for each function (`auto`) by what it predicts at
-    the validation lights, or at train lights left out: the leading axes, which hold little noise, are followed closely, the
-    last ones are smoothed. Columns of T are weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives
-    the least squared error, `relative` divides each by its mean, so that dark texels count as much as bright ones.
+    number a texel for all three colours. What an axis holds at the lights becomes a function of every direction by kernel
+    ridge regression on a dense set of spherical Gaussians. One kernel, of one spread or of two, and one ridge serve all functions: those
+    that predict best the lights left out and the validation lights (`auto`, `light_function_fit.choose_functions`). Columns of T are
+    weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives the least squared error, `relative` divides
+    each by its mean, so that dark texels count as much as bright ones.
     """
 
     scalars: int = 28
@@ -79,17 +78,9 @@ class EigenMap:
             product.add(first, block)
             progress(first + len(block), len(train))
         planes = product.result - space.offsets(axes)[:, None]
-        sampled = np.concatenate([np.ones((1, len(sample.texels)), np.float32), planes[:, sample.texels]])
-        functions = fit_light_functions(
-            sample,
-            space.functions(axes),
-            space.validation_functions(sampled),
-            dense_centers(directions, domain),
-            None if self.spread == "auto" else self.spread,
-            None if self.ridge == "auto" else self.ridge,
-        )
+        functions, chosen = functions_through(sample, space.functions(axes), domain, self.spread, self.ridge)
         fit = {
-            "chosen_by": "validation" if sample.validated else "leave-one-light-out",
+            **chosen,
             "singular_values": (values / max(float(values[0]), 1e-30)).tolist(),
             "energy_kept": space.energy_kept(values),
         }
