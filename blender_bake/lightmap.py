@@ -19,6 +19,15 @@ NOT_DIFFUSE = 1e-3  # an albedo below this everywhere on a slot leaves Cycles no
 NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
 
 
+def world_from_baked_normal(matrix_world: Any) -> np.ndarray:
+    """(3, 3) M^T, which turns rows of baked OBJECT normals into world normals, up to their length.
+
+    Blender turns Cycles' world normal n back as if it were a displacement, to normalize(M^-1 n): `RE_bake_normal_world_to_object` in
+    source/blender/render/intern/bake.cc, seen in 4.5.15 and 5.2. So n is along M (M^-1 n), whatever the scale, shear or mirroring.
+    """
+    return np.array(matrix_world.to_3x3(), np.float32).T
+
+
 class LightmapReceiver:
     """Mesh objects, their modifiers applied, whose texels in one atlas answer lights; arrays are (H, W, C) float32, row 0 at the top."""
 
@@ -80,7 +89,7 @@ class LightmapReceiver:
         normal = np.empty_like(of_object)
         for i, obj in enumerate(self._objects):
             mine = self._owner == i
-            normal[mine] = of_object[mine] @ np.array(obj.matrix_world.to_3x3().inverted_safe(), np.float32)
+            normal[mine] = of_object[mine] @ world_from_baked_normal(obj.matrix_world)
         normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-20)
         covered = self._coverage
         of_each = [seam_edges(obj.data, self._layers[obj.name], within_material=not self._irradiance) for obj in self._objects]

@@ -6,9 +6,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from blender_bake import as_rendered, beside
 from blender_bake.channel import WorkerError
-
-RAYS = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_volume_scatter", "visible_shadow")
 
 
 def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
@@ -21,9 +20,7 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
         for obj in _named(scene, name):
             if obj not in objects:
                 objects.append(obj)
-    for obj in objects:
-        apply_modifiers(obj)
-    return objects
+    return [apply_modifiers(obj) for obj in objects]
 
 
 def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
@@ -113,39 +110,26 @@ def _show(obj: bpy.types.Object) -> None:
     obj.hide_set(False)
 
 
-def apply_modifiers(obj: bpy.types.Object) -> None:
-    """Put the evaluated mesh, at render settings, in place of the object's data: every bake would evaluate it again.
+def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
+    """The object with its evaluated mesh, at render settings, for its data: every bake would evaluate it again.
 
-    That mesh is the object's own, so objects that shared one each get their own texels.
+    That mesh is the object's own, so objects that shared one each get their own texels. What it shows beside its mesh stays on another
+    object, see `beside`. One that is nothing but instances of geometry nodes becomes their mesh.
     """
-    for modifier in obj.modifiers:
-        modifier.show_viewport = modifier.show_render
-        if modifier.type in {"SUBSURF", "MULTIRES"}:
-            modifier.levels = modifier.render_levels
+    scene = bpy.context.scene
+    as_rendered.for_evaluation(obj, scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    _realise_instances(obj, depsgraph)
+    more = beside.shows_more(obj, depsgraph)
     mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
+    real = None if mesh.polygons or not more else beside.real_mesh(obj)
+    mesh = real or mesh
+    if not mesh.polygons:
+        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any; bake the objects that it scatters instead")
+    if more:
+        return beside.set_apart(obj, mesh, instances_too=real is None)
     obj.modifiers.clear()
     obj.data = mesh
-    if not mesh.polygons:
-        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any")
-
-
-def _realise_instances(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Objects that the modifiers or particles of `obj` scatter stay as objects of their own when those are gone."""
-    meshes: dict[str, bpy.types.Mesh] = {}
-    for instance in depsgraph.object_instances:
-        source = instance.object
-        if not (instance.is_instance and instance.parent and instance.parent.original == obj and source.type == "MESH"):
-            continue
-        key = source.data.name_full
-        if key not in meshes:
-            meshes[key] = bpy.data.meshes.new_from_object(source, preserve_all_data_layers=True, depsgraph=depsgraph)
-        copy = bpy.data.objects.new(f"{obj.name} instance", meshes[key])
-        for ray in RAYS:
-            setattr(copy, ray, getattr(source, ray))
-        copy.matrix_world = instance.matrix_world.copy()
-        bpy.context.scene.collection.objects.link(copy)
+    return obj
 
 
 def select(objects: list[bpy.types.Object]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from blender_bake import hardening
+from blender_bake import as_rendered, hardening
 from blender_bake.channel import Channel, WorkerError, leave
 
 WORKING_SPACE = "Linear Rec.709"
@@ -121,6 +121,7 @@ def configure(scene: bpy.types.Scene) -> None:
     render.use_overwrite = True
     render.use_file_extension = True
     render.threads_mode = "AUTO"
+    as_rendered.settle(scene)
     for layer in scene.view_layers:
         layer.samples = 0  # a layer's own count would win over ours
 

@@ -15,6 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from blender_bake import as_rendered
 from blender_bake.translucency import Curve
 
 SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # kinds of objects with faces
@@ -48,10 +49,7 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
         obj.hide_set(False)
     for obj in scene.objects:
         obj.hide_viewport = obj.hide_render
-        for modifier in obj.modifiers:
-            modifier.show_viewport = modifier.show_render
-            if modifier.type in {"SUBSURF", "MULTIRES"}:
-                modifier.levels = modifier.render_levels
+        as_rendered.modifiers(obj)
         if obj.type in {"CURVE", "SURFACE", "FONT"} and getattr(obj.data, "render_resolution_u", 0):
             obj.data.resolution_u = obj.data.render_resolution_u
 

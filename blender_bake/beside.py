@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an object shows beside its mesh: hair, particles, instances, curves, points, volumes. It stays when its modifiers are applied."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+from mathutils import Matrix
+
+BESIDE_A_MESH = ("Curve", "Point Cloud", "Volume", "Grease Pencil")  # of geometry nodes
+INSTANCES = "Instances"
+
+
+def shows_more(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Whether modifiers of `obj` show more than its mesh."""
+    if any(modifier.type == "PARTICLE_SYSTEM" and modifier.show_render for modifier in obj.modifiers):
+        return True
+    if not any(modifier.type == "NODES" and modifier.show_render for modifier in obj.modifiers):
+        return False
+    for instance in depsgraph.object_instances:
+        if instance.is_instance:
+            if instance.parent and instance.parent.original == obj:
+                return True
+        elif instance.object.original == obj and instance.object.type != "MESH":
+            return True
+    return False
+
+
+def real_mesh(obj: bpy.types.Object) -> bpy.types.Mesh | None:
+    """The instances that geometry nodes of `obj` scatter as one mesh of their own; None where they make no faces."""
+    with _at_the_end(obj, _realizing()):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
+    return mesh if mesh.polygons else None
+
+
+def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, instances_too: bool = True) -> bpy.types.Object:
+    """An object that has `mesh`, the place and the name of `obj`, which stays as "NAME instance" and shows all but its mesh.
+
+    So hair, particles and what other objects take from it come from the object that its author made. Without `instances_too` those that
+    geometry nodes scatter are left out: `mesh` holds them.
+    """
+    name, place = obj.name, obj.matrix_world.copy()
+    receiver = obj.copy()
+    receiver.animation_data_clear()
+    receiver.modifiers.clear()
+    receiver.constraints.clear()
+    receiver.data = mesh
+    receiver.instance_type = "NONE"
+    for collection in obj.users_collection:
+        collection.objects.link(receiver)
+    obj.name = f"{name} instance"
+    receiver.name = name
+    stand(receiver, place)
+    kept = [*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]
+    if any(modifier.type == "NODES" for modifier in obj.modifiers):
+        _append(obj, _keeping(kept))
+    if obj.particle_systems or obj.instance_type in {"VERTS", "FACES"}:
+        obj.show_instancer_for_render = obj.show_instancer_for_viewport = False
+    return receiver
+
+
+def stand(obj: bpy.types.Object, matrix: Matrix) -> None:
+    """Put `obj` where `matrix` says, shear included, which location, rotation and scale cannot hold: by the inverse of a parent."""
+    anchor = bpy.data.objects.new(f"{obj.name} place", None)
+    bpy.context.scene.collection.objects.link(anchor)
+    obj.parent, obj.parent_type = anchor, "OBJECT"
+    obj.matrix_parent_inverse = matrix
+    obj.delta_location, obj.delta_scale = (0, 0, 0), (1, 1, 1)
+    obj.delta_rotation_euler, obj.delta_rotation_quaternion = (0, 0, 0), (1, 0, 0, 0)
+    obj.matrix_basis = Matrix.Identity(4)
+    bpy.context.view_layer.update()
+
+
+@contextmanager
+def _at_the_end(obj: bpy.types.Object, group: bpy.types.NodeTree) -> Iterator[None]:
+    modifier = _append(obj, group)
+    yield
+    obj.modifiers.remove(modifier)
+
+
+def _append(obj: bpy.types.Object, group: bpy.types.NodeTree) -> bpy.types.Modifier:
+    modifier = obj.modifiers.new("srbf", "NODES")
+    modifier.node_group = group
+    return modifier
+
+
+def _realizing() -> bpy.types.NodeTree:
+    group, entry, end = _group()
+    real = group.nodes.new("GeometryNodeRealizeInstances")
+    group.links.new(entry.outputs[0], real.inputs[0])
+    group.links.new(real.outputs[0], end.inputs[0])
+    return group
+
+
+def _keeping(kept: list[str]) -> bpy.types.NodeTree:
+    group, entry, end = _group()
+    parts, join = group.nodes.new("GeometryNodeSeparateComponents"), group.nodes.new("GeometryNodeJoinGeometry")
+    group.links.new(entry.outputs[0], parts.inputs[0])
+    for output in [output for output in parts.outputs if output.name in kept]:
+        group.links.new(output, join.inputs[0])
+    group.links.new(join.outputs[0], end.inputs[0])
+    return group
+
+
+def _group() -> tuple[bpy.types.NodeTree, bpy.types.Node, bpy.types.Node]:
+    group = bpy.data.node_groups.new("srbf", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    return group, group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
