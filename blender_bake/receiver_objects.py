@@ -5,9 +5,12 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from blender_bake import as_rendered, beside
+from blender_bake import as_rendered, beside, elsewhere, soundness
 from blender_bake.channel import WorkerError
+
+SHEARED = 1e-5  # of an object's scale, that its matrix is off by where location, rotation and scale cannot hold it
 
 
 def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
@@ -28,7 +31,10 @@ def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
     found = {c.name: c for c in [scene.collection, *scene.collection.children_recursive]}
     if collection not in found:
         shown = ", ".join(repr(name) for name in sorted(found)[:12]) + (", …" if len(found) > 12 else "")
-        raise WorkerError(f"expected a collection {collection!r} in scene {scene.name!r}, found none; its collections are {shown}")
+        raise WorkerError(
+            f"expected a collection {collection!r} in scene {scene.name!r}, found none; its collections are {shown}"
+            f"{elsewhere.hint(scene, collection)}"
+        )
     hidden = {o.name for c in found.values() if c.hide_render for o in c.all_objects}
     in_layer = {o.name for o in bpy.context.view_layer.objects}
     names = [
@@ -61,11 +67,13 @@ def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.type
         obj.hide_viewport = obj.hide_render  # what is made real is what the viewport would show
     _show(empty)
     select([empty])
+    places = _places_of_instances(empty)
     before = set(scene.objects)
     if bpy.ops.object.duplicates_make_real() != {"FINISHED"}:
         raise WorkerError(f"Blender could not make the instances of {empty.name!r} real")
     made = sorted((obj for obj in scene.objects if obj not in before), key=lambda obj: obj.name)
     for obj in made:
+        _stand_exactly(obj, places)
         stem, _, number = obj.name.rpartition(".")
         obj.name = f"{empty.name}/{stem if number.isdecimal() and stem else obj.name}"
     meshes = [find_mesh_object(scene, obj.name) for obj in made if obj.type == "MESH" and not obj.hide_render]
@@ -74,13 +82,36 @@ def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.type
     return meshes
 
 
+def _places_of_instances(empty: bpy.types.Object) -> list[tuple[bpy.types.ID | None, Matrix]]:
+    """(data, place in the world) of everything that an empty's collection shows."""
+    return [
+        (one.object.original.data, one.matrix_world.copy())
+        for one in bpy.context.evaluated_depsgraph_get().object_instances
+        if one.is_instance and one.parent and one.parent.original == empty
+    ]
+
+
+def _stand_exactly(obj: bpy.types.Object, places: list[tuple[bpy.types.ID | None, Matrix]]) -> None:
+    """Put an object made real where its instance stood: Blender gives it a location, a rotation and a scale, which hold no shear."""
+    bpy.context.view_layer.update()
+    own = np.array(obj.matrix_world)
+    errors = [(float(np.abs(np.array(place) - own).max()), place) for data, place in places if data == obj.data]
+    if errors:
+        error, place = min(errors, key=lambda pair: pair[0])
+        if error > SHEARED * float(np.abs(own[:3, :3]).max()):
+            beside.stand(obj, place)
+
+
 def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The object `name` of the scene, made local and visible; WorkerError says what else there is."""
     obj = scene.objects.get(name)
     if obj is None:
         meshes = sorted(o.name for o in scene.objects if o.type == "MESH")
         shown = ", ".join(repr(n) for n in meshes[:12]) + (", …" if len(meshes) > 12 else "")
-        raise WorkerError(f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}")
+        raise WorkerError(
+            f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}"
+            f"{elsewhere.hint(scene, name)}"
+        )
     if obj.type != "MESH":
         raise WorkerError(
             f"expected a mesh object, found {name!r} of type {obj.type}; a curve or text: Object > Convert > Mesh, and save the .blend"
@@ -117,6 +148,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
     object, see `beside`. One that is nothing but instances of geometry nodes becomes their mesh.
     """
     scene = bpy.context.scene
+    soundness.require_finite(obj, obj.data)
     as_rendered.for_evaluation(obj, scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     more = beside.shows_more(obj, depsgraph)
@@ -125,6 +157,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
     mesh = real or mesh
     if not mesh.polygons:
         raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any; bake the objects that it scatters instead")
+    soundness.require_finite(obj, mesh, " after its modifiers")
     if more:
         return beside.set_apart(obj, mesh, instances_too=real is None)
     obj.modifiers.clear()

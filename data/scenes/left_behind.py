@@ -141,16 +141,22 @@ def particle_collection():
     source = aside("Ball")
     held = bpy.data.collections.new("Held")
     held.objects.link(source)
-    hair_system(
-        ground(), 40, render_type="COLLECTION", instance_collection=held, particle_size=1.0, use_advanced_hair=True, hair_length=1
-    )
+    hair_system(ground(), 40, render_type="COLLECTION", instance_collection=held, particle_size=1.0, use_advanced_hair=True, hair_length=1)
 
 
 def emitted():
     """Emitted particles at a later frame, shown as balls."""
     source = aside("Ball")
     hair_system(
-        ground(), 60, kind="EMITTER", render_type="OBJECT", instance_object=source, particle_size=1.0, frame_start=1, frame_end=5, lifetime=50
+        ground(),
+        60,
+        kind="EMITTER",
+        render_type="OBJECT",
+        instance_object=source,
+        particle_size=1.0,
+        frame_start=1,
+        frame_end=5,
+        lifetime=50,
     )
     bpy.context.scene.frame_set(1)
 
@@ -457,6 +463,75 @@ def shadow_catcher_occluder():
     ball("Ball").is_shadow_catcher = True
 
 
+def caught():
+    """The receiver itself a shadow catcher, under a ball."""
+    ground().is_shadow_catcher = True
+    ball("Ball")
+
+
+def held_out():
+    """The receiver itself a holdout."""
+    ground().is_holdout = True
+    ball("Ball")
+
+
+def collected(**settings):
+    """The receiver in a collection of its own, with settings of the view layer's."""
+    obj = ground()
+    ball("Ball")
+    held = bpy.data.collections.new("Held")
+    bpy.context.scene.collection.children.link(held)
+    bpy.context.scene.collection.objects.unlink(obj)
+    held.objects.link(obj)
+    for name, value in settings.items():
+        setattr(bpy.context.view_layer.layer_collection.children["Held"], name, value)
+
+
+def held_out_by_collection():
+    """The receiver in a collection that the view layer holds out."""
+    collected(holdout=True)
+
+
+def seen_indirectly():
+    """The receiver in a collection that is indirect only."""
+    collected(indirect_only=True)
+
+
+def held_out_by_material():
+    """A receiver whose material is a Holdout."""
+    obj = ground()
+    obj.data.materials[0] = material_of("ShaderNodeHoldout")
+    ball("Ball")
+
+
+def half_held_out():
+    """A receiver of two faces, one of them with a Holdout material."""
+    obj = ground()
+    obj.data.materials.append(material_of("ShaderNodeHoldout"))
+    bpy.context.view_layer.objects.active = obj
+    modifier = obj.modifiers.new("Divide", "SUBSURF")
+    modifier.subdivision_type = "SIMPLE"
+    bpy.ops.object.modifier_apply(modifier=modifier.name)
+    obj.data.polygons[0].material_index = 1
+
+
+def material_of(shader):
+    made = bpy.data.materials.new(shader)
+    made.use_nodes = True
+    made.node_tree.nodes.clear()
+    node = made.node_tree.nodes.new(shader)
+    made.node_tree.links.new(node.outputs[0], made.node_tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return made
+
+
+def unseen_by_rays():
+    """A receiver that no kind of ray sees, under a ball."""
+    obj = ground()
+    ball("Ball")
+    for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
+        setattr(obj, f"visible_{ray}", False)
+
+
 def grease_pencil():
     """Strokes, which Cycles does not see."""
     ground()
@@ -487,7 +562,7 @@ SCENES = {
 
 
 def own_bake(blend, name, out, directions):
-    """(suns, SIDE, SIDE, 3) irradiance of an object under each sun, and (SIDE, SIDE, 1) coverage behind them: Blender's bake of the file."""
+    """(suns, SIDE, SIDE, 3) irradiance of an object under each sun: Blender's own bake of the file as it is."""
     bpy.ops.wm.open_mainfile(filepath=blend)
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from surfaces import check_normals
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
@@ -50,6 +51,7 @@ class Baked:
         self.job = Bake(scene, folder, settings)
         self.job.run(Reporter(say=self.said.append))
         self.capture = Capture.open(folder)
+        check_normals(self.capture)
 
 
 @pytest.fixture
