@@ -51,7 +51,7 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     by which the tints of translucent materials are chosen, unless `tints` has them already. A job with `survey` gets what that asks for,
     one with `mesh` the scene's triangles and looks (see `scene_mesh`), and no light is baked.
     """
-    from blender_bake import emission, no_shadow, scene_file, scene_mesh, survey, translucency
+    from blender_bake import emission, no_shadow, scene_file, scene_mesh, survey, translucency, without_triangles
     from blender_bake import scene as scenes
     from blender_bake.frame import Frame
     from blender_bake.illuminant import Illuminant
@@ -108,6 +108,8 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
             seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
             (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+            if missed := without_triangles.line(scene):
+                channel.warn(missed)
             channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)
         switch = translucency.Switch(translucent, tints)
     channel.emit("ready")

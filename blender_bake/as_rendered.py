@@ -22,16 +22,17 @@ def settle(scene: bpy.types.Scene) -> None:
 
 def for_evaluation(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
     """The modifiers of `obj` as a render has them, and those of every object where `obj` may look at others."""
-    modifiers(obj)
+    settle_object(obj)
     if any(modifier.show_render and modifier.type not in ALONE for modifier in obj.modifiers):
         for other in scene.objects:
-            modifiers(other)
+            settle_object(other)
 
 
-def modifiers(obj: bpy.types.Object) -> None:
-    """Which modifiers of `obj` are on, and how finely they divide, as a render has it."""
+def settle_object(obj: bpy.types.Object) -> None:
+    """Which modifiers of `obj` are on, how finely they divide, and whether what scatters is itself seen, as a render has it."""
     if obj.library:
         return
+    obj.show_instancer_for_viewport = obj.show_instancer_for_render
     for modifier in obj.modifiers:
         modifier.show_viewport = modifier.show_render
         if modifier.type in {"SUBSURF", "MULTIRES"}:

@@ -11,6 +11,12 @@ from mathutils import Matrix
 
 BESIDE_A_MESH = ("Curve", "Point Cloud", "Volume", "Grease Pencil")  # of geometry nodes
 INSTANCES = "Instances"
+AUTHORED = "srbf name"  # property that holds the name that an object had in the file
+
+
+def authored_name(obj: bpy.types.Object) -> str:
+    """The name of `obj` as its author knows it."""
+    return str(obj.get(AUTHORED, obj.name))
 
 
 def shows_more(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -51,7 +57,7 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, instances_too: bool =
     receiver.instance_type = "NONE"
     for collection in obj.users_collection:
         collection.objects.link(receiver)
-    obj.name = f"{name} instance"
+    obj.name, obj[AUTHORED] = f"{name} instance", name
     receiver.name = name
     stand(receiver, place)
     kept = [*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]

@@ -31,7 +31,7 @@ class LightmapReceiver:
         wanted = job["receiver"]
         self._objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
         for obj in self._objects:
-            soundness.require_visible(obj)
+            soundness.require_visible(obj, channel)
         soundness.warn_of_occluders(scene, {obj.name for obj in self._objects}, channel)
         self._image = bpy.data.images.new("srbf bake", self._width, self._height, alpha=True, float_buffer=True)
         self._material_names = [[s.material.name if s.material else "(none)" for s in obj.material_slots] for obj in self._objects]

@@ -62,7 +62,12 @@ def leave_modes() -> None:
     for obj in [obj for obj in bpy.context.view_layer.objects if obj.mode != "OBJECT"]:
         if obj.mode != "OBJECT":  # another's leaving may have taken it along
             bpy.context.view_layer.objects.active = obj
-            bpy.ops.object.mode_set(mode="OBJECT")
+            try:
+                bpy.ops.object.mode_set(mode="OBJECT")
+            except RuntimeError as error:
+                raise WorkerError(
+                    f"expected {obj.name!r} in Object Mode, found it in {obj.mode}; leave that, and save the .blend"
+                ) from error
 
 
 def _chosen(name: str | None) -> bpy.types.Scene:

@@ -17,6 +17,7 @@ import numpy as np
 
 from blender_bake import as_rendered
 from blender_bake.translucency import Curve
+from blender_bake.without_triangles import is_only_volume
 
 SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # kinds of objects with faces
 Z_UP_TO_Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion x, y, z, w: -90 degrees about x
@@ -49,7 +50,7 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
         obj.hide_set(False)
     for obj in scene.objects:
         obj.hide_viewport = obj.hide_render
-        as_rendered.modifiers(obj)
+        as_rendered.settle_object(obj)
         if obj.type in {"CURVE", "SURFACE", "FONT"} and getattr(obj.data, "render_resolution_u", 0):
             obj.data.resolution_u = obj.data.render_resolution_u
 
@@ -123,6 +124,8 @@ def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh) -> Iterator[Pa
     for index in np.unique(found.materials):
         chosen = np.repeat(found.materials == index, 3)
         slot = slots[index].material if index < len(slots) else None
+        if slot is not None and is_only_volume(slot):
+            continue
         places, normals = found.places[chosen].astype("<f4"), found.normals[chosen].astype("<f4")
         yield Part(shown.name, slot.name if slot else None, casts, places, normals)
 

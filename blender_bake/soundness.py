@@ -11,6 +11,7 @@ import numpy as np
 from blender_bake.channel import Channel, WorkerError
 
 SHOWN = 6  # names in a warning
+LARGEST = 1e18  # of a coordinate, m
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
 
@@ -28,11 +29,13 @@ def require_finite(obj: bpy.types.Object, mesh: bpy.types.Mesh, after: str = "")
         )
 
 
-def require_visible(obj: bpy.types.Object) -> None:
-    """WorkerError that names the setting by which Cycles leaves a receiver black or empty."""
+def require_visible(obj: bpy.types.Object, channel: Channel) -> None:
+    """WorkerError that names the setting by which Cycles leaves a receiver black or empty; a line for parts of it that stay empty."""
     setting = hidden_by(obj)
     if setting is not None:
         raise WorkerError(f"expected a receiver that light can be read from, found that {obj.name!r} {setting}, and save the .blend")
+    if held := _held_out(obj):
+        channel.warn(f"what has material {held[0]!r} of {obj.name!r}, a Holdout, stays empty")
 
 
 def hidden_by(obj: bpy.types.Object) -> str | None:
@@ -46,14 +49,17 @@ def hidden_by(obj: bpy.types.Object) -> str | None:
             return f"is in collection {collection.name!r}, which the view layer holds out; switch its Holdout off in the outliner"
     if not any(getattr(obj, f"visible_{ray}") for ray in RAYS):
         return "is seen by no ray at all; switch something of Object > Visibility > Ray Visibility on"
-    held = [slot.material.name for slot in obj.material_slots if slot.material and is_holdout(slot.material)]
+    held = _held_out(obj)
     if held and len(held) == len(obj.material_slots):
         return f"has material {held[0]!r}, a Holdout, which shows nothing; give it another"
     return None
 
 
-def is_holdout(material: bpy.types.Material) -> bool:
-    """Whether a material's surface is a Holdout."""
+def _held_out(obj: bpy.types.Object) -> list[str]:
+    return [slot.material.name for slot in obj.material_slots if slot.material and _is_holdout(slot.material)]
+
+
+def _is_holdout(material: bpy.types.Material) -> bool:
     output = material.node_tree.get_output_node("CYCLES") if material.use_nodes and material.node_tree else None
     links = output.inputs["Surface"].links if output is not None else ()
     return bool(links) and links[0].from_node.bl_idname == "ShaderNodeHoldout"
@@ -72,7 +78,9 @@ def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], channel: Chan
             found.append(f"{obj.name!r} in its transform")
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        channel.warn(f"NaN or infinite coordinates, whose shadows and bounces are left to chance: {', '.join(found[:SHOWN])}{more}")
+        channel.warn(
+            f"NaN, infinite or immense coordinates, whose shadows and bounces are left to chance: {', '.join(found[:SHOWN])}{more}"
+        )
 
 
 def warn_of_hidden(scene: bpy.types.Scene, channel: Channel) -> None:
@@ -86,10 +94,10 @@ def warn_of_hidden(scene: bpy.types.Scene, channel: Channel) -> None:
 
 
 def spoiled_vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Indices of the vertices with a coordinate that is NaN or infinite."""
+    """Indices of the vertices with a coordinate that is NaN, infinite, or so large that single precision cannot square it."""
     points = np.empty(len(mesh.vertices) * 3, np.float32)
     mesh.vertices.foreach_get("co", points)
-    return np.nonzero(~np.isfinite(points.reshape(-1, 3)).all(axis=1))[0]
+    return np.nonzero(~(np.abs(points.reshape(-1, 3)) < LARGEST).all(axis=1))[0]
 
 
 def _leaves_no_picture(obj: bpy.types.Object) -> str | None:

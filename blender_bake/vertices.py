@@ -41,7 +41,7 @@ class VertexReceiver:
         if len(objects) > 1:
             raise WorkerError(f"expected one object's vertices, found {len(objects)} objects in {job['receiver']['object']!r}; name one")
         self._object = objects[0]
-        soundness.require_visible(self._object)
+        soundness.require_visible(self._object, channel)
         soundness.warn_of_occluders(scene, {self._object.name}, channel)
         precision.warn_of_objects(objects, len(self._object.data.vertices), "vertex's share", channel)
         mesh = self._object.data
