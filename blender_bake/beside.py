@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import bpy
 from mathutils import Matrix
@@ -19,19 +20,28 @@ def authored_name(obj: bpy.types.Object) -> str:
     return str(obj.get(AUTHORED, obj.name))
 
 
-def shows_more(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Whether modifiers of `obj` show more than its mesh."""
-    if any(modifier.type == "PARTICLE_SYSTEM" and modifier.show_render for modifier in obj.modifiers):
-        return True
-    if not any(modifier.type == "NODES" and modifier.show_render for modifier in obj.modifiers):
-        return False
-    for instance in depsgraph.object_instances:
-        if instance.is_instance:
-            if instance.parent and instance.parent.original == obj:
-                return True
-        elif instance.object.original == obj and instance.object.type != "MESH":
-            return True
-    return False
+@dataclass(frozen=True)
+class Beside:
+    """What an object shows beside its mesh: particles or instances, which Blender can show without it, and other kinds of geometry."""
+
+    scattered: bool
+    geometry: bool
+
+    def __bool__(self) -> bool:
+        return self.scattered or self.geometry
+
+
+def shown_by(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Beside:
+    """What the modifiers of `obj` show beside its mesh."""
+    scattered = any(modifier.type == "PARTICLE_SYSTEM" and modifier.show_render for modifier in obj.modifiers)
+    geometry = False
+    if any(modifier.type == "NODES" and modifier.show_render for modifier in obj.modifiers):
+        for instance in depsgraph.object_instances:
+            if instance.is_instance:
+                scattered |= instance.parent is not None and instance.parent.original == obj
+            else:
+                geometry |= instance.object.original == obj and instance.object.type != "MESH"
+    return Beside(scattered, geometry)
 
 
 def real_mesh(obj: bpy.types.Object) -> bpy.types.Mesh | None:
@@ -42,7 +52,7 @@ def real_mesh(obj: bpy.types.Object) -> bpy.types.Mesh | None:
     return mesh if mesh.polygons else None
 
 
-def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, instances_too: bool = True) -> bpy.types.Object:
+def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instances_too: bool = True) -> bpy.types.Object:
     """An object that has `mesh`, the place and the name of `obj`, which stays as "NAME instance" and shows all but its mesh.
 
     So hair, particles and what other objects take from it come from the object that its author made. Without `instances_too` those that
@@ -60,10 +70,9 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, instances_too: bool =
     obj.name, obj[AUTHORED] = f"{name} instance", name
     receiver.name = name
     stand(receiver, place)
-    kept = [*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]
-    if any(modifier.type == "NODES" for modifier in obj.modifiers):
-        _append(obj, _keeping(kept))
-    if obj.particle_systems or obj.instance_type in {"VERTS", "FACES"}:
+    if more.geometry or not instances_too:  # Blender shows either all of an object's own geometry or nothing of it
+        _append(obj, _keeping([*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]))
+    if not more.geometry:
         obj.show_instancer_for_render = obj.show_instancer_for_viewport = False
     return receiver
 

@@ -8,8 +8,9 @@ import numpy as np
 from mathutils import Matrix
 
 from blender_bake import as_rendered, beside, elsewhere, soundness
-from blender_bake.channel import WorkerError
+from blender_bake.channel import Channel, WorkerError
 
+NO_MESHES = {"CURVE", "SURFACE", "FONT", "META"}
 SHEARED = 1e-5  # of an object's scale, that its matrix is off by where location, rotation and scale cannot hold it
 
 
@@ -26,8 +27,11 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
     return [apply_modifiers(obj) for obj in objects]
 
 
-def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
-    """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none."""
+def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list[str]:
+    """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none.
+
+    What has faces and is no mesh is named: it casts shadows alone.
+    """
     found = {c.name: c for c in [scene.collection, *scene.collection.children_recursive]}
     if collection not in found:
         shown = ", ".join(repr(name) for name in sorted(found)[:12]) + (", …" if len(found) > 12 else "")
@@ -37,11 +41,11 @@ def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
         )
     hidden = {o.name for c in found.values() if c.hide_render for o in c.all_objects}
     in_layer = {o.name for o in bpy.context.view_layer.objects}
-    names = [
-        o.name
-        for o in found[collection].all_objects
-        if not o.hide_render and o.name not in hidden and o.name in in_layer and (o.type == "MESH" or _shows_collection(o))
-    ]
+    shown = [o for o in found[collection].all_objects if not o.hide_render and o.name not in hidden and o.name in in_layer]
+    names = [o.name for o in shown if o.type == "MESH" or _shows_collection(o)]
+    if others := sorted(repr(o.name) for o in shown if o.type in NO_MESHES):
+        listed = ", ".join(others[:12]) + (", …" if len(others) > 12 else "")
+        channel.warn(f"no receivers, since they are no meshes (Object > Convert > Mesh makes them some): {listed}")
     if not names:
         raise WorkerError(f"expected renderable meshes in collection {collection!r}, found none")
     return sorted(set(names))
@@ -151,7 +155,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
     soundness.require_finite(obj, obj.data)
     as_rendered.for_evaluation(obj, scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    more = beside.shows_more(obj, depsgraph)
+    more = beside.shown_by(obj, depsgraph)
     mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
     real = None if mesh.polygons or not more else beside.real_mesh(obj)
     mesh = real or mesh
@@ -159,7 +163,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
         raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any; bake the objects that it scatters instead")
     soundness.require_finite(obj, mesh, " after its modifiers")
     if more:
-        return beside.set_apart(obj, mesh, instances_too=real is None)
+        return beside.set_apart(obj, mesh, more, instances_too=real is None)
     obj.modifiers.clear()
     obj.data = mesh
     return obj

@@ -122,6 +122,8 @@ def configure(scene: bpy.types.Scene) -> None:
         "use_guiding": False,
         "use_animated_seed": False,
         "use_fast_gi": False,
+        "use_camera_cull": False,  # Simplify's: what is culled casts no shadows
+        "use_distance_cull": False,
         "sample_clamp_direct": 0.0,
         "sample_clamp_indirect": 0.0,
         "light_sampling_threshold": 0.0,

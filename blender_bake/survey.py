@@ -28,7 +28,7 @@ def answer(scene: bpy.types.Scene, job: dict[str, Any], channel: Channel, frame:
     asked = job["survey"]
     facts: dict[str, Any] = {}
     if asked.get("collections"):
-        facts["objects"] = list(dict.fromkeys(name for c in asked["collections"] for name in meshes_of(scene, c)))
+        facts["objects"] = list(dict.fromkeys(name for c in asked["collections"] for name in meshes_of(scene, c, channel)))
     if asked.get("vertices"):
         counts = [len(obj.data.vertices) for obj in prepare(scene, [job["receiver"]["object"]])]
         facts["width"], facts["height"] = vertices.image_size(sum(counts))

@@ -145,11 +145,11 @@ def particle_collection():
 
 
 def emitted():
-    """Emitted particles at a later frame, shown as balls."""
-    source = aside("Ball")
+    """Emitted particles, those of the first frame, shown as balls."""
+    source = aside("Ball", 0.3)
     hair_system(
         ground(),
-        60,
+        120,
         kind="EMITTER",
         render_type="OBJECT",
         instance_object=source,
@@ -326,6 +326,31 @@ def text_and_curve():
     spline.points.add(1)
     spline.points[0].co, spline.points[1].co = (-0.8, -0.5, 0.3, 1), (0.8, -0.5, 0.6, 1)
     bpy.context.scene.collection.objects.link(bpy.data.objects.new("Curve", data))
+
+
+def node_instances_and_follower():
+    """Instances scattered by the receiver, which another object reads: a lid that geometry nodes make of the receiver's own mesh."""
+    node_instances()
+    follower = quad("Follower", [(x, y, 5) for x, y, _ in SQUARE], color=(0, 0, 0))
+
+    def build(group, _geometry):
+        taken = node(group, "GeometryNodeObjectInfo", {"Object": bpy.data.objects["Ground"]}).outputs["Geometry"]
+        meshes = node(group, "GeometryNodeSeparateComponents", {"Geometry": taken}).outputs["Mesh"]
+        return node(group, "GeometryNodeTransform", {"Geometry": meshes, "Translation": (1.2, 0, 0.8)}).outputs[0]
+
+    geometry_nodes(follower, build)
+
+
+def culled():
+    """Simplify that culls what the camera does not see: a lid behind it."""
+    ground()
+    lid = quad("Lid", [(x, y, 1.5) for x, y, _ in SQUARE], color=(0, 0, 0), location=(0, 0.5, 0))
+    obj = camera(location=(0, 0, 1.4))
+    obj.rotation_euler = (0, 0, 0)
+    scene = bpy.context.scene
+    scene.render.use_simplify = True
+    scene.cycles.use_camera_cull = lid.cycles.use_camera_cull = True
+    scene.cycles.camera_cull_margin = 0.0
 
 
 def face_instances():

@@ -32,6 +32,7 @@ CARRIED = [
     "emitted",
     "node_instances",
     "nested_instances",
+    "node_instances_and_follower",
     "node_points",
     "node_volume",
     "node_curves_and_instances",
@@ -106,6 +107,12 @@ def test_a_receiver_of_nothing_but_instances_is_their_mesh(left, tmp_path: Path)
     near = np.linalg.norm(position[:, :2], axis=1) < 0.15
     noon = capture.image(0)[covered].mean(axis=1)
     assert noon[near].max() < 0.2 and noon[np.linalg.norm(position[:, :2], axis=1) > 0.3].min() > 0.95
+
+
+def test_what_simplify_would_cull_still_casts(left, tmp_path: Path) -> None:
+    """A lid of the square's size, 1.5 m up and 0.5 m aside, which the camera beneath it does not see, leaves a quarter of it lit at noon."""
+    capture = bake(left("culled"), tmp_path / "capture", samples=4).capture
+    assert capture.image(0).mean() == pytest.approx(0.25, abs=0.02)
 
 
 def test_a_render_only_screw_is_what_is_baked(left, tmp_path: Path) -> None:
