@@ -24,7 +24,14 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
         for obj in _named(scene, name):
             if obj not in objects:
                 objects.append(obj)
-    return [apply_modifiers(obj) for obj in objects]
+    ready = [apply_modifiers(obj) for obj in objects]
+    for obj in ready:
+        if world_area(obj) <= 0:
+            scale = ", ".join(f"{part:.3g}" for part in obj.matrix_world.to_scale())
+            raise WorkerError(
+                f"expected faces with an area on {obj.name!r}, found none at a scale of ({scale}); scale it up, and save the .blend"
+            )
+    return ready
 
 
 def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list[str]:

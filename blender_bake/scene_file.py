@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import as_rendered
+from blender_bake import as_rendered, world_normals
 from blender_bake.translucency import Curve
 from blender_bake.without_triangles import is_only_volume
 
@@ -114,8 +114,7 @@ def corners_of(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Corners:
     normals = np.empty(len(mesh.loops) * 3, np.float32)
     mesh.corner_normals.foreach_get("vector", normals)
     corners = points.reshape(-1, 3)[vertices[loops]] @ matrix[:3, :3].T + matrix[:3, 3]
-    turned = normals.reshape(-1, 3)[loops] @ np.linalg.pinv(matrix[:3, :3])
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
+    turned = world_normals.of_mesh(normals.reshape(-1, 3)[loops], matrix[:3, :3])
     return Corners(loops, corners, turned, materials)
 
 

@@ -107,6 +107,16 @@ def spoiled_by_modifier():
     obj.modifiers.new("Nodes", "NODES").node_group = group
 
 
+def scaled(*scale):
+    """The square at such a scale."""
+    quad("Plane").scale = scale
+
+
+def displaced():
+    """The square at a place that is no number."""
+    quad("Plane").location.x = float("nan")
+
+
 def far(distance):
     """The lidded square, and a camera over it, so many metres along x."""
     lidded()
@@ -165,6 +175,8 @@ SCENES = {
     "nan occluder": lambda: spoiled("Lid", float("nan")),
     "nan layer": spoiled_layer,
     "nan by modifier": spoiled_by_modifier,
+    "scaled away": lambda: scaled(1, 0, 0),
+    "nowhere": displaced,
     "near": lambda: far(1000.0),
     "far": lambda: far(5e6),
     "two scenes": two_scenes,

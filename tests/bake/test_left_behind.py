@@ -110,7 +110,7 @@ def test_a_receiver_of_nothing_but_instances_is_their_mesh(left, tmp_path: Path)
 
 
 def test_what_simplify_would_cull_still_casts(left, tmp_path: Path) -> None:
-    """A lid of the square's size, 1.5 m up and 0.5 m aside, which the camera beneath it does not see, leaves a quarter of it lit at noon."""
+    """A lid of the square's size, 1.5 m up and 0.5 m aside, which the camera does not see, leaves a quarter of it lit at noon."""
     capture = bake(left("culled"), tmp_path / "capture", samples=4).capture
     assert capture.image(0).mean() == pytest.approx(0.25, abs=0.02)
 
@@ -137,3 +137,11 @@ def test_what_hides_a_receiver_is_named(left, tmp_path: Path, name: str, words: 
         bake(left(name), tmp_path / "capture", f"{kind}:Ground", **({"width": 4, "height": 1} if kind == "vertices" else {}))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "capture" / "capture.json").exists()
+
+
+def test_equal_bakes_are_equal_to_the_bit(left, tmp_path: Path) -> None:
+    """With hair, particles and instances too: every worker sets them apart anew."""
+    for name in ("hair", "node_curves_and_instances"):
+        first, second = (bake(left(name), tmp_path / f"{name} {i}", samples=2).capture.folder for i in range(2))
+        for path in [*sorted(first.rglob("*.exr")), first / "capture.json"]:
+            assert path.read_bytes() == (second / path.relative_to(first)).read_bytes(), path.name

@@ -77,6 +77,8 @@ def test_any_mode_is_left_and_its_edits_kept(tmp_path: Path, mode: str, whose: s
         ("infinite receiver", "lightmap:Plane", None, r"'Plane', found \(1, inf, 0\) at vertex 2"),
         ("nan by modifier", "lightmap:Plane", None, r"'Plane' after its modifiers.*at vertex 0 and 3 more"),
         ("nan layer", "lightmap:Plane", "UV", "UV layer 'UV' of 'Plane'.*at vertex 1"),
+        ("scaled away", "lightmap:Plane", None, r"area on 'Plane', found none at a scale of \(1, 0, 0\)"),
+        ("nowhere", "lightmap:Plane", None, "place in the world for 'Plane'"),
         ("two scenes", "lightmap:Plane", None, "'Plane' is in scene 'Night shot': add --scene \"Night shot\""),
         ("two scenes", "view:Camera", None, "'Camera' is in scene 'Night shot'"),
     ],
