@@ -22,26 +22,22 @@ def authored_name(obj: bpy.types.Object) -> str:
 
 @dataclass(frozen=True)
 class Beside:
-    """What an object shows beside its mesh: particles or instances, which Blender can show without it, and other kinds of geometry."""
+    """What the modifiers of an object show beside its mesh: hair and particles, and what geometry nodes make."""
 
-    scattered: bool
-    geometry: bool
+    particles: bool
+    nodes: bool
 
     def __bool__(self) -> bool:
-        return self.scattered or self.geometry
+        return self.particles or self.nodes
 
 
 def shown_by(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Beside:
-    """What the modifiers of `obj` show beside its mesh."""
-    scattered = any(modifier.type == "PARTICLE_SYSTEM" and modifier.show_render for modifier in obj.modifiers)
-    geometry = False
-    if any(modifier.type == "NODES" and modifier.show_render for modifier in obj.modifiers):
-        for instance in depsgraph.object_instances:
-            if instance.is_instance:
-                scattered |= instance.parent is not None and instance.parent.original == obj
-            else:
-                geometry |= instance.object.original == obj and instance.object.type != "MESH"
-    return Beside(scattered, geometry)
+    """What `obj` shows; other kinds of geometry than its mesh are instances of their own to the depsgraph."""
+    kinds = {modifier.type for modifier in obj.modifiers if modifier.show_render}
+    nodes = "NODES" in kinds and any(
+        instance.is_instance and instance.parent and instance.parent.original == obj for instance in depsgraph.object_instances
+    )
+    return Beside("PARTICLE_SYSTEM" in kinds, nodes)
 
 
 def real_mesh(obj: bpy.types.Object) -> bpy.types.Mesh | None:
@@ -70,9 +66,10 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instanc
     obj.name, obj[AUTHORED] = f"{name} instance", name
     receiver.name = name
     stand(receiver, place)
-    if more.geometry or not instances_too:  # Blender shows either all of an object's own geometry or nothing of it
+    if more.nodes and (more.particles or not instances_too):
+        # Where there are particles, what nodes make would be hidden along with the mesh.
         _append(obj, _keeping([*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]))
-    if not more.geometry:
+    else:
         obj.show_instancer_for_render = obj.show_instancer_for_viewport = False
     return receiver
 

@@ -341,6 +341,18 @@ def node_instances_and_follower():
     geometry_nodes(follower, build)
 
 
+def hair_and_node_instances():
+    """Hair beside instances."""
+    node_instances()
+    hair_system(bpy.data.objects["Ground"], 200, 0.4)
+
+
+def hair_and_node_points():
+    """Hair beside a point cloud."""
+    node_points()
+    hair_system(bpy.data.objects["Ground"], 200, 0.4)
+
+
 def culled():
     """Simplify that culls what the camera does not see: a lid behind it."""
     ground()

@@ -33,6 +33,8 @@ CARRIED = [
     "node_instances",
     "nested_instances",
     "node_instances_and_follower",
+    "hair_and_node_instances",
+    "hair_and_node_points",
     "node_points",
     "node_volume",
     "node_curves_and_instances",
