@@ -12,6 +12,7 @@ from mathutils import Matrix
 
 BESIDE_A_MESH = ("Curve", "Point Cloud", "Volume", "Grease Pencil")  # of geometry nodes
 INSTANCES = "Instances"
+SHORT = 12  # characters of a name, which leave room for more in Blender's 63 bytes
 AUTHORED = "srbf name"  # property that holds the name that an object had in the file
 
 
@@ -63,7 +64,7 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instanc
     receiver.instance_type = "NONE"
     for collection in obj.users_collection:
         collection.objects.link(receiver)
-    obj.name, obj[AUTHORED] = f"{name} instance", name
+    obj.name, obj[AUTHORED] = f"{name[:SHORT]} instance", name  # another name than before, whatever Blender cuts off
     receiver.name = name
     stand(receiver, place)
     if more.nodes and (more.particles or not instances_too):
