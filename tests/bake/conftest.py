@@ -43,6 +43,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     return built("real_scenes.py", tmp_path_factory.mktemp("real"))
 
 
+LEANING = {"normal mapped"}  # scenes whose materials turn normals away from the surface, as their tests check
+
+
 class Baked:
     """A finished bake and what it told the user."""
 
@@ -51,7 +54,8 @@ class Baked:
         self.job = Bake(scene, folder, settings)
         self.job.run(Reporter(say=self.said.append))
         self.capture = Capture.open(folder)
-        check_normals(self.capture)
+        if scene.stem not in LEANING:
+            check_normals(self.capture)
 
 
 @pytest.fixture
