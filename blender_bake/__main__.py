@@ -44,29 +44,34 @@ def main() -> None:
 def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel) -> None:
     """Open the scene, prepare the receiver, hand over what `job` asks for, say that it is ready, then answer `lights` as they come.
 
-    job: scene, receiver {kind, object | objects, uv_layer, unwrap | camera}, no_shadow (names of objects), width, height, quantity,
-    keep_lamps, sun_angle, scratch, geometry (bool), ambient {samples, seed} or null; `serve` where lights are asked for on stdin,
-    after those in the job. A light: index, kind, direction | position, samples, seed, denoise (bool).
+    job: scene, scene_name (null: the active one), receiver {kind, object | objects, uv_layer, unwrap | camera}, no_shadow (names of
+    objects), width, height, quantity, keep_lamps, sun_angle, scratch, geometry (bool), ambient {samples, seed} or null; `serve` where
+    lights are asked for on stdin, after those in the job. A light: index, kind, direction | position, samples, seed, denoise (bool).
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
     by which the tints of translucent materials are chosen, unless `tints` has them already. A job with `survey` gets what that asks for,
     one with `mesh` the scene's triangles and looks (see `scene_mesh`), and no light is baked.
     """
-    from blender_bake import emission, no_shadow, scene_file, scene_mesh, survey, translucency
+    from blender_bake import emission, no_shadow, scene_file, scene_mesh, survey, translucency, without_triangles
     from blender_bake import scene as scenes
+    from blender_bake.frame import Frame
     from blender_bake.illuminant import Illuminant
     from blender_bake.lightmap import LightmapReceiver
     from blender_bake.vertices import VertexReceiver
     from blender_bake.view import ViewReceiver
 
     scratch = Path(job["scratch"])
-    scene = scenes.open_scene(job["scene"], channel)
+    scene = scenes.open_scene(job["scene"], channel, job.get("scene_name"))
+    frame = Frame.of(scene)
     scenes.configure(scene)
     if "survey" in job:
-        channel.emit("survey", **survey.answer(scene, job, channel))
+        channel.emit("survey", **survey.answer(scene, job, channel, frame))
         return
     if "mesh" in job:
         channel.emit("mesh", **scene_mesh.answer(scene, job))
         return
+    is_view = job["receiver"]["kind"] == "view"
+    for line in [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if is_view else ())]:
+        channel.warn(line)
     no_shadow.let_light_through(scene, job["no_shadow"])
     own_light = scenes.OwnLight(scene)
     kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
@@ -103,6 +108,8 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
             seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
             (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+            if missed := without_triangles.line(scene):
+                channel.warn(missed)
             channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)
         switch = translucency.Switch(translucent, tints)
     channel.emit("ready")

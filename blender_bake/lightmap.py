@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials, unwrap
+from blender_bake import materials, precision, soundness, unwrap, world_normals
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.receiver_objects import prepare, select
 from blender_bake.seam_edges import seam_edges
@@ -30,6 +30,9 @@ class LightmapReceiver:
         self._height, self._width = job["height"], job["width"]
         wanted = job["receiver"]
         self._objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
+        for obj in self._objects:
+            soundness.require_visible(obj, channel)
+        soundness.warn_of_occluders(scene, {obj.name for obj in self._objects}, channel)
         self._image = bpy.data.images.new("srbf bake", self._width, self._height, alpha=True, float_buffer=True)
         self._material_names = [[s.material.name if s.material else "(none)" for s in obj.material_slots] for obj in self._objects]
         for obj in self._objects:
@@ -45,6 +48,7 @@ class LightmapReceiver:
             self._take_texels(i, obj)
         self._coverage = self._albedo[:, :, 3:]
         self._check_overlap(self._made or wanted.get("uv_layer") is not None)
+        precision.warn_of_objects(self._objects, int((self._coverage > 0).sum()), "texel", channel)
         self._readable, self._albedo_read = self._coverage, self._albedo
         if self._irradiance:
             self._whiten_what_is_not_diffuse()
@@ -80,8 +84,7 @@ class LightmapReceiver:
         normal = np.empty_like(of_object)
         for i, obj in enumerate(self._objects):
             mine = self._owner == i
-            normal[mine] = of_object[mine] @ np.array(obj.matrix_world.to_3x3().inverted_safe(), np.float32)
-        normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-20)
+            normal[mine] = world_normals.of_bake(of_object[mine], obj)
         covered = self._coverage
         of_each = [seam_edges(obj.data, self._layers[obj.name], within_material=not self._irradiance) for obj in self._objects]
         seams = np.concatenate(of_each)

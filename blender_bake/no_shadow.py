@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bpy
 
+from blender_bake import elsewhere
 from blender_bake.channel import WorkerError
 
 
@@ -22,7 +23,10 @@ def let_light_through(scene: bpy.types.Scene, names: list[str]) -> None:
         if obj is None:
             shown = sorted(o.name for o in scene.objects if o.type in {"MESH", "EMPTY", "CURVE", "SURFACE", "FONT", "META"})
             listed = ", ".join(repr(n) for n in shown[:12]) + (", …" if len(shown) > 12 else "")
-            raise WorkerError(f"expected an object {name!r} for --no-shadow, found none in scene {scene.name!r}; there are {listed}")
+            raise WorkerError(
+                f"expected an object {name!r} for --no-shadow, found none in scene {scene.name!r}; there are {listed}"
+                f"{elsewhere.hint(scene, name)}"
+            )
         shows = obj.type == "EMPTY" and obj.instance_collection is not None
         for hidden in list(obj.instance_collection.all_objects) if shows else [obj]:
             hidden.visible_shadow = False

@@ -5,10 +5,13 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from blender_bake.channel import WorkerError
+from blender_bake import as_rendered, beside, elsewhere, soundness
+from blender_bake.channel import Channel, WorkerError
 
-RAYS = ("visible_camera", "visible_diffuse", "visible_glossy", "visible_transmission", "visible_volume_scatter", "visible_shadow")
+NO_MESHES = {"CURVE", "SURFACE", "FONT", "META"}
+SHEARED = 1e-5  # of an object's scale, that its matrix is off by where location, rotation and scale cannot hold it
 
 
 def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
@@ -21,24 +24,35 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
         for obj in _named(scene, name):
             if obj not in objects:
                 objects.append(obj)
-    for obj in objects:
-        apply_modifiers(obj)
-    return objects
+    ready = [apply_modifiers(obj) for obj in objects]
+    for obj in ready:
+        if world_area(obj) <= 0:
+            scale = ", ".join(f"{part:.3g}" for part in obj.matrix_world.to_scale())
+            raise WorkerError(
+                f"expected faces with an area on {obj.name!r}, found none at a scale of ({scale}); scale it up, and save the .blend"
+            )
+    return ready
 
 
-def meshes_of(scene: bpy.types.Scene, collection: str) -> list[str]:
-    """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none."""
+def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list[str]:
+    """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none.
+
+    What has faces and is no mesh is named: it casts shadows alone.
+    """
     found = {c.name: c for c in [scene.collection, *scene.collection.children_recursive]}
     if collection not in found:
         shown = ", ".join(repr(name) for name in sorted(found)[:12]) + (", …" if len(found) > 12 else "")
-        raise WorkerError(f"expected a collection {collection!r} in scene {scene.name!r}, found none; its collections are {shown}")
+        raise WorkerError(
+            f"expected a collection {collection!r} in scene {scene.name!r}, found none; its collections are {shown}"
+            f"{elsewhere.hint(scene, collection)}"
+        )
     hidden = {o.name for c in found.values() if c.hide_render for o in c.all_objects}
     in_layer = {o.name for o in bpy.context.view_layer.objects}
-    names = [
-        o.name
-        for o in found[collection].all_objects
-        if not o.hide_render and o.name not in hidden and o.name in in_layer and (o.type == "MESH" or _shows_collection(o))
-    ]
+    shown = [o for o in found[collection].all_objects if not o.hide_render and o.name not in hidden and o.name in in_layer]
+    names = [o.name for o in shown if o.type == "MESH" or _shows_collection(o)]
+    if others := sorted(repr(o.name) for o in shown if o.type in NO_MESHES):
+        listed = ", ".join(others[:12]) + (", …" if len(others) > 12 else "")
+        channel.warn(f"no receivers, since they are no meshes (Object > Convert > Mesh makes them some): {listed}")
     if not names:
         raise WorkerError(f"expected renderable meshes in collection {collection!r}, found none")
     return sorted(set(names))
@@ -64,11 +78,13 @@ def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.type
         obj.hide_viewport = obj.hide_render  # what is made real is what the viewport would show
     _show(empty)
     select([empty])
+    places = _places_of_instances(empty)
     before = set(scene.objects)
     if bpy.ops.object.duplicates_make_real() != {"FINISHED"}:
         raise WorkerError(f"Blender could not make the instances of {empty.name!r} real")
     made = sorted((obj for obj in scene.objects if obj not in before), key=lambda obj: obj.name)
     for obj in made:
+        _stand_exactly(obj, places)
         stem, _, number = obj.name.rpartition(".")
         obj.name = f"{empty.name}/{stem if number.isdecimal() and stem else obj.name}"
     meshes = [find_mesh_object(scene, obj.name) for obj in made if obj.type == "MESH" and not obj.hide_render]
@@ -77,13 +93,36 @@ def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.type
     return meshes
 
 
+def _places_of_instances(empty: bpy.types.Object) -> list[tuple[bpy.types.ID | None, Matrix]]:
+    """(data, place in the world) of everything that an empty's collection shows."""
+    return [
+        (one.object.original.data, one.matrix_world.copy())
+        for one in bpy.context.evaluated_depsgraph_get().object_instances
+        if one.is_instance and one.parent and one.parent.original == empty
+    ]
+
+
+def _stand_exactly(obj: bpy.types.Object, places: list[tuple[bpy.types.ID | None, Matrix]]) -> None:
+    """Put an object made real where its instance stood: Blender gives it a location, a rotation and a scale, which hold no shear."""
+    bpy.context.view_layer.update()
+    own = np.array(obj.matrix_world)
+    errors = [(float(np.abs(np.array(place) - own).max()), place) for data, place in places if data == obj.data]
+    if errors:
+        error, place = min(errors, key=lambda pair: pair[0])
+        if error > SHEARED * float(np.abs(own[:3, :3]).max()):
+            beside.stand(obj, place)
+
+
 def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The object `name` of the scene, made local and visible; WorkerError says what else there is."""
     obj = scene.objects.get(name)
     if obj is None:
         meshes = sorted(o.name for o in scene.objects if o.type == "MESH")
         shown = ", ".join(repr(n) for n in meshes[:12]) + (", …" if len(meshes) > 12 else "")
-        raise WorkerError(f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}")
+        raise WorkerError(
+            f"expected an object {name!r} in scene {scene.name!r}, found none; its meshes are {shown or 'none'}"
+            f"{elsewhere.hint(scene, name)}"
+        )
     if obj.type != "MESH":
         raise WorkerError(
             f"expected a mesh object, found {name!r} of type {obj.type}; a curve or text: Object > Convert > Mesh, and save the .blend"
@@ -113,39 +152,28 @@ def _show(obj: bpy.types.Object) -> None:
     obj.hide_set(False)
 
 
-def apply_modifiers(obj: bpy.types.Object) -> None:
-    """Put the evaluated mesh, at render settings, in place of the object's data: every bake would evaluate it again.
+def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
+    """The object with its evaluated mesh, at render settings, for its data: every bake would evaluate it again.
 
-    That mesh is the object's own, so objects that shared one each get their own texels.
+    That mesh is the object's own, so objects that shared one each get their own texels. What it shows beside its mesh stays on another
+    object, see `beside`. One that is nothing but instances of geometry nodes becomes their mesh.
     """
-    for modifier in obj.modifiers:
-        modifier.show_viewport = modifier.show_render
-        if modifier.type in {"SUBSURF", "MULTIRES"}:
-            modifier.levels = modifier.render_levels
+    scene = bpy.context.scene
+    soundness.require_finite(obj, obj.data)
+    as_rendered.for_evaluation(obj, scene)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    _realise_instances(obj, depsgraph)
+    more = beside.shown_by(obj, depsgraph)
     mesh = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph)
+    real = None if mesh.polygons or not more else beside.real_mesh(obj)
+    mesh = real or mesh
+    if not mesh.polygons:
+        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any; bake the objects that it scatters instead")
+    soundness.require_finite(obj, mesh, " after its modifiers")
+    if more:
+        return beside.set_apart(obj, mesh, more, instances_too=real is None)
     obj.modifiers.clear()
     obj.data = mesh
-    if not mesh.polygons:
-        raise WorkerError(f"expected faces to bake on {obj.name!r}, found a mesh without any")
-
-
-def _realise_instances(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Objects that the modifiers or particles of `obj` scatter stay as objects of their own when those are gone."""
-    meshes: dict[str, bpy.types.Mesh] = {}
-    for instance in depsgraph.object_instances:
-        source = instance.object
-        if not (instance.is_instance and instance.parent and instance.parent.original == obj and source.type == "MESH"):
-            continue
-        key = source.data.name_full
-        if key not in meshes:
-            meshes[key] = bpy.data.meshes.new_from_object(source, preserve_all_data_layers=True, depsgraph=depsgraph)
-        copy = bpy.data.objects.new(f"{obj.name} instance", meshes[key])
-        for ray in RAYS:
-            setattr(copy, ray, getattr(source, ray))
-        copy.matrix_world = instance.matrix_world.copy()
-        bpy.context.scene.collection.objects.link(copy)
+    return obj
 
 
 def select(objects: list[bpy.types.Object]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from blender_bake import hardening
+from blender_bake import as_rendered, hardening
 from blender_bake.channel import Channel, WorkerError, leave
 
 WORKING_SPACE = "Linear Rec.709"
@@ -18,8 +18,9 @@ def version() -> str:
     return ".".join(str(n) for n in bpy.app.version)
 
 
-def open_scene(path: str, channel: Channel) -> bpy.types.Scene:
-    """The .blend's active scene, disarmed (see `hardening`): nothing in it runs or writes; what is left out or missing is named."""
+def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.types.Scene:
+    """The .blend's scene `name`, else its active one, disarmed (see `hardening`): nothing in it runs or writes; what is left out or
+    missing is named, and no object is in another mode than Object Mode."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.filepaths.use_scripts_auto_execute = False
     said: list[str] = []
@@ -52,7 +53,41 @@ def open_scene(path: str, channel: Channel) -> bpy.types.Scene:
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
     if space != WORKING_SPACE:
         raise WorkerError(f"expected the working colour space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")
+    leave_modes()
+    return _chosen(name)
+
+
+def leave_modes() -> None:
+    """Object Mode for every object that was saved in another: in Edit Mode its data is the editor's, and operators refuse."""
+    for obj in [obj for obj in bpy.context.view_layer.objects if obj.mode != "OBJECT"]:
+        if obj.mode != "OBJECT":  # another's leaving may have taken it along
+            bpy.context.view_layer.objects.active = obj
+            try:
+                bpy.ops.object.mode_set(mode="OBJECT")
+            except RuntimeError as error:
+                raise WorkerError(
+                    f"expected {obj.name!r} in Object Mode, found it in {obj.mode}; leave that, and save the .blend"
+                ) from error
+
+
+def _chosen(name: str | None) -> bpy.types.Scene:
+    """The scene `name` made the active one; WorkerError names those there are."""
+    if name is not None:
+        if name not in bpy.data.scenes:
+            shown = ", ".join(repr(scene.name) for scene in bpy.data.scenes)
+            raise WorkerError(f"expected a scene {name!r}, found none; the .blend holds {shown}")
+        bpy.context.window.scene = bpy.data.scenes[name]
+        leave_modes()
     return bpy.context.scene
+
+
+def left_out(scene: bpy.types.Scene) -> list[str]:
+    """A line where the world holds a volume: it is black and empty while our light shines."""
+    world = scene.world
+    output = world.node_tree.get_output_node("CYCLES") if world is not None and world.use_nodes and world.node_tree else None
+    if output is not None and output.inputs["Volume"].links:
+        return [f"the volume of world {world.name!r} is left out of every light; fog in a box that is a mesh is followed"]
+    return []
 
 
 def missing_files() -> list[str]:
@@ -87,6 +122,8 @@ def configure(scene: bpy.types.Scene) -> None:
         "use_guiding": False,
         "use_animated_seed": False,
         "use_fast_gi": False,
+        "use_camera_cull": False,  # Simplify's: what is culled casts no shadows
+        "use_distance_cull": False,
         "sample_clamp_direct": 0.0,
         "sample_clamp_indirect": 0.0,
         "light_sampling_threshold": 0.0,
@@ -121,6 +158,7 @@ def configure(scene: bpy.types.Scene) -> None:
     render.use_overwrite = True
     render.use_file_extension = True
     render.threads_mode = "AUTO"
+    as_rendered.settle(scene)
     for layer in scene.view_layers:
         layer.samples = 0  # a layer's own count would win over ours
 

@@ -15,7 +15,9 @@ from typing import Any
 import bpy
 import numpy as np
 
+from blender_bake import as_rendered, world_normals
 from blender_bake.translucency import Curve
+from blender_bake.without_triangles import is_only_volume
 
 SOLID = {"MESH", "CURVE", "SURFACE", "FONT", "META"}  # kinds of objects with faces
 Z_UP_TO_Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion x, y, z, w: -90 degrees about x
@@ -48,10 +50,7 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
         obj.hide_set(False)
     for obj in scene.objects:
         obj.hide_viewport = obj.hide_render
-        for modifier in obj.modifiers:
-            modifier.show_viewport = modifier.show_render
-            if modifier.type in {"SUBSURF", "MULTIRES"}:
-                modifier.levels = modifier.render_levels
+        as_rendered.settle_object(obj)
         if obj.type in {"CURVE", "SURFACE", "FONT"} and getattr(obj.data, "render_resolution_u", 0):
             obj.data.resolution_u = obj.data.render_resolution_u
 
@@ -115,8 +114,7 @@ def corners_of(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Corners:
     normals = np.empty(len(mesh.loops) * 3, np.float32)
     mesh.corner_normals.foreach_get("vector", normals)
     corners = points.reshape(-1, 3)[vertices[loops]] @ matrix[:3, :3].T + matrix[:3, 3]
-    turned = normals.reshape(-1, 3)[loops] @ np.linalg.pinv(matrix[:3, :3])
-    turned /= np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
+    turned = world_normals.of_mesh(normals.reshape(-1, 3)[loops], matrix[:3, :3])
     return Corners(loops, corners, turned, materials)
 
 
@@ -125,6 +123,8 @@ def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh) -> Iterator[Pa
     for index in np.unique(found.materials):
         chosen = np.repeat(found.materials == index, 3)
         slot = slots[index].material if index < len(slots) else None
+        if slot is not None and is_only_volume(slot):
+            continue
         places, normals = found.places[chosen].astype("<f4"), found.normals[chosen].astype("<f4")
         yield Part(shown.name, slot.name if slot else None, casts, places, normals)
 

@@ -20,6 +20,7 @@ SMALLEST_AREA = 1e-6  # of the unit square: less is degenerate
 OVERLAP_LIMIT = 0.1  # of the layer's area: below, texel rounding at small charts explains it
 OVERLAP_GRID = 512
 NO_AREA = "has no area"
+NOT_NUMBERS = "holds NaN or infinite coordinates"
 GUTTER_TEXELS = 4
 LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be all gutter
 
@@ -108,6 +109,13 @@ def _require_layer(obj: bpy.types.Object, name: str) -> None:
         found = ", ".join(repr(layer.name) for layer in layers) or "none"
         raise WorkerError(f"expected a UV layer {name!r} on {obj.name!r}, found {found}")
     problem = misfit(obj.data, name)
+    if problem == NOT_NUMBERS:
+        bad = int(np.nonzero(~np.isfinite(layer_coordinates(obj.data, name)).all(axis=1))[0][0])
+        vertex = obj.data.loops[bad].vertex_index
+        raise WorkerError(
+            f"expected numbers in UV layer {name!r} of {obj.name!r}, found NaN or infinity at vertex {vertex} (face corner {bad}); "
+            "mend it, or name another layer"
+        )
     if problem == NO_AREA:
         raise WorkerError(f"expected UV layer {name!r} of {obj.name!r} to cover texels, found that it {problem}")
 
@@ -120,7 +128,7 @@ def misfit(mesh: bpy.types.Mesh, layer: str) -> str | None:
 def misfit_of(corners: np.ndarray) -> str | None:
     """Why UV triangles (n, 3, 2), of one mesh or of several together, cannot serve as a lightmap, or None."""
     if not np.isfinite(corners).all():
-        return "holds NaN or infinite coordinates"
+        return NOT_NUMBERS
     if float(corners.min()) < -RANGE_TOLERANCE or float(corners.max()) > 1 + RANGE_TOLERANCE:
         return f"leaves [0, 1] (from {corners.min():.3g} to {corners.max():.3g})"
     if float(np.abs(triangle_areas(corners)).sum()) < SMALLEST_AREA:

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials
+from blender_bake import materials, precision, soundness, world_normals
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.receiver_objects import prepare, select
 
@@ -41,6 +41,9 @@ class VertexReceiver:
         if len(objects) > 1:
             raise WorkerError(f"expected one object's vertices, found {len(objects)} objects in {job['receiver']['object']!r}; name one")
         self._object = objects[0]
+        soundness.require_visible(self._object, channel)
+        soundness.warn_of_occluders(scene, {self._object.name}, channel)
+        precision.warn_of_objects(objects, len(self._object.data.vertices), "vertex's share", channel)
         mesh = self._object.data
         self._count = len(mesh.vertices)
         self._width, self._height = job["width"], job["height"]
@@ -83,8 +86,7 @@ class VertexReceiver:
         mesh.vertices.foreach_get("co", points)
         mesh.vertex_normals.foreach_get("vector", normals)
         position = points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-        normal = normals.reshape(-1, 3) @ np.linalg.pinv(matrix[:3, :3])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+        normal = world_normals.of_mesh(normals.reshape(-1, 3), matrix[:3, :3])
         faced = np.bincount(self._corners, minlength=self._count) > 0
         lit = np.bincount(self._corners, self._readable, self._count) > 0
         coverage = self._image(faced[:, None])

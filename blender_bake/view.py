@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials
+from blender_bake import elsewhere, materials, precision, soundness
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
@@ -26,6 +26,7 @@ class ViewReceiver:
 
     def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
         self._scene = scene
+        self._channel = channel
         self._irradiance = job["quantity"] == "irradiance"
         self._file = Path(job["scratch"]) / "view.exr"
         self._camera = find_camera(scene, job["receiver"].get("camera"))
@@ -36,6 +37,8 @@ class ViewReceiver:
         self._guides: tuple[np.ndarray, np.ndarray] | None = None  # albedo and normal
         self._denoiser: Denoiser | None = None
         self._scratch = Path(job["scratch"])
+        soundness.warn_of_occluders(scene, set(), channel)
+        soundness.warn_of_hidden(scene, channel)
         self._prepare(job["width"], job["height"])
         if self._irradiance:
             self._whiten_if_nothing_is_diffuse(channel)
@@ -88,6 +91,7 @@ class ViewReceiver:
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
         self._guides = (albedo, normal * hit)
+        precision.warn_of_pixels(centre["Position"], hit, self._channel)
         return {
             "position": centre["Position"] * hit,
             "normal": normal * hit,
@@ -197,5 +201,7 @@ def find_camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
         return scene.camera
     camera = scene.objects.get(name)
     if camera is None or camera.type != "CAMERA":
-        raise WorkerError(f"expected a camera {name!r} in scene {scene.name!r}, found none; its cameras are {shown}")
+        raise WorkerError(
+            f"expected a camera {name!r} in scene {scene.name!r}, found none; its cameras are {shown}{elsewhere.hint(scene, name)}"
+        )
     return camera

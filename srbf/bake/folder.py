@@ -229,4 +229,5 @@ def _differences(recorded: dict[str, Any], asked: dict[str, Any]) -> list[str]:
     """Names of what differs between a recorded bake and this one; samples may: more are added, fewer are there."""
     changed = ["scene"] if recorded.get("scene_sha256") != asked["scene_sha256"] else []
     before, now = recorded.get("settings", {}), asked["settings"]
-    return changed + [name.replace("_", " ") for name in now if name != "samples" and before.get(name) != now[name]]
+    names = [*now, *(name for name in before if name not in now)]  # a choice that was not made again is another one too
+    return changed + [name.replace("_", " ") for name in names if name != "samples" and before.get(name) != now.get(name)]

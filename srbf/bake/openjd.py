@@ -76,6 +76,7 @@ def arguments(settings: BakeSettings) -> list[str]:
     """The flags of `srbf bake` that give these settings, to the bit; a light list is the job's parameter."""
     receiver, points = settings.receiver, settings.points
     named = {
+        "scene": settings.scene,
         "uv-layer": receiver.uv_layer,
         "unwrap": receiver.unwrap,
         "size": f"{settings.width}x{settings.height}",

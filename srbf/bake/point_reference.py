@@ -100,7 +100,8 @@ def _render(
     say: Callable[[str], None],
     blender: Path | None,
 ) -> list[np.ndarray]:
-    settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity)
+    chosen = asset.manifest["source"].get("settings", {}).get("scene")
+    settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
     lights = [
         {"index": i, "kind": "point", "position": lamp.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
         for i, lamp in enumerate(lamps)

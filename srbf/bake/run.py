@@ -428,6 +428,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
     """What every job tells the worker of scene and receiver."""
     return {
         "scene": str(scene.resolve()),
+        "scene_name": settings.scene,
         "receiver": settings.receiver.job(),
         "width": settings.width,
         "height": settings.height,

@@ -130,6 +130,7 @@ class BakeSettings:
     points: PointGrid | None = None  # lamps instead of directional lights
     no_shadow: tuple[str, ...] = ()  # objects that light passes
     denoise: bool = False  # of a view's train images
+    scene: str | None = None  # of the .blend's scenes; None: the active one
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -168,7 +169,7 @@ class BakeSettings:
         record = asdict(self)
         record["receiver"] = self.receiver.record()
         record["no_shadow"] = list(self.no_shadow)
-        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False)):
+        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None)):
             if record[name] == old:
                 del record[name]  # captures of before there was a choice stay what they were
         del record["points"]

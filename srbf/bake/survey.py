@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from srbf import files
+from srbf.bake.folder import STATE
 from srbf.bake.run import Bake, base_job
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
-from srbf.errors import BakeError, InputError
+from srbf.capture import MANIFEST
+from srbf.errors import BakeError, InputError, ManifestError
 
 MULTIPLE = 4  # of texels, that a side found by density is rounded up to: what block compression needs
 
@@ -65,6 +69,32 @@ def with_size(bake: Bake, texels_per_metre: float | None = None, say: Callable[[
         )
     say(f"{side}x{side} texels: {texels_per_metre:g} a metre on {facts['world_area']:.4g} square metres, UVs fill {facts['uv_area']:.0%}")
     return _sized(bake, side, side)
+
+
+def with_frame(bake: Bake, longer: int, anew: bool, say: Callable[[str], None] = lambda line: None) -> Bake:
+    """The same bake of a view in the shape of its camera's frame, in square pixels, `longer` on the longer side.
+
+    A capture that its folder holds already keeps its size, unless it is to be made `anew`.
+    """
+    before = None if anew else size_of_begun(bake.folder)
+    if before is not None:
+        return _sized(bake, *before)
+    found = survey(bake, {"frame": True}, say)["frame"]
+    aspect = float(found["aspect"])
+    width, height = (longer, max(1, round(longer / aspect))) if aspect >= 1 else (max(1, round(longer * aspect)), longer)
+    say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; --size WxH gives another")
+    return _sized(bake, width, height)
+
+
+def size_of_begun(folder: Path) -> tuple[int, int] | None:
+    """(width, height) of the capture in `folder`, finished or not; None where there is none to read."""
+    for name in (STATE, MANIFEST):
+        if (folder / name).is_file():
+            with suppress(ManifestError, KeyError, TypeError, ValueError):
+                recorded = files.read_json(folder / name)
+                settings = (recorded["source"] if name == MANIFEST else recorded)["settings"]
+                return int(settings["width"]), int(settings["height"])
+    return None
 
 
 def with_free_lamps(bake: Bake, say: Callable[[str], None] = lambda line: None) -> Bake:

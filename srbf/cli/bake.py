@@ -15,17 +15,21 @@ from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import objects_of, with_free_lamps, with_size
+from srbf.bake.survey import objects_of, with_frame, with_free_lamps, with_size
 from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
 from srbf.errors import InputError
 
+DEFAULT_SIZE = 256  # texels on the longer side
 UNLIMITED = 1 << 16  # samples a texel: more than any bake's time allows
 
 
 def bake(
     scene: Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)],
     output: Output,
+    scene_name: Annotated[
+        str | None, typer.Option("--scene", help="Which scene of the .blend; default: the one it was saved in.", show_default=False)
+    ] = None,
     receiver: Annotated[
         list[str] | None,
         typer.Option(
@@ -37,7 +41,12 @@ def bake(
         list[str] | None, typer.Option(help="Every renderable mesh of a collection into the atlas.", show_default=False)
     ] = None,
     separate: Annotated[bool, typer.Option("--separate", help="A lightmap each instead of one atlas, in OUTPUT/NAME.")] = False,
-    size: Annotated[str, typer.Option(help="Texels, N or WxH.")] = "256",
+    size: Annotated[
+        str | None,
+        typer.Option(
+            help="Texels, WxH, or N for NxN. Default: 256x256; of a view, 256 on the longer side of its camera's frame.", show_default=False
+        ),
+    ] = None,
     texels_per_metre: Annotated[
         float | None, typer.Option(help="Mean density of a lightmap, which decides its size.", show_default=False)
     ] = None,
@@ -114,7 +123,7 @@ def bake(
     restart: Annotated[bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin anew.")] = False,
 ) -> None:
     """Bake SCENE under many lights, one at a time, in passes. Stopped at any moment, the same command goes on."""
-    width, height = parse_size(size)
+    width, height = parse_size(size or str(DEFAULT_SIZE))
     angle = parse_sun_angle(sun_angle)
     named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
     if not (named or collection):
@@ -144,6 +153,7 @@ def bake(
             points=None if light_set is None else PointGrid.parse(light_set, light_box),
             no_shadow=tuple(no_shadow or ()),
             denoise=denoise,
+            scene=scene_name,
         )
         settings = settings.with_matched_sun() if angle == "auto" else settings
         return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_sums, dask)
@@ -160,6 +170,8 @@ def bake(
         note(f"a sun of {sun:.4g} rad ({degrees(sun):.1f} degrees), as far as the fitted lights stand apart")
     for job in jobs:
         job = with_size(job, texels_per_metre if job.settings.receiver.kind == "lightmap" or not several else None, note)
+        if size is None and job.settings.receiver.kind == "view":
+            job = with_frame(job, DEFAULT_SIZE, force or restart, note)
         job = with_free_lamps(job, note)
         _check_spread(job, part, farm, restart or force)
         if farm is not None:

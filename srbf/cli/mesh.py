@@ -19,12 +19,18 @@ def mesh(
     capture: Annotated[
         Path | None, typer.Option(help="Of a lightmap: its receivers get the lightmap's UVs and its albedo.", show_default=False)
     ] = None,
+    scene_name: Annotated[
+        str | None,
+        typer.Option(
+            "--scene", help="Which scene of the .blend; default: the capture's, else the one it was saved in.", show_default=False
+        ),
+    ] = None,
     blender: Blender = None,
     force: Force = False,
     json: Json = False,
 ) -> None:
     """Write all that renders of SCENE as one .glb: what lightmaps go onto, in its surroundings, for `--mesh`."""
-    made = write_scene_mesh(scene, output, capture, blender, force, note)
+    made = write_scene_mesh(scene, output, capture, blender, force, note, scene_name)
     if json:
         print_json(asdict(made))
         return

@@ -46,8 +46,10 @@ def write_scene_mesh(
     blender: Path | None = None,
     force: bool = False,
     say: Callable[[str], None] = lambda line: None,
+    scene_name: str | None = None,
 ) -> SceneMesh:
-    """Write the objects of a .blend that render as `output`, a .glb, whole or not at all.
+    """Write the objects of a .blend that render as `output`, a .glb, whole or not at all: of its scene `scene_name`, else of the one that
+    the capture was baked of, else of the active one.
 
     With a lightmap's `capture`, its receivers get TEXCOORD_1, and its albedo for a base colour. InputError on what cannot be used,
     BakeError where Blender fails or the scene is not the one of the capture, OutputExistsError where `output` may not be replaced.
@@ -59,10 +61,12 @@ def write_scene_mesh(
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found {'a folder' if scene.is_dir() else 'no such file'}")
     opened = None if capture is None else Capture.open(capture)
+    if scene_name is None and opened is not None:
+        scene_name = opened.manifest.get("source", {}).get("settings", {}).get("scene")
     receivers = [] if opened is None else lightmap_receivers(opened)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        told = _ask(scene, scratch, receivers, {} if opened is None else made_layers(opened, receivers), blender, say)
+        told = _ask(scene, scene_name, scratch, receivers, {} if opened is None else made_layers(opened, receivers), blender, say)
         made = _Writer(told, scratch, None if opened is None else opened.geometry("albedo"))
         data = made.document.pack()
     with files.atomic_path(output) as temporary:
@@ -98,6 +102,7 @@ def made_layers(capture: Capture, receivers: list[dict[str, Any]]) -> dict[str, 
 
 def _ask(
     scene: Path,
+    scene_name: str | None,
     scratch: Path,
     receivers: list[dict[str, Any]],
     made: dict[str, Float32[ndarray, "n 2"]],
@@ -112,7 +117,7 @@ def _ask(
             per_loop = f"uv_{i}.npy"
             np.save(scratch / per_loop, made[receiver["object"]])
         asked.append({"object": receiver["object"], "uv_layer": receiver["uv_layer"], "per_loop": per_loop})
-    job = {"scene": str(scene.resolve()), "scratch": str(scratch.resolve()), "mesh": {"receivers": asked}}
+    job = {"scene": str(scene.resolve()), "scene_name": scene_name, "scratch": str(scratch.resolve()), "mesh": {"receivers": asked}}
     told: dict[str, Any] | None = None
     with Worker(job, scratch, scratch / "mesh.log", blender) as worker:
         for event in worker.events(say):

@@ -256,6 +256,7 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
         "sun_angle": 0.1 + 0.2,
         "keep_lamps": True,
         "no_shadow": ("Roof",),
+        "scene": "Night shot",
         "quantity": "radiance",
     }
     flags = arguments(BakeSettings(Receiver("lightmap", "A b", "UV 2"), **settings))

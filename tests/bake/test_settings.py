@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from srbf.bake.folder import STATE
+from srbf.bake.openjd import arguments
+from srbf.bake.run import Bake, base_job
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
+from srbf.bake.survey import size_of_begun, with_frame
+from srbf.capture import MANIFEST
 from srbf.cli.parameters import parse_sun_angle
 from srbf.errors import InputError
 from srbf.sphere import point_set
@@ -62,7 +68,7 @@ def test_captures_of_one_bake_have_folders_of_their_own() -> None:
 def test_what_was_recorded_before_there_was_a_choice_stays() -> None:
     record = BakeSettings(Receiver("lightmap", "A")).record()
     assert record["receiver"] == {"kind": "lightmap", "name": "A", "uv_layer": None}
-    assert not {"no_shadow", "denoise", "transport"} & set(record)
+    assert not {"no_shadow", "denoise", "transport", "scene"} & set(record)
     chosen = BakeSettings(Receiver("lightmap", "A", also=("B",), unwrap="keep"), no_shadow=("C",)).record()
     assert chosen == json.loads(json.dumps(chosen))  # a bake that goes on compares it with what was written
     assert chosen["receiver"] == {"kind": "lightmap", "name": "A", "uv_layer": None, "also": ["B"], "unwrap": "keep"}
@@ -97,3 +103,26 @@ def test_what_only_some_receivers_can() -> None:
     for receiver, transport in ((Receiver("lightmap", "A"), "combined"), (Receiver("view"), "indirect")):
         with pytest.raises(InputError, match="--denoise is for views"):
             BakeSettings(receiver, transport=transport, denoise=True)
+
+
+def test_a_chosen_scene_is_recorded_and_goes_to_farms_and_workers(tmp_path: Path) -> None:
+    settings = BakeSettings(Receiver("lightmap", "A"), scene="Night shot")
+    assert settings.record()["scene"] == "Night shot"
+    assert "--scene=Night shot" in arguments(settings)
+    assert not [flag for flag in arguments(replace(settings, scene=None)) if flag.startswith("--scene")]
+    assert base_job(tmp_path / "a.blend", settings, tmp_path)["scene_name"] == "Night shot"
+
+
+def test_a_capture_that_is_begun_keeps_its_size(tmp_path: Path) -> None:
+    assert size_of_begun(tmp_path) is None
+    settings = BakeSettings(Receiver("view"), width=64, height=36).record()
+    (tmp_path / MANIFEST).write_text(json.dumps({"source": {"settings": settings}}))
+    assert size_of_begun(tmp_path) == (64, 36)
+    (tmp_path / STATE).write_text(json.dumps({"settings": settings | {"height": 64}}))
+    assert size_of_begun(tmp_path) == (64, 64)  # what is under way, not what it replaces
+    (tmp_path / STATE).write_text("{")
+    assert size_of_begun(tmp_path) == (64, 36)
+    job = Bake(tmp_path / "no.blend", tmp_path, BakeSettings(Receiver("view")))
+    assert with_frame(job, 256, anew=False).settings.height == 36  # no Blender is asked
+    with pytest.raises(InputError, match="expected a .blend"):
+        with_frame(job, 256, anew=True)
