@@ -33,6 +33,7 @@ class ViewReceiver:
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
         self._coverage: np.ndarray | None = None
+        self._diffuse: np.ndarray | None = None  # of the same samples: diffuse color times coverage
         self._last: dict[str, np.ndarray] = {}
         self._guides: tuple[np.ndarray, np.ndarray] | None = None  # albedo and normal
         self._denoiser: Denoiser | None = None
@@ -85,11 +86,11 @@ class ViewReceiver:
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
         centre = self._render(1, 0, ("Combined", "Position", "Normal"))
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
-        whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
+        self._measure_coverage()
         hit = (centre["Combined"][:, :, 3:] > 0).astype(np.float32)
-        coverage = self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1)
+        coverage = self._coverage
         normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
-        albedo = whole["Diffuse Color"][:, :, :3] / np.where(coverage > 0, coverage, 1)
+        albedo = self._diffuse / np.where(coverage > 0, coverage, 1)
         self._guides = (albedo, normal * hit)
         precision.warn_of_pixels(centre["Position"], hit, self._channel)
         return {
@@ -104,11 +105,11 @@ class ViewReceiver:
     def answer(self, samples: int, seed: int) -> np.ndarray:
         """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without colour).
 
-        The coverage is that of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
+        Coverage and color are of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
         """
         passes = self._last = self._render(samples, seed, LIGHT_PASSES)
         if self._irradiance:
-            return (passes["Diffuse Direct"] + passes["Diffuse Indirect"])[:, :, :3] * np.float32(math.pi)
+            return self._irradiance_of(passes["Diffuse Direct"] + passes["Diffuse Indirect"], passes)
         return self._over_coverage(passes["Combined"][:, :, :3])
 
     def denoised(self, image: np.ndarray) -> np.ndarray:
@@ -138,12 +139,29 @@ class ViewReceiver:
 
     def _direct_of(self, passes: dict[str, np.ndarray]) -> np.ndarray:
         if self._irradiance:
-            return passes["Diffuse Direct"][:, :, :3] * np.float32(math.pi)
+            return self._irradiance_of(passes["Diffuse Direct"], passes)
         return self._over_coverage((passes["Diffuse Direct"] * passes["Diffuse Color"])[:, :, :3])
 
-    def _over_coverage(self, image: np.ndarray) -> np.ndarray:
+    def _irradiance_of(self, light: np.ndarray, passes: dict[str, np.ndarray]) -> np.ndarray:
+        """E = pi x `light`, which Cycles has divided by the diffuse color of the same samples: 0 where all of them miss.
+
+        Where a pixel is covered in part, that color is multiplied back and the color of many samples divided by, so that the mean over
+        passes is right; elsewhere the ratio is kept, which has less noise on textures.
+        """
+        self._measure_coverage()
+        ratio = light[:, :, :3]
+        partial = (self._coverage < 1) & (self._diffuse > 0)
+        expected = ratio * passes["Diffuse Color"][:, :, :3] / np.where(partial, self._diffuse, 1)
+        return np.where(partial, expected, ratio) * np.float32(math.pi)
+
+    def _measure_coverage(self) -> None:
+        """Coverage and diffuse color by many samples, once."""
         if self._coverage is None:
-            self._coverage = np.clip(self._render(self._coverage_samples, 0, ("Combined",))["Combined"][:, :, 3:], 0, 1)
+            whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
+            self._coverage, self._diffuse = np.clip(whole["Combined"][:, :, 3:], 0, 1), whole["Diffuse Color"][:, :, :3]
+
+    def _over_coverage(self, image: np.ndarray) -> np.ndarray:
+        self._measure_coverage()
         seen = self._coverage > 0
         return np.where(seen, image / np.where(seen, self._coverage, 1), 0)
 

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from srbf import methods
+from srbf.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.asset import Asset
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
@@ -17,7 +18,7 @@ from srbf.direct.choice import Added, chosen
 from srbf.errors import InputError
 from srbf.files import atomic_folder, check_replaceable
 from srbf.gl.relighter import Relighter
-from srbf.image import write_image, write_picture
+from srbf.image import write_image
 from srbf.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
 from srbf.lights import Light
 from srbf.receivers import outside_domain
@@ -41,9 +42,19 @@ def relight(
     ] = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(help="Stops, for PNG.")] = 0.0,
+    alpha: Annotated[
+        Alpha,
+        typer.Option(
+            help="Of views that do not fill their picture. straight: RGB whole at edges; premultiplied: RGB times alpha, as compositors "
+            "expect of EXR; none: RGB alone, filled outside."
+        ),
+    ] = "straight",
     force: Force = False,
 ) -> None:
-    """Relight by any number of lights at once: max(0, their sum) + ambient. EXR is linear float, PNG is sRGB."""
+    """Relight by any number of lights at once: max(0, their sum) + ambient. EXR is linear float, PNG is sRGB.
+
+    A view with an empty background gets its coverage as a fourth channel, A, and 0 where nothing is seen; lightmaps stay RGB.
+    """
     if not abs(exposure) <= 100:
         raise InputError(f"expected an exposure within ±100 stops, found {exposure:g}")
     flags: list[Light] = [
@@ -57,6 +68,7 @@ def relight(
             raise InputError("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
         frames = read_frames(lights)
         opened = Asset.open(asset)
+        opacity = alpha_of(opened)
         with (
             Added(opened, chosen(opened, direct)) as added,
             atomic_folder(output, force, FRAMES_MARKER) as folder,
@@ -66,7 +78,7 @@ def relight(
                 for line in outside_domain(opened, frame):
                     note(f"frame {number}: {line}")
             for number, image in enumerate(_render(opened, frames, renderer, added)):
-                write_image(folder / f"{number:04d}.exr", image, "float")
+                write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
                 update(number + 1, len(frames))
             for line in added.notes([light for frame in frames for light in frame]):
                 note(line)
@@ -74,18 +86,22 @@ def relight(
         return
     if output.suffix.lower() not in (".exr", ".png"):
         raise InputError(f"expected an output named .exr or .png, found {output.name!r}")
+    picture = output.suffix.lower() == ".png"
+    if picture and alpha == "premultiplied":
+        raise InputError("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     check_image_output(output, force)
     opened = Asset.open(asset)
+    opacity = alpha_of(opened)
     for line in outside_domain(opened, flags):
         note(line)
     with Added(opened, chosen(opened, direct)) as added:
         (image,) = _render(opened, [flags], renderer, added)
         for line in added.notes(flags):
             note(line)
-    if output.suffix.lower() == ".png":
-        write_picture(output, image, exposure)
+    if picture:
+        write_png(output, image, None if alpha == "none" else opacity, exposure)
     else:
-        write_image(output, image, "float")
+        write_image(output, with_alpha(image, opacity, alpha), "float")
     note(f"wrote {output}")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from srbf.alpha import alpha_of, write_png
 from srbf.arrays import Float32
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
@@ -16,7 +17,6 @@ from srbf.export.glb import Document
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.texel_mesh import texel_mesh
 from srbf.files import atomic_path
-from srbf.image import write_picture
 from srbf.lights import EnvironmentLight
 from srbf.methods import relight
 
@@ -104,7 +104,7 @@ def _fallback(document: Document, asset: Asset) -> int:
     """The asset under a white sky as a texture of the document; its index."""
     with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
         path = Path(folder) / "lightmap.png"
-        write_picture(path, white_sky(asset))
+        write_png(path, white_sky(asset), alpha_of(asset))
         view = document.view(path.read_bytes())
     image = document.add("images", {"name": "lightmap", "mimeType": "image/png", "bufferView": view})
     sampler = document.add("samplers", {"magFilter": LINEAR_FILTER, "minFilter": LINEAR_FILTER, "wrapS": CLAMP, "wrapT": CLAMP})
@@ -128,7 +128,7 @@ def _light_up(document: Document, asset: Asset, picture: int, path: Path | None)
             attributes["TEXCOORD_1"] = uv
             before = primitive.get("material")
             if before not in made:
-                made[before] = document.add("materials", _material(document, before, picture))
+                made[before] = document.add("materials", _material(document, before, picture, alpha_of(asset) is not None))
             primitive["material"] = made[before]
             count = document.json["accessors"][primitive.get("indices", attributes["POSITION"])]["count"]
             lit += count // 3
@@ -148,14 +148,15 @@ def _receivers(document: Document, asset: Asset) -> set[int]:
     return named or set(range(len(document.json["meshes"])))
 
 
-def _material(document: Document, before: int | None, picture: int) -> dict[str, Any]:
-    """The lightmap unlit, in the colour of the material before where the map holds none, and the extension."""
+def _material(document: Document, before: int | None, picture: int, cut_out: bool) -> dict[str, Any]:
+    """The lightmap unlit, in the colour of the material before where the map holds none, and the extension; a view by its alpha."""
     old = document.json["materials"][before] if before is not None else {}
     base = old.get("pbrMetallicRoughness", {})
     factor = {"baseColorFactor": base["baseColorFactor"]} if "baseColorFactor" in base else {}
     return {
         "name": f"{old.get('name', 'receiver')}, relit",
         "doubleSided": old.get("doubleSided", True),
+        **({"alphaMode": "BLEND"} if cut_out else {}),
         "pbrMetallicRoughness": {
             **factor,
             "baseColorTexture": {"index": picture, "texCoord": UV_SET},

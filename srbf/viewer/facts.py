@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from srbf.alpha import receiver_kind
 from srbf.asset import Asset
 from srbf.quality import family_of, name_of
 from srbf.viewer.camera import fitted_camera
@@ -50,12 +51,6 @@ def names(assets: Sequence[Asset], folders: Sequence[Path]) -> list[str]:
     """What tells assets apart: their method and size, and the folder's name where two are alike."""
     told = [name_of(asset) if asset.method == "relighting-map" else f"{family_of(asset)}, {name_of(asset)}" for asset in assets]
     return [f"{folder.resolve().name}: {name}" if told.count(name) > 1 else name for folder, name in zip(folders, told, strict=True)]
-
-
-def receiver_kind(asset: Asset) -> str:
-    """`view`, `lightmap` or `vertices`, as the asset's source says; a picture of which nothing is known is a view."""
-    kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
-    return str(kind) if kind else "view"
 
 
 def receiver_name(asset: Asset) -> str:

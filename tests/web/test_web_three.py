@@ -85,6 +85,7 @@ def test_an_asset_adds_as_three_s_own_lightmap_does(browser: Any, served: dict, 
 def test_radiance_replaces_the_outgoing_light(browser: Any, make_asset: Callable[..., Asset], material: str) -> None:
     """A view: positions from the map, whatever the mesh is; uv with v upwards, as three's own geometries have it."""
     asset = complete(make_asset(k=5, encoding="half"), quantity="radiance", source={"receiver": {"kind": "view", "camera": "Camera"}})
+    asset.images["coverage"][:] = 1
     asset.manifest["maps"] = complete(asset).manifest["maps"]
     job = {"asset": browser.serve(asset), "lights": LIGHTS["several"], "material": material, "color": ALBEDO, "half": HALF_EXTENT}
     expected = relight(asset, LIGHTS["several"])

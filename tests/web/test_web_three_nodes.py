@@ -67,6 +67,7 @@ def test_nodes_follow_three_s_lights_in_place_of_its_diffuse_light(browser: Any,
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_radiance_replaces_what_a_node_material_shows(browser: Any, make_asset: Callable[..., Asset], backend: str) -> None:
     asset = complete(make_asset(k=5, encoding="half"), quantity="radiance", source={"receiver": {"kind": "view"}})
+    asset.images["coverage"][:] = 1
     job = {"lights": LIGHTS["several"], "material": "MeshBasicMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps"}
     shown = browser.picture("nodes-material", asset=browser.serve(asset), **job, backend=backend, apply={"uvOrigin": "bottom"})
     assert (np.abs(shown[::-1] - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()

@@ -57,13 +57,13 @@ FOLLOWED["several"] = ([light for row in FOLLOWED.values() for light in row[0]],
 
 
 def on_a_plane(asset: Asset) -> Asset:
-    """`asset` with its receivers evenly over a rectangle about the origin, row 0 at +y."""
+    """`asset` with its receivers evenly over a rectangle about the origin, row 0 at +y, all of it covered."""
     a, b, z = HALF_EXTENT
     position = np.empty((asset.height, asset.width, 3), np.float32)
     position[..., 0] = a * (2 * (np.arange(asset.width) + 0.5) / asset.width - 1)
     position[..., 1] = b * (1 - 2 * (np.arange(asset.height) + 0.5) / asset.height)[:, None]
     position[..., 2] = z
-    return replace(asset, images={**asset.images, "position": position})
+    return replace(asset, images={**asset.images, "position": position, "coverage": np.ones(position.shape[:2], np.float32)})
 
 
 def complete(asset: Asset, **manifest: Any) -> Asset:

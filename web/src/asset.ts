@@ -8,7 +8,7 @@ import { decodeKtx2 } from "./ktx2";
 import { checkStack, type LayerStack } from "./layers";
 import type { LightFunctions } from "./light_functions";
 import { unit } from "./lights";
-import { checkManifest, type LayerEntry, layersOf, type Manifest } from "./manifest";
+import { checkManifest, isPicture, type LayerEntry, layersOf, type Manifest } from "./manifest";
 import { IDENTITY, type Matrix4, type Triple } from "./matrix";
 import { decodePng } from "./png";
 
@@ -36,6 +36,8 @@ export interface Asset {
   /** World position of every receiver, metres, (H, W, 4). */
   readonly position?: FloatImage;
   readonly ambient?: FloatImage;
+  /** Of a view that does not fill its picture: the share of every texel that is there, (H, W). Layers hold colors that are not multiplied by it. */
+  readonly alpha?: FloatImage;
   readonly assetFromWorld: Matrix4;
 }
 
@@ -65,11 +67,12 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
   const manifest = checkManifest(json, place);
   const files = new AssetFiles(folder, fetcher, manifest, options.verify ?? false);
   const entries = layersOf(manifest);
-  const [layers, basis, position, ambient] = await Promise.all([
+  const [layers, basis, position, ambient, alpha] = await Promise.all([
     readLayers(files, manifest, entries),
     readBasis(files, manifest),
     readImage(files, manifest, manifest.position),
     readImage(files, manifest, manifest.ambient),
+    readAlpha(files, manifest),
   ]);
   return {
     manifest,
@@ -79,6 +82,7 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
     basis,
     position,
     ambient,
+    alpha,
     assetFromWorld: manifest.asset_from_world ?? IDENTITY,
   };
 }
@@ -145,6 +149,14 @@ async function readBasis(files: AssetFiles, manifest: Manifest): Promise<Basis> 
 
 async function readImage(files: AssetFiles, manifest: Manifest, name: string | undefined): Promise<FloatImage | undefined> {
   return name === undefined ? undefined : sized(decodeFloat(await files.bytes(name), name), manifest, name);
+}
+
+async function readAlpha(files: AssetFiles, manifest: Manifest): Promise<FloatImage | undefined> {
+  const image = isPicture(manifest) ? await readImage(files, manifest, manifest.coverage) : undefined;
+  if (!image) return undefined;
+  const { width, height, channels } = image;
+  const data = Float32Array.from({ length: width * height }, (_, i) => Math.min(1, Math.max(0, image.data[channels * i])));
+  return data.every((share) => share === 1) ? undefined : { kind: "float", width, height, channels: 1, data };
 }
 
 function sized<I extends { width: number; height: number }>(image: I, manifest: Manifest, where: string): I {

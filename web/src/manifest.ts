@@ -49,7 +49,13 @@ export interface Manifest {
   direct?: { sun_angle?: number; footprint?: number };
   asset_from_world?: Matrix4;
   sha256?: Record<string, string>;
-  source?: { receiver?: { kind?: string } };
+  source?: { receiver?: { kind?: string }; receivers?: { kind?: string }[] };
+}
+
+/** Whether the asset is a picture, a view or photographs, rather than a texture: `receiver_kind` of `srbf/alpha.py`. */
+export function isPicture(manifest: Manifest): boolean {
+  const { receiver, receivers } = manifest.source ?? {};
+  return ((receiver ?? receivers?.[0])?.kind ?? "view") === "view";
 }
 
 /** `value` as a manifest. @throws SrbfError that names the key which is not as the schema says. */

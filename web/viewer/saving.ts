@@ -2,10 +2,12 @@
 import { encode } from "fast-png";
 import { aim, type LightState, linearColor } from "./light_state";
 
+/** RGBA where anything is transparent, RGB otherwise. */
 export function savePng(name: string, image: { width: number; height: number; data: Uint8Array }): void {
-  const rgb = new Uint8Array((image.data.length / 4) * 3);
-  for (let i = 0, j = 0; i < image.data.length; i += 4, j += 3) rgb.set(image.data.subarray(i, i + 3), j);
-  handOut(name, new Blob([encode({ width: image.width, height: image.height, channels: 3, data: rgb }) as BlobPart], { type: "image/png" }));
+  const { width, height, data: rgba } = image;
+  const channels = rgba.some((byte, i) => i % 4 === 3 && byte < 255) ? 4 : 3;
+  const data = channels === 4 ? rgba : rgba.filter((_, i) => i % 4 !== 3);
+  handOut(name, new Blob([encode({ width, height, channels, data }) as BlobPart], { type: "image/png" }));
 }
 
 export function saveFrames(name: string, frames: readonly (readonly LightState[])[]): void {

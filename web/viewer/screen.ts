@@ -13,13 +13,15 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 ${ShaderChunk.tonemapping_pars_fragment}
 in vec2 vUv;
-uniform sampler2D relit, negative, reference, ambient;
+uniform sampler2D relit, negative, reference, ambient, coverage;
 uniform sampler2DArray layers;
 uniform vec4 layerScale, layerBias;
 uniform int layer, channel, value, colour;
 uniform vec3 referenceColour;
 uniform float split; // in pixels of the drawing buffer; left of it is the reference
 uniform bool nearest;
+uniform vec3 background; // linear, behind a view
+uniform bool cutOut; // the background is left transparent
 out vec4 shown;
 
 vec2 place(ivec2 size) {
@@ -28,6 +30,13 @@ vec2 place(ivec2 size) {
 
 vec3 relitAt() { return textureLod(relit, place(textureSize(relit, 0)), 0.0).rgb; }
 vec3 ambientAt() { return textureLod(ambient, place(textureSize(ambient, 0)), 0.0).rgb; }
+float coverageAt() {
+#ifdef DEVELOPED
+    return 1.0;
+#else
+    return textureLod(coverage, place(textureSize(coverage, 0)), 0.0).r;
+#endif
+}
 vec3 referenceAt() { return textureLod(reference, place(textureSize(reference, 0)), 0.0).rgb * referenceColour + ambientAt(); }
 
 vec3 valueAt() {
@@ -66,6 +75,10 @@ vec3 srgb(vec3 c) {
     return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, vec3(lessThanEqual(c, vec3(0.0031308))));
 }
 
+vec3 linear(vec3 c) {
+    return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, vec3(lessThanEqual(c, vec3(0.04045))));
+}
+
 void main() {
 #ifdef DEVELOPED
     vec3 v = textureLod(relit, vUv, 0.0).rgb;
@@ -84,7 +97,9 @@ void main() {
     else if (colour == ${COLOURS.agx}) c = srgb(AgXToneMapping(v));
     else if (colour == ${COLOURS.aces}) c = srgb(ACESFilmicToneMapping(v));
     else c = srgb(LinearToneMapping(v));
-    shown = vec4(c, 1.0);
+    float alpha = coverageAt();
+    if (cutOut) shown = vec4(alpha > 0.0 ? c : vec3(0.0), alpha);
+    else shown = vec4(alpha >= 1.0 ? c : srgb(mix(background, linear(c), alpha)), 1.0);
 }`;
 
 const MESH = `precision highp float;
@@ -116,12 +131,16 @@ void main() {
 
 export type ScreenUniforms = Record<string, IUniform> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
 
-export function screenUniforms(relit: Texture, textures: SrbfTextures): ScreenUniforms {
+/** `coverage`: of a view, how much of every texel is there; 1 everywhere else. */
+export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage: Texture): ScreenUniforms {
   return {
     relit: { value: relit },
     negative: { value: textures.ambient },
     reference: { value: textures.ambient },
     ambient: { value: textures.ambient },
+    coverage: { value: coverage },
+    background: { value: BACKGROUND },
+    cutOut: { value: false },
     layers: { value: textures.layers },
     layerScale: { value: new Vector4(1, 1, 1, 1) },
     layerBias: { value: new Vector4() },

@@ -140,7 +140,10 @@ export class Stage {
     this.uniforms.split.value /= this.renderer.getPixelRatio();
   }
 
-  /** The picture texel for texel, or the mesh as large as the screen has it; RGBA bytes, top row first, nothing drawn over it. */
+  /**
+   * The picture texel for texel, or the mesh as large as the screen has it; RGBA bytes, top row first, nothing drawn over it. A view has its coverage as
+   * alpha, straight, and no background.
+   */
   pixels(lights: readonly Light[]): { width: number; height: number; data: Uint8Array } {
     const buffer = this.renderer.getDrawingBufferSize(new Vector2());
     const { width, height } = this.hasMesh ? { width: buffer.x, height: buffer.y } : this.size;
@@ -154,8 +157,10 @@ export class Stage {
       this.uniforms.pictureOffset.value.set(0, 0);
       this.uniforms.nearest.value = true;
     }
+    this.uniforms.cutOut.value = !this.hasMesh;
     this.renderer.setClearColor(BACKGROUND_BYTES);
     this.render(lights, target, width, height);
+    this.uniforms.cutOut.value = false;
     this.renderer.setRenderTarget(target);
     const upward = new Uint8Array(4 * width * height);
     this.renderer.readRenderTargetPixels(target, 0, 0, width, height, upward);

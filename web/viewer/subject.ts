@@ -1,6 +1,7 @@
 /** The assets that the page can switch between, each relit once it is asked for; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
 import type { Asset, FloatImage, Light } from "../src";
+import { alphaTexture } from "../src/three/textures";
 import { DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
 import { lineOf, say } from "./messages";
@@ -12,6 +13,8 @@ export class Subject {
   readonly facts: AssetFacts;
   readonly asset: Asset;
   readonly coverage?: FloatImage;
+  /** What the picture is cut out by: a view's coverage; 1 everywhere of anything else. */
+  readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
   private readonly direct?: DirectLight;
 
@@ -21,6 +24,7 @@ export class Subject {
     this.coverage = loaded.coverage;
     const floats = renderer.extensions.has("OES_texture_float_linear") && renderer.extensions.has("EXT_color_buffer_float");
     this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear" });
+    this.alpha = this.relighting.textures.alpha ?? alphaTexture({ kind: "float", width: 1, height: 1, channels: 1, data: new Float32Array([1]) });
     if (!loaded.direct) return;
     try {
       this.direct = new DirectLight(loaded.asset, loaded.direct, renderer);

@@ -69,7 +69,7 @@ export class Viewer {
     this.subjects = subjects;
     this.subject = first;
     const { asset, coverage } = first;
-    this.uniforms = screenUniforms(first.lightmap, first.relighting.textures);
+    this.uniforms = screenUniforms(first.lightmap, first.relighting.textures, first.alpha);
     this.receivers = new Receivers(asset, coverage);
     this.copy = new Copy(asset.manifest.width, asset.manifest.height);
     this.inScene = model !== undefined && Surroundings.in(model);
@@ -152,6 +152,7 @@ export class Viewer {
         this.uniforms.relit.value = subject.lightmap;
         this.uniforms.layers.value = layers;
         this.uniforms.ambient.value = ambient;
+        this.uniforms.coverage.value = subject.alpha;
         this.state.map = Math.min(this.state.map, subject.planes - 1);
         this.sky.show(this.skyPoints());
         this.sky.errors = undefined;

@@ -108,7 +108,9 @@ vSrbfReceiver = (srbfAssetFromScene * worldPos).xyz;`,
       CUSTOM_FRAGMENT_DEFINITIONS: `varying vec2 vSrbfUv;
 varying vec3 vSrbfReceiver;
 ${receivers === "map" ? "uniform highp sampler2D srbfPositions;" : ""}
+${this.asset.alpha ? "uniform sampler2D srbfAlpha;" : ""}
 ${shaderBody(this.asset)}`,
+      ...(this.asset.alpha ? { CUSTOM_FRAGMENT_UPDATE_ALPHA: "alpha *= textureLod(srbfAlpha, vSrbfUv, 0.0).r;" } : {}),
       ...(this.asset.manifest.quantity === "irradiance"
         ? { CUSTOM_FRAGMENT_BEFORE_FINALCOLORCOMPOSITION: added }
         : { CUSTOM_FRAGMENT_BEFORE_FOG: `finalColor.rgb = ${light};` }),

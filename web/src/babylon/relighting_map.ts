@@ -1,5 +1,5 @@
 /** An asset in a Babylon.js scene: its textures, its lights, the materials that it lights. */
-import type { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";
+import { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";
 import type { Scene } from "@babylonjs/core/scene.js";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
@@ -55,6 +55,7 @@ export class SrbfRelightingMap {
     if (receivers === "map") needPositions(this.asset, 1);
     const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
     const chosen = { uv: options.uv ?? "uv2", uvOrigin: options.uvOrigin ?? "top", receivers, direct } as const;
+    if (this.asset.alpha) material.transparencyMode = PBRMaterial.PBRMATERIAL_ALPHABLEND;
     this.plugins.push(new SrbfPlugin(material, this.asset, this.textures, this.frame, chosen));
     return material;
   }

@@ -38,6 +38,10 @@ export class BabylonTextures {
       this.weights = plain(new Float32Array(4 * (basis.scalars + 1)), basis.scalars + 1, 1, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT);
       this.samplers.srbfWeights = this.weights;
     }
+    if (asset.alpha) {
+      const shares = Uint8Array.from(asset.alpha.data, (share) => Math.round(255 * share));
+      this.samplers.srbfAlpha = new RawTexture(shares, width, height, TEXTUREFORMAT_R, scene, false, false, Texture.BILINEAR_SAMPLINGMODE, TYPES.uint8);
+    }
     if (asset.position) {
       this.samplers.srbfPositions = plain(asset.position.data, width, height, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT);
     }

@@ -1,5 +1,5 @@
 /** An asset in a PlayCanvas scene: its textures, its lights, the materials that show it. */
-import { type GraphicsDevice, SEMANTIC_POSITION, SEMANTIC_TEXCOORD0, SEMANTIC_TEXCOORD1, ShaderMaterial } from "playcanvas";
+import { BLEND_NORMAL, type GraphicsDevice, SEMANTIC_POSITION, SEMANTIC_TEXCOORD0, SEMANTIC_TEXCOORD1, ShaderMaterial } from "playcanvas";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
 import { lampRoom, packedLamps } from "../lamp";
@@ -58,6 +58,7 @@ export class SrbfRelightingMap {
       options: { receivers, uvOrigin: options.uvOrigin ?? "top", channel: options.channel ?? 1 },
     };
     const { material } = shown;
+    if (this.asset.alpha) material.blendType = BLEND_NORMAL;
     for (const [name, texture] of Object.entries(this.textures.samplers)) material.setParameter(name, texture);
     material.setParameter("srbfAlbedo", [...(options.albedo ?? [1, 1, 1])]);
     material.setParameter("srbfScale[0]", this.asset.scale);
@@ -98,7 +99,7 @@ export class SrbfRelightingMap {
   private compile({ material, options }: Shown): void {
     const { manifest, layers } = this.asset;
     material.shaderDesc = {
-      uniqueName: `srbf ${manifest.method} ${manifest.quantity} ${layers.count} ${this.room} ${Object.values(options).join(" ")}`,
+      uniqueName: `srbf ${manifest.method} ${manifest.quantity} ${layers.count} ${this.asset.alpha !== undefined} ${this.room} ${Object.values(options).join(" ")}`,
       attributes: { aPosition: SEMANTIC_POSITION, aLightmapUv: options.channel === 0 ? SEMANTIC_TEXCOORD0 : SEMANTIC_TEXCOORD1 },
       vertexGLSL: vertexText(options),
       fragmentGLSL: fragmentText(this.asset, this.room, options),

@@ -5,6 +5,7 @@ import {
   FILTER_NEAREST,
   type GraphicsDevice,
   PIXELFORMAT_R32F,
+  PIXELFORMAT_R8,
   PIXELFORMAT_RGBA16F,
   PIXELFORMAT_RGBA32F,
   PIXELFORMAT_RGBA8,
@@ -54,6 +55,7 @@ export class PlayCanvasTextures {
       this.weights = of(new Float32Array(4 * (basis.scalars + 1)), basis.scalars + 1, 1, PIXELFORMAT_RGBA32F);
       this.samplers.srbfWeights = this.weights;
     }
+    if (asset.alpha) this.samplers.srbfAlpha = of(Uint8Array.from(asset.alpha.data, (share) => Math.round(255 * share)), width, height, PIXELFORMAT_R8, true);
     if (asset.position) this.samplers.srbfPositions = of(asset.position.data, width, height, PIXELFORMAT_RGBA32F);
   }
 

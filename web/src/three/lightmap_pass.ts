@@ -45,7 +45,7 @@ void main() {
     gl_Position = vec4(position.xy, 0.0, 1.0);
 }`;
 
-/** `srbfRelit` over every texel; row 0 of the target is the asset's top row. */
+/** `srbfRelit` over every texel, and a view's coverage as alpha, straight; row 0 of the target is the asset's top row. */
 export class LightmapPass {
   readonly target: WebGLRenderTarget;
   private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
@@ -104,6 +104,7 @@ export class LightmapPass {
     const { srbfPositions } = this.uniforms;
     const sum = this.added?.alone ? "vec3(0.0)" : "srbfSum(uv, 0.0, receiver)";
     const added = this.added ? " + texelFetch(srbfAdded, ivec2(gl_FragCoord.xy), 0).rgb" : "";
+    const alpha = this.uniforms.srbfAlpha ? "texelFetch(srbfAlpha, ivec2(gl_FragCoord.xy), 0).r" : "1.0";
     const receiver = srbfPositions ? "texelFetch(srbfPositions, ivec2(gl_FragCoord.xy), 0).xyz" : "vec3(0.0)";
     this.mesh.material = new RawShaderMaterial({
       glslVersion: GLSL3,
@@ -116,11 +117,12 @@ precision highp sampler2DArray;
 ${shaderText(this.asset, room)}
 ${srbfPositions ? "uniform highp sampler2D srbfPositions;" : ""}
 ${this.added ? "uniform highp sampler2D srbfAdded;" : ""}
+${this.uniforms.srbfAlpha ? "uniform sampler2D srbfAlpha;" : ""}
 out vec4 relit;
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(srbfLayers, 0).xy);
     vec3 receiver = ${receiver};
-    relit = vec4(srbfFinish(${sum}${added}, textureLod(srbfAmbient, uv, 0.0).rgb), 1.0);
+    relit = vec4(srbfFinish(${sum}${added}, textureLod(srbfAmbient, uv, 0.0).rgb), ${alpha});
 }`,
       blending: NoBlending,
       depthTest: false,

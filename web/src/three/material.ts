@@ -31,6 +31,8 @@ export interface Patch {
 
 const LIT = ["MeshStandardMaterial", "MeshPhysicalMaterial", "MeshLambertMaterial"];
 
+const CUT_OUT: [string, string] = ["#include <opaque_fragment>", "diffuseColor.a *= textureLod(srbfAlpha, vSrbfUv, 0.0).r;\n#include <opaque_fragment>"];
+
 /** @throws SrbfError on a material that is none of three's Standard, Physical, Lambert or Basic. */
 export function checkMaterial(material: Material): void {
   if (![...LIT, "MeshBasicMaterial"].includes(material.type)) {
@@ -41,7 +43,7 @@ export function checkMaterial(material: Material): void {
 /** What tells one patched program from another. */
 export function patchKey(patch: Patch): string {
   const { asset, source, room, options } = patch;
-  return ["srbf", asset.manifest.method, asset.manifest.quantity, asset.layers.count, source, room, ...Object.values(options)].join(" ");
+  return ["srbf", asset.manifest.method, asset.manifest.quantity, asset.layers.count, asset.alpha !== undefined, source, room, ...Object.values(options)].join(" ");
 }
 
 /** Irradiance adds to a material's as a lightMap does (outgoing = albedo * E / pi); radiance replaces its outgoing light. */
@@ -71,9 +73,11 @@ export function patchShader(shader: WebGLProgramParametersWithUniforms, material
   const declarations = ["varying vec2 vSrbfUv;", "varying vec3 vSrbfReceiver;"];
   declarations.push(source === "maps" ? shaderText(asset, patch.room) : "uniform sampler2D srbfLightmap;");
   if (source === "maps" && options.receivers === "map") declarations.push("uniform highp sampler2D srbfPositions;");
+  if (asset.alpha) declarations.push("uniform sampler2D srbfAlpha;");
   shader.fragmentShader = replaced(shader.fragmentShader, [
     ["#include <common>", `#include <common>\n${declarations.join("\n")}`],
     ...additions(asset, material, options, light),
+    ...(asset.alpha ? [CUT_OUT] : []),
   ]);
 }
 

@@ -72,7 +72,7 @@ export class SrbfRelightingMap extends SceneAsset {
     this.drawn = "";
   }
 
-  /** Light `material` by this asset. @throws SrbfError on a material of another kind than Standard, Physical, Lambert, Basic. */
+  /** Light `material` by this asset; a view that does not fill its picture makes it transparent. @throws SrbfError on a material of another kind than Standard, Physical, Lambert, Basic. */
   apply<M extends Material>(material: M, options: MaterialOptions = {}): M {
     checkMaterial(material);
     if (this.patched.has(material)) return material;
@@ -91,6 +91,7 @@ export class SrbfRelightingMap extends SceneAsset {
     };
     if (patch.options.receivers === "map") needPositions(this.asset, 1);
     this.patched.set(material, patch);
+    if (this.asset.alpha) material.transparent = true;
     const before = material.onBeforeCompile;
     const keyBefore = material.customProgramCacheKey;
     material.onBeforeCompile = (shader, renderer) => {

@@ -36,6 +36,8 @@ export class SrbfTextures {
   readonly weights?: DataTexture;
   readonly clusters?: DataTexture;
   readonly positions?: DataTexture;
+  /** Of a view that does not fill its picture. */
+  readonly alpha?: DataTexture;
 
   /** Layers and ambient are filtered as asked, compressed layers by their mip levels too; clustered ones must be `nearest`. */
   constructor(asset: Asset, filter: Filter) {
@@ -43,6 +45,7 @@ export class SrbfTextures {
     this.layers = layersTexture(asset, filter);
     this.ambient = ambientTexture(asset.ambient, filter);
     if (asset.position) this.positions = rgbaTexture(asset.position.data, asset.position.width, asset.position.height, FloatType);
+    if (asset.alpha) this.alpha = alphaTexture(asset.alpha);
     if (basis.kind === "gaussian") {
       this.table = plain(basis.table, basis.table.length, 1, RedFormat, FloatType);
       return;
@@ -54,7 +57,7 @@ export class SrbfTextures {
   }
 
   dispose(): void {
-    for (const texture of [this.layers, this.ambient, this.table, this.weights, this.clusters, this.positions]) texture?.dispose();
+    for (const texture of [this.layers, this.ambient, this.table, this.weights, this.clusters, this.positions, this.alpha]) texture?.dispose();
   }
 }
 
@@ -80,6 +83,12 @@ function ambientTexture(ambient: FloatImage | undefined, filter: Filter): DataTe
   if (filter === "nearest") return rgbaTexture(ambient.data, ambient.width, ambient.height, FloatType);
   const halves = Uint16Array.from(ambient.data, (value) => DataUtils.toHalfFloat(value)); // few GPUs of phones filter single floats
   return finished(rgbaTexture(halves, ambient.width, ambient.height, HalfFloatType), filter);
+}
+
+/** The share of every texel that is there, filtered: layers hold whole colors past its edge. */
+export function alphaTexture({ data, width, height }: FloatImage): DataTexture {
+  const halves = Uint16Array.from(data, (value) => DataUtils.toHalfFloat(value));
+  return finished(plain(halves, width, height, RedFormat, HalfFloatType), "linear");
 }
 
 function rgbaTexture(data: ArrayBufferView, width: number, height: number, type: TextureDataType): DataTexture {

@@ -19,6 +19,7 @@ export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
     srbfLampCount: { value: 0 },
     srbfAssetFromScene: { value: new Matrix4() },
   };
+  if (textures.alpha) uniforms.srbfAlpha = { value: textures.alpha };
   if (textures.positions) uniforms.srbfPositions = { value: textures.positions };
   if (asset.basis.kind === "gaussian") {
     uniforms.srbfWeights = { value: new Float32Array(4 * asset.layers.count) };

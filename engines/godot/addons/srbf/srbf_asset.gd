@@ -12,6 +12,8 @@ extends Resource
 @export var is_indirect: bool
 ## Whether the texels are the pixels of a fixed camera.
 @export var is_view: bool
+## A view, or photographs, rather than a texture: its coverage is the alpha of what is shown.
+@export var is_picture: bool
 @export_enum("sphere", "hemisphere") var domain := "sphere"
 @export var width: int
 @export var height: int
@@ -55,7 +57,10 @@ static func read(manifest_path: String) -> SrbfAsset:
 	asset.quantity = manifest.quantity
 	asset.domain = manifest.domain
 	asset.is_indirect = manifest.get("transport") == "indirect"
-	asset.is_view = manifest.get("source", {}).get("receiver", {}).get("kind") == "view"
+	var source: Dictionary = manifest.get("source", {})
+	var receiver: Dictionary = source.get("receiver", source.get("receivers", [{}])[0])
+	asset.is_view = receiver.get("kind") == "view"
+	asset.is_picture = receiver.get("kind", "view") == "view"
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))

@@ -187,6 +187,7 @@ func _material(type: String, file: String) -> ShaderMaterial:
 		"srbf_last_level": float(asset.levels - 1),
 		"srbf_positions": asset.texture("position"),
 		"srbf_ambient": asset.texture("ambient"),
+		"srbf_alpha": asset.texture("coverage") if asset.is_picture else null,
 	}
 	if asset.method == "relighting-map":
 		var centers := PackedVector4Array()

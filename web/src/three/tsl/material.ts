@@ -18,9 +18,13 @@ class ReplacingIrradianceNode extends LightingNode {
 }
 
 /** Irradiance adds as a lightMap does (outgoing = albedo * E / pi), radiance replaces the outgoing light. @throws SrbfError on unlit materials other than Basic. */
-export function applyLight(material: NodeMaterial, light: N, quantity: "irradiance" | "radiance", replaceDirect: boolean): void {
+export function applyLight(material: NodeMaterial, light: N, quantity: "irradiance" | "radiance", replaceDirect: boolean, alpha?: N): void {
+  if (alpha !== undefined) {
+    material.transparent = true;
+    material.opacityNode = alpha;
+  }
   if (quantity === "radiance") {
-    material.outputNode = vec4(light, 1);
+    material.outputNode = vec4(light, alpha ?? 1);
   } else if ((material as { isMeshBasicNodeMaterial?: boolean }).isMeshBasicNodeMaterial) {
     material.setupLightMap = () => new BasicLightMapNode(light) as N;
   } else if (material.lights) {

@@ -56,20 +56,24 @@ export class SrbfRelightingNodes extends SceneAsset {
 
   /** The asset's light on a mesh: irradiance or radiance, a vec3 node. */
   light(options: MaterialOptions = {}): N {
-    const channel = options.channel ?? 1;
-    const own = attribute(channel === 0 ? "uv" : `uv${channel}`, "vec2") as N;
-    const uv = options.uvOrigin === "bottom" ? vec2(own.x, own.y.oneMinus()) : own;
+    const uv = placeOf(options);
     if (this.target) return (texture(this.target.texture, uv) as N).rgb;
     const kind = this.asset.manifest.source?.receiver?.kind;
     const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
     return relit(this.inputs, uv, receivers === "map" ? this.mapped(uv) : this.inputs.assetFromScene.mul(vec4(positionWorld as N, 1)).xyz);
   }
 
-  /** Light a node material by this asset. @throws SrbfError on a material that takes no light. */
+  /** How much of a view is there, a float node; none where it fills its picture, and of a lightmap. */
+  alpha(options: MaterialOptions = {}): N | undefined {
+    const { alpha } = this.textures;
+    return alpha && (texture(alpha, placeOf(options)) as N).r;
+  }
+
+  /** Light a node material by this asset; a view that does not fill its picture makes it transparent. @throws SrbfError on a material that takes no light. */
   apply<M extends NodeMaterial>(material: M, options: MaterialOptions = {}): M {
     const { quantity, transport } = this.asset.manifest;
     const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
-    applyLight(material, this.light(options), quantity, direct === "asset");
+    applyLight(material, this.light(options), quantity, direct === "asset", this.alpha(options));
     return material;
   }
 
@@ -116,6 +120,12 @@ export class SrbfRelightingNodes extends SceneAsset {
     if (!positions) return vec4(0).xyz;
     return (textureLoad(positions, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).xyz;
   }
+}
+
+function placeOf(options: MaterialOptions): N {
+  const channel = options.channel ?? 1;
+  const own = attribute(channel === 0 ? "uv" : `uv${channel}`, "vec2") as N;
+  return options.uvOrigin === "bottom" ? vec2(own.x, own.y.oneMinus()) : own;
 }
 
 function reads(renderer: Renderer, encoding: "bc7" | "bc1"): boolean {
