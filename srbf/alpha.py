@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy import ndarray
@@ -18,7 +18,7 @@ Alpha = Literal["straight", "premultiplied", "none"]
 def receiver_kind(asset: Asset) -> str:
     """`view`, `lightmap` or `vertices`, as the asset's source says; a picture of which nothing is known is a view."""
     source = asset.manifest.get("source", {})
-    first = source.get("receiver") or next(iter(source.get("receivers", [])), {})
+    first: dict[str, Any] = source.get("receiver") or next(iter(source.get("receivers", [])), {})
     return str(first.get("kind") or "view")
 
 
