@@ -96,6 +96,12 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
+        cut = translucency.cut_outs(scene)
+        if cut:
+            channel.warn(
+                f"transparency that varies over the surface is held as one mean tint by the direct light of an indirect capture: "
+                f"{', '.join(repr(name) for name in cut)}; bake combined where such shadows matter"
+            )
         translucent = translucency.find(scene)
         tints = job.get("tints")
         if tints is None:
