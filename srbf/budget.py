@@ -119,7 +119,7 @@ def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
 def _reached(asset: Asset, capture: Capture, missed: Float64[ndarray, " L"] | None) -> float:
     """PSNR (dB) of a trial on the validation lights, or its estimate from the train lights."""
     if missed is None:
-        return float(evaluate(asset, capture, roles=("train", "validation"))["validation"]["psnr"])
+        return float(evaluate(asset, capture, roles=("validation",))["validation"]["psnr"])
     errors = evaluate(asset, capture, roles=("train",))
     squares = np.array([light["rmse"] ** 2 for light in errors["lights"]]) + missed
     return float(np.mean([psnr_of(errors["train"]["peak"], float(np.sqrt(square))) for square in squares]))

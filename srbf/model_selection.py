@@ -20,8 +20,11 @@ Rule = Literal["validation", "leave-one-light-out"]
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
 SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighbouring centers
 WIDEST = 1.0  # rad: past it the R table has a cusp
+USUAL_SPREAD, USUAL_RIDGE = 0.85, RIDGES[7]  # of the mean distance between neighboring centers; on the diagonal
 NARROWEST = 0.05  # rad
 SAMPLE_TEXELS = 1 << 13
+MARGIN = 3.0  # times the squared error of the best, geometric mean over lights, that the usual choice may have
+SURE = 2.0  # the margin is whole where there are fewer than so many lights to a function
 
 
 @dataclass(frozen=True)
@@ -77,18 +80,23 @@ def choose(
     candidates: Iterable[tuple[float, Float64[ndarray, "M K"]]],
     ridges: Sequence[float] = RIDGES,
     noise: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    usual: tuple[float, float] | None = None,
 ) -> Choice:
     """The candidate, (spread, basis functions at the sample's lights), and the ridge > 0 that predict best what they did not see.
 
+    The `usual` (spread, ridge), if it is among them, stays unless another has less than 1 / MARGIN of its squared error. The more lights
+    there are to a function, the surer is what they show, and the smaller the margin.
     Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation.HeldOut.score`).
     `noise(operator, weights)` adds a variance a light: what the maps' encoding loses.
     """
     held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
     middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
     train = sample.train
-    best: Choice | None = None
-    best_score = np.inf
+    best: tuple[float, Choice] | None = None
+    usual_one: tuple[float, Choice] | None = None
+    margin = 0.0
     for spread, weights in candidates:
+        margin = np.log(MARGIN) * min(1.0, SURE * weights.shape[1] / train) ** 2
         path = KernelPath(weights[:train] @ weights[:train].T)
         for ridge in ridges:
             single, banded = held_out.single(path, ridge), held_out.in_bands(path, ridge)
@@ -98,12 +106,14 @@ def choose(
                 single, banded = single + lost[:train], banded + lost[middles]
                 unseen = None if unseen is None else unseen + lost[train:]
             score = held_out.score(single, banded, unseen)
-            if score < best_score or best is None:
-                best_score = score
-                rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
-                best = Choice(spread, ridge, rule, float((single if unseen is None else unseen).mean()))
+            rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
+            scored = score, Choice(spread, ridge, rule, float((single if unseen is None else unseen).mean()))
+            if best is None or score < best[0]:
+                best = scored
+            if (spread, ridge) == usual:
+                usual_one = scored
     assert best is not None, "no spread or no ridge to choose from"
-    return best
+    return usual_one[1] if usual_one is not None and usual_one[0] < best[0] + margin else best[1]
 
 
 def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:

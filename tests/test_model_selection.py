@@ -144,3 +144,16 @@ def test_light_space_and_back(weighting: str) -> None:
     ones = np.concatenate([np.ones((1, planes.shape[1])), planes])
     np.testing.assert_allclose(np.einsum("fn,lfc->nlc", ones, space.functions(axes)), given.answers, atol=1e-4)
     assert (space.row_weights**2).mean() == pytest.approx(1, rel=1e-5)
+
+
+def test_the_usual_stays_unless_another_is_much_better() -> None:
+    given, centers = sample(0.5, False)
+    options = candidates(given, centers)
+    best = choose(given, options, RIDGES)
+    alike = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
+    kept = choose(given, options, RIDGES, usual=alike)
+    assert (kept.spread, kept.ridge) == alike and kept.error < 1.5 * best.error
+    assert choose(given, options, RIDGES, usual=(9.0, 9.0)) == best  # not among them
+    clean, centers = sample(1e-3, False)
+    sure = choose(clean, candidates(clean, centers), RIDGES)
+    assert choose(clean, candidates(clean, centers), RIDGES, usual=(SPREADS[0], RIDGES[2])) == sure

@@ -18,7 +18,7 @@ from srbf.dilation import dilate, nearest_covered
 from srbf.errors import InputError
 from srbf.image import Encoding
 from srbf.lights import Light, PointLight
-from srbf.model_selection import RIDGES, Choice, TexelSample, choose, spread_candidates
+from srbf.model_selection import RIDGES, USUAL_RIDGE, USUAL_SPREAD, Choice, TexelSample, choose, spread_candidates
 from srbf.parallel import each
 from srbf.quantization import layer_entries, metric, quantize, quantize_together, rounding_variance
 from srbf.receivers import (
@@ -161,9 +161,11 @@ class RelightingMap:
         if self.spread != "auto" and self.ridge != "auto":
             return GaussianBasis(centers, spread_of(centers, self.spread)), self.ridge, None
         sample = TexelSample.of(capture)
-        spreads = spread_candidates(spread_of(centers, "mean")) if self.spread == "auto" else [spread_of(centers, self.spread)]
+        mean = spread_of(centers, "mean")
+        spreads = spread_candidates(mean) if self.spread == "auto" else [spread_of(centers, self.spread)]
         candidates = ((spread, GaussianBasis(centers, spread).evaluate(sample.directions)) for spread in spreads)
-        choice = choose(sample, candidates, self._ridges(), self._rounding(sample))
+        usual = (min(spreads, key=lambda spread: abs(spread - USUAL_SPREAD * mean)), USUAL_RIDGE)
+        choice = choose(sample, candidates, self._ridges(), self._rounding(sample), usual)
         return GaussianBasis(centers, choice.spread), choice.ridge, choice
 
     def _ridges(self) -> list[float]:
