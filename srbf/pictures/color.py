@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32
+from srbf.errors import MissingLibraryError
 from srbf.image import decode_srgb
 from srbf.pictures.found import Model
 
@@ -55,7 +57,7 @@ def model_of(profile: bytes) -> Model | None:
 
 def by_profile(pixels: Float32[ndarray, "H W C"], profile: bytes) -> Float32[ndarray, "H W 3"]:
     """Values in [0, 1] of a profile's model to linear Rec.709, colors outside of it negative or above 1. ValueError on a bad profile."""
-    import imagecodecs
+    imagecodecs = _codecs()
 
     model = model_of(profile)
     values = np.ascontiguousarray(pixels[:, :, 0] if model == "gray" else pixels)
@@ -69,13 +71,13 @@ def by_profile(pixels: Float32[ndarray, "H W C"], profile: bytes) -> Float32[nda
 
 def from_lab(lab: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
     """CIE L*a*b* under D50, as TIFF has it, to linear Rec.709."""
-    import imagecodecs
+    imagecodecs = _codecs()
 
     return np.asarray(_converted(np.ascontiguousarray(lab), imagecodecs.cms_profile("lab4"), "lab"), np.float32)
 
 
 def _converted(values: ndarray, profile: bytes, space: str) -> ndarray:
-    import imagecodecs
+    imagecodecs = _codecs()
 
     converted: ndarray = imagecodecs.cms_transform(
         values, profile, _linear_rec709(), colorspace=space, outcolorspace="rgb", outdtype=np.float32, intent=RELATIVE
@@ -85,7 +87,7 @@ def _converted(values: ndarray, profile: bytes, space: str) -> ndarray:
 
 @lru_cache(maxsize=1)
 def _linear_rec709() -> bytes:
-    import imagecodecs
+    imagecodecs = _codecs()
 
     x = REC709
     primaries = (x[0], x[1], 1.0, x[2], x[3], 1.0, x[4], x[5], 1.0)
@@ -116,3 +118,11 @@ def name_of(profile: bytes) -> str:
     except (OSError, ImageCms.PyCMSError, ValueError):
         text = ""
     return " ".join(text.split())[:60] or "a space without a name"
+
+
+def _codecs() -> Any:
+    try:
+        import imagecodecs
+    except ImportError as error:
+        raise MissingLibraryError("converting colors by a profile, and packed TIFF, need imagecodecs: pip install imagecodecs") from error
+    return imagecodecs

@@ -55,8 +55,7 @@ def _exif_tags(exif: Any, profile: bytes | None) -> Tags:
     if profile:
         return Tags(profile=profile, orientation=orientation)
     details = exif.get_ifd(EXIF)
-    index = details.get(INTEROPERABILITY)
-    index = index.get(1) if isinstance(index, dict) else exif.get_ifd(INTEROPERABILITY).get(1)
+    index = exif.get_ifd(INTEROPERABILITY).get(1)
     adobe = details.get(COLOR_SPACE) == 2 or (details.get(COLOR_SPACE) == 0xFFFF and str(index).strip("\0") == "R03")
     if adobe:
         return Tags(gamma=563 / 256, chromaticities=ADOBE_RGB, space="Adobe RGB", orientation=orientation)

@@ -62,7 +62,8 @@ def layers_of(parts: list[Part]) -> list[Layer]:
                     colored.append(Layer(part, prefix, tuple(by_name[name] for name in names)))
                     break
             else:
-                gray += [Layer(part, prefix, (by_name[name.lower()],)) for name in GRAY if name.lower() in by_name][:1]
+                if not {"x", "z"} <= by_name.keys():  # there Y is a coordinate
+                    gray += [Layer(part, prefix, (by_name[name.lower()],)) for name in GRAY if name.lower() in by_name][:1]
     return colored or gray
 
 
