@@ -16,6 +16,7 @@ from srbf.pictures.found import Found, Tags, stripped
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ORIENTATION, EXIF, INTEROPERABILITY, COLOR_SPACE = 0x112, 0x8769, 0xA005, 0xA001
+SRGB_GAMMA = 2.2
 CICP_PRIMARIES = {1: ("Rec.709", REC709), 9: ("Rec.2020", REC2020), 12: ("Display P3", DISPLAY_P3)}
 CICP_CURVES = {8: 1.0, 4: 2.2, 5: 2.8, 13: None}  # None: sRGB's
 
@@ -91,6 +92,8 @@ def _png_tags(path: Path) -> Tags:
     if len(chromaticities) == 32:
         stored = [n / 1e5 for n in struct.unpack(">8I", chromaticities)]
         xy = (*stored[2:], *stored[:2])
+    if exponent is not None and abs(exponent - SRGB_GAMMA) < 0.01:  # the file means sRGB's curve, which this approximates
+        return Tags(chromaticities=xy, space="primaries of their own", orientation=orientation)
     return Tags(gamma=exponent, chromaticities=xy, orientation=orientation)
 
 

@@ -10,9 +10,10 @@ from srbf.errors import ImageError
 from srbf.image import Part, parts_of, read_channels
 from srbf.pictures.found import Found, Tags, stripped
 
-PICTURES = {"combined", "rgb", "rgba", "beauty", "color", "colour", "final", "main", "image"}
+PICTURES = {"combined", "rgb", "rgba", "beauty", "color", "colour", "final"}
+VIEWS = {"left", "right"}
 DATA = {"ao", "ambientocclusion", "ambient", "depth", "z", "mist", "normal", "normals", "n", "position", "p", "pos", "uv", "st", "vector"}
-DATA |= {"motion", "velocity", "indexob", "indexma", "id", "mask", "matte", "shadow", "denoising", "albedo", "debug", "variance"}
+DATA |= {"motion", "velocity", "indexob", "indexma", "id", "mask", "matte", "shadow", "denoising", "noisy", "albedo", "debug", "variance"}
 GRAY = ("Y", "L", "I", "gray", "grey", "luminance")
 
 
@@ -32,20 +33,20 @@ class Layer:
         return ".".join(word for word in (self.part.name, self.prefix) if word) or "R, G, B"
 
     @property
-    def words(self) -> set[str]:
-        """The words of its name, without digits at their end: `Crypto00` is crypto."""
-        return {re.sub(r"[\W\d]+$", "", word).lower() for word in re.split(r"[.\s:/]+", self.name)} - {""}
-
-    @property
     def is_picture(self) -> bool:
         """Named as the whole picture."""
-        return bool(self.words & PICTURES) and not self.is_data
+        return not self.is_data and any(words & PICTURES for words in self._words())
 
     @property
     def is_data(self) -> bool:
-        """Named as something that is no light."""
-        last = self.words
-        return bool(last & DATA) or any(word.startswith(("crypto", "denoising")) for word in last)
+        """Named, by its last part other than a view's, as something that is no light."""
+        words = ([words for words in self._words() if words and not words <= VIEWS] or [set()])[-1]
+        return bool(words & DATA) or any(word.startswith("crypto") for word in words)
+
+    def _words(self) -> list[set[str]]:
+        """The words of each part of its name, without digits at their end: `V.Crypto00` is v, crypto."""
+        names = re.split(r"[.:/]+", self.name)
+        return [{re.sub(r"[\W\d]+$", "", word).lower() for word in re.split(r"[\s_-]+", name)} - {""} for name in names]
 
 
 def layers_of(parts: list[Part]) -> list[Layer]:

@@ -13,7 +13,6 @@ from srbf.pictures.color import ALIKE, by_profile, character, from_lab, model_of
 from srbf.pictures.found import Found, Tags
 
 Transfer = Literal["srgb", "linear"]
-SRGB_GAMMA = 2.2  # what PNG files of sRGB give as theirs
 GAMMA_ALIKE = 0.01
 
 
@@ -65,7 +64,7 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
     if tags.srgb:
         return _decoded(pixels, transfer), []
     own_linear = tags.gamma is not None and abs(tags.gamma - 1) < GAMMA_ALIKE
-    own_curve = tags.curve is not None or (tags.gamma is not None and abs(tags.gamma - SRGB_GAMMA) > GAMMA_ALIKE)
+    own_curve = tags.curve is not None or tags.gamma is not None
     notes, matrix = [], None
     if tags.chromaticities is not None:
         try:
@@ -77,7 +76,7 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
     if matrix is None and not own_curve:
         return _decoded(pixels, transfer), notes
     space = tags.space or ("linear values" if own_linear else "a curve of their own" if own_curve else "primaries of their own")
-    if transfer == "linear" and not own_linear and (own_curve or tags.gamma is not None or tags.space):
+    if transfer == "linear" and not own_linear and (own_curve or tags.space):
         return pixels, [*notes, f"took the values of {{}} as linear by --transfer linear, and left their tags ({space}) aside"]
     if transfer == "srgb" and tags.curve is not None:
         levels = np.linspace(0, 1, len(tags.curve))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import struct
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from srbf.pictures.raw import read_raw
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what it warns of is checked here, or is of no account
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, INKS, YCBCR, CIELAB, ICCLAB = 0, 1, 2, 3, 5, 6, 8, 9
 RAW = (32803, 34892)  # a mosaic of a sensor; linear values in a camera's own space
+MOST_PIXELS = 2**30  # 12 GB as float32
 REDUCED, MASK = 1, 4  # bits of NewSubfileType
 ORIENTATION, TRANSFER_FUNCTION, WHITE_POINT, PRIMARIES, PROFILE = 274, 301, 318, 319, 34675
 
@@ -36,6 +38,8 @@ def read_tiff(path: Path) -> Found:
                 return read_raw(path)
             page = _largest(pages)
             size = path.stat().st_size
+            if len(page.dataoffsets) < math.prod(page.chunked) or page.imagewidth * page.imagelength > MOST_PIXELS:
+                raise ImageError(f"cannot read image {path}: {page.imagewidth}x{page.imagelength} pixels are not in it; is it damaged?")
             if any(at + count > size for at, count in zip(page.dataoffsets, page.databytecounts, strict=False)):
                 raise ImageError(f"cannot read image {path}: it is cut short, or damaged; copy it again")
             pixels, model = _meant(page, path)

@@ -77,8 +77,8 @@ def test_what_is_not_finite_is_named(tmp_path: Path, value: float) -> None:
 
 def test_a_wrong_suffix_is_no_matter(tmp_path: Path) -> None:
     for name, source in (("tiff.jpg", "a.tif"), ("jpeg.tif", "a.jpg"), ("exr.png", "a.exr"), ("png.jpg", "a.png")):
-        WHOLE[source](tmp_path / name)
         WHOLE[source](tmp_path / source)
+        (tmp_path / name).write_bytes((tmp_path / source).read_bytes())
         np.testing.assert_array_equal(read_picture(tmp_path / name, "linear").pixels, read_picture(tmp_path / source, "linear").pixels)
 
 
@@ -88,7 +88,7 @@ def test_damaged_bytes_never_end_otherwise(tmp_path: Path) -> None:
     for name, write in WHOLE.items():
         write(tmp_path / name)
         whole = np.frombuffer((tmp_path / name).read_bytes(), np.uint8)
-        for _ in range(25):
+        for _ in range(12):
             broken = whole.copy()
             at = rng.integers(8, min(len(broken), 600), 4)
             broken[at] = rng.integers(0, 256, 4)

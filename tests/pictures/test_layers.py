@@ -44,6 +44,12 @@ CASES: dict[str, list[dict[str, Any]]] = {
     "plain beside layers": [{"channels": rgb("", PICTURE) | layered("diffuse", "albedo")}],
     "layers in parts": [{"name": "V.AO", "channels": layered("V.AO")}, {"name": "V.Combined", "channels": layered("V.Combined")}],
     "another renderer": [{"channels": layered("AO", "beauty", "normal")}],
+    "Blender, a part a pass": [
+        {"name": f"ViewLayer.{name}", "channels": rgb("", PICTURE if name == "Combined" else OTHER)}
+        for name in ("Ambient Occlusion", "Combined", "Diffuse Direct", "Noisy Image", "Denoising Albedo")
+    ],
+    "a view layer that is called Shadow": [{"channels": layered("Shadow.AO", "Shadow.Combined", "Shadow.Emit")}],
+    "one eye": [{"channels": rgb("V.Combined.left.", PICTURE) | rgb("V.AO.left.", OTHER) | rgb("V.Emit.left.", OTHER)}],
     "one layer alone": [{"channels": rgb("left.", PICTURE)}],
     "alone in a part that is called depth": [{"name": "depth", "channels": rgb("", PICTURE)}],
     "one light layer beside data": [{"channels": rgb("render.", PICTURE) | layered("normal", "AO", "Position")}],
@@ -64,6 +70,7 @@ def test_the_picture_is_chosen_by_names(tmp_path: Path, case: str) -> None:
         ([{"channels": layered("A.Combined", "B.Combined")}], "A.Combined, B.Combined"),
         ([{"channels": layered("diffuse", "specular")}], "diffuse, specular"),
         ([{"channels": layered("V.AO")}], "V.AO"),
+        ([{"channels": rgb("V.Combined.left.", OTHER) | rgb("V.Combined.right.", OTHER)}], "V.Combined.left, V.Combined.right"),
         ([{"channels": layered("V.AO", "V.Albedo")}], "V.AO, V.Albedo"),
         ([{"name": "key", "channels": rgb("", OTHER)}, {"name": "fill", "channels": rgb("", OTHER)}], "key, fill"),
         ([{"channels": DEPTH}], "found Z"),

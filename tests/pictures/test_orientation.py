@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from picture_files import asymmetrical, encoded, exif, png
 
 from srbf.capture import Capture
 from srbf.importing import LightListImport
 from srbf.pictures import read_picture
-from picture_files import asymmetrical, encoded, exif, png
 
 SEEN = {  # what is to be seen, of what is stored [EXIF 2.32, tag 274: where row 0 and column 0 are]
     1: lambda a: a,
