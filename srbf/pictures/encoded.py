@@ -35,7 +35,7 @@ def read_jpeg(path: Path) -> Found:
     if mode == "CMYK":
         return Found(stored, "cmyk", 8, tags)
     pixels, model = stripped(stored)
-    return Found(pixels, model, 8, tags)
+    return Found(pixels, model, 8, tags, levels=255)
 
 
 def read_other(path: Path) -> Found:
@@ -46,7 +46,8 @@ def read_other(path: Path) -> Found:
     with path.open("rb") as file:
         is_png = file.read(8) == PNG
     tags = _png_tags(path) if is_png else Tags(profile=part.profile, orientation=part.orientation)
-    return Found(pixels, model, part.bits, tags, (f"took the first of the {len(parts)} images of {{}}",) if len(parts) > 1 else ())
+    notes = (f"took the first of the {len(parts)} images of {{}}",) if len(parts) > 1 else ()
+    return Found(pixels, model, part.bits, tags, notes, 2**part.bits - 1 if is_png else 0)
 
 
 def _exif_tags(exif: Any, profile: bytes | None) -> Tags:

@@ -37,13 +37,17 @@ class Tags:
 
 @dataclass(frozen=True)
 class Found:
-    """Pixels as stored, without alpha: (H, W, 1, 3 or 4), integers over their maximum; inks of CMYK 1 where full; L*, a*, b* of Lab."""
+    """Pixels as stored, without alpha: (H, W, 1, 3 or 4), integers over their maximum; inks of CMYK 1 where full; L*, a*, b* of Lab.
+
+    levels: what integers were divided by, 0 for floats.
+    """
 
     pixels: Float32[ndarray, "H W C"]
     model: Model
     bits: int
     tags: Tags
     notes: tuple[str, ...] = ()
+    levels: int = 0
 
 
 def stripped(pixels: ndarray) -> tuple[Float32[ndarray, "H W C"], Model]:

@@ -55,7 +55,7 @@ def _by_profile(found: Found, profile: bytes, transfer: Transfer) -> tuple[Float
             return None, []
         if transfer == "linear" and not is_linear and model != "cmyk":
             return None, [f"took the values of {{}} as linear by --transfer linear, and left their profile ({name}) aside"]
-        return by_profile(pixels, profile), [f"converted {{}} from {name} to linear Rec.709 by their profile"]
+        return by_profile(pixels, profile, found.levels), [f"converted {{}} from {name} to linear Rec.709 by their profile"]
     except ValueError:
         return None, [f"could not read the color profile of {{}}; took their values by --transfer {transfer}"]
 

@@ -45,7 +45,9 @@ def read_tiff(path: Path) -> Found:
             pixels, model = _meant(page, path)
             tags = _tags(page, pages[0], page.photometric)
             notes = (f"took the largest of the {len(pages)} pages of {{}}",) if len(pages) > 1 else ()
-            return Found(pixels, model, 8 if page.bitspersample <= 8 else 16 if page.bitspersample <= 16 else 32, tags, notes)
+            bits = 8 if page.bitspersample <= 8 else 16 if page.bitspersample <= 16 else 32
+            whole = page.dtype is not None and page.dtype.kind == "u" and page.bitspersample in (8, 16) and page.photometric != PALETTE
+            return Found(pixels, model, bits, tags, notes, 2**bits - 1 if whole else 0)
     except (tifffile.TiffFileError, RuntimeError, ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error) as error:
         raise ImageError(f"cannot read image {path}: {' '.join(str(error).split())[:120]}; is it damaged or cut short?") from error
 

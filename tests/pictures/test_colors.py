@@ -25,6 +25,7 @@ from PIL import Image
 from srbf.image import decode_srgb, encode_srgb
 from srbf.importing import LightListImport
 from srbf.pictures import read_picture
+from srbf.pictures.color import by_profile
 
 STEP = 1.5 / 255  # of what is shown: half a step of the stored bytes and a step of Little CMS's tables
 COLORS = np.random.default_rng(7).integers(0, 256, (12, 9, 3), dtype=np.uint8)
@@ -238,3 +239,13 @@ def test_a_set_says_each_kind_once(tmp_path: Path) -> None:
     said: list[str] = []
     LightListImport(tmp_path / "l.lp", "srgb").write(tmp_path / "capture", say=said.append)
     assert len(said) == 1 and said[0].startswith("converted 5 images from")
+
+
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("model", ["rgb", "gray"])
+def test_large_pictures_go_by_tables_to_the_same_values(bits: int, model: str) -> None:
+    levels = 2**bits - 1
+    shape = (400, 500, 3) if model == "rgb" else (800, 700, 1)
+    values = (np.random.default_rng(1).integers(0, levels + 1, shape) / levels).astype(np.float32)
+    icc = profile(DISPLAY_P3, 1.9, model)
+    np.testing.assert_allclose(by_profile(values, icc, levels), by_profile(values, icc), atol=3e-4)
