@@ -16,7 +16,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-LEFT_OUT = ("numpy", "scikit-learn")
+LEFT_OUT = ("numpy", "scikit-learn", "imagecodecs")  # the last: 25 MB for profiles and packed TIFF, which `srbf import` asks for by name
 # Of each platform of Blender's the tags of wheels that its builds can load.
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],

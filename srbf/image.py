@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -101,6 +102,80 @@ def size_of(path: Path) -> tuple[int, int]:
     spec = source.spec()
     source.close()
     return spec.height, spec.width
+
+
+@dataclass(frozen=True)
+class Part:
+    """One image of a file, as its header has it: `data` is the window that is stored, `display` the frame, each (x, y, width, height)."""
+
+    index: int
+    name: str
+    channels: tuple[str, ...]
+    data: tuple[int, int, int, int]
+    display: tuple[int, int, int, int]
+    bits: int
+    chromaticities: tuple[float, ...] | None
+    orientation: int
+    profile: bytes | None
+
+
+def parts_of(path: Path) -> list[Part]:
+    """The headers of all images of a file: parts of an EXR, pages, frames. ImageError where there is none to read."""
+    source = _opened(path)
+    parts: list[Part] = []
+    try:
+        while source.seek_subimage(len(parts), 0):
+            spec = source.spec()
+            primaries = spec.getattribute("chromaticities")
+            profile = spec.getattribute("ICCProfile")
+            parts.append(
+                Part(
+                    len(parts),
+                    str(spec.getattribute("oiio:subimagename") or ""),
+                    tuple(spec.channelnames),
+                    (spec.x, spec.y, spec.width, spec.height),
+                    (spec.full_x, spec.full_y, spec.full_width, spec.full_height),
+                    int(spec.format.basesize()) * 8,
+                    tuple(float(v) for v in primaries) if primaries is not None and len(primaries) == 8 else None,
+                    int(spec.getattribute("Orientation") or 1),
+                    None if profile is None else bytes(bytearray(profile)),
+                )
+            )
+        source.geterror()
+    finally:
+        source.close()
+    return parts
+
+
+def read_channels(path: Path, part: Part, channels: Sequence[int]) -> Float32[ndarray, "H W C"]:
+    """Channels of one part in its display window: zero where nothing is stored, and nothing of what is stored outside of it."""
+    source, low, high = _opened(path), min(channels), max(channels) + 1
+    try:
+        stored = source.read_image(part.index, 0, low, high, _oiio().FLOAT)
+        if stored is None:
+            raise ImageError(f"cannot read image {path}: {_first_line(source.geterror())}; is it damaged or cut short?")
+    finally:
+        source.close()
+    x, y, width, height = part.data
+    stored = np.asarray(stored, np.float32).reshape(height, width, high - low)[:, :, [c - low for c in channels]]
+    if part.data == part.display:
+        return np.ascontiguousarray(stored)
+    left, top, across, down = part.display
+    frame = np.zeros((down, across, len(channels)), np.float32)
+    x0, x1, y0, y1 = max(x, left), min(x + width, left + across), max(y, top), min(y + height, top + down)
+    if x0 < x1 and y0 < y1:
+        frame[y0 - top : y1 - top, x0 - left : x1 - left] = stored[y0 - y : y1 - y, x0 - x : x1 - x]
+    return frame
+
+
+def _opened(path: Path) -> Any:
+    oiio = _oiio()
+    wanted = oiio.ImageSpec()
+    wanted.attribute("oiio:UnassociatedAlpha", 1)
+    source = oiio.ImageInput.open(str(path), wanted) if path.is_file() else None
+    if source is None:
+        raise ImageError(f"cannot read image {path}: {_first_line(oiio.geterror()) if path.is_file() else 'no such file'}")
+    return source
 
 
 def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -13,18 +13,18 @@ import srbf
 from srbf import files
 from srbf.capture import MANIFEST, LightKind, Quantity, Role
 from srbf.errors import ImageError, InputError
-from srbf.image import HALF_MAX, bits_of, decode_srgb, read_image, require_finite, write_image
+from srbf.image import HALF_MAX, write_image
 from srbf.light_list import LightListEntry, read_light_list
-
-Transfer = Literal["srgb", "linear"]
+from srbf.pictures import Picture, Transfer, read_picture, said_once
 
 
 @dataclass(frozen=True)
 class LightListImport:
     """A .lp list and its images (JPG, PNG, TIFF, EXR), paired by the name in the list; an optional list of unseen lights.
 
-    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are. `mask` becomes coverage. `kind` says whether the
-    lists hold directions, or positions of point lights in metres, whose irradiance the images have at 1 m from each.
+    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are; what files say of their own values comes first
+    (`srbf.pictures`). `layer` names one of multilayer EXR. `mask` becomes coverage. `kind` says whether the lists hold directions, or
+    positions of point lights in metres, whose irradiance the images have at 1 m from each.
     """
 
     lights: Path
@@ -33,9 +33,16 @@ class LightListImport:
     mask: Path | None = None
     quantity: Quantity = "radiance"
     kind: LightKind = "directional"
+    layer: str | None = None
 
-    def write(self, folder: Path, force: bool = False, progress: Callable[[int, int], None] = lambda done, total: None) -> dict[str, Any]:
-        """Write the capture, whole or not at all; returns its manifest.
+    def write(
+        self,
+        folder: Path,
+        force: bool = False,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> dict[str, Any]:
+        """Write the capture, whole or not at all; returns its manifest. `say` gets a line of each kind of thing done to images.
 
         ManifestError or ImageError where the list or an image is damaged, missing, of another size, or not finite.
         """
@@ -48,14 +55,19 @@ class LightListImport:
             (temporary / "lights").mkdir()
             size: tuple[int, int] = (0, 0)
             lights = []
+            bits = 0
+            notes: list[tuple[str, tuple[str, ...]]] = []
             for index, (path, entry, role) in enumerate(pairs):
-                pixels = self._read(path)
+                picture = self._read(path)
+                pixels = picture.pixels
+                bits = max(bits, picture.bits)
+                notes.append((path.name, picture.notes))
                 height, width = pixels.shape[:2]
                 size = (height, width) if index == 0 else size
                 if (height, width) != size:
                     raise ImageError(f"expected {size[1]}x{size[0]} pixels in {path}, as in {pairs[0][0].name}, found {width}x{height}")
                 file = f"lights/{index:04d}.exr"
-                wide = bits_of(path) > 8 and float(np.abs(pixels - pixels.astype(np.float16)).max()) > 0
+                wide = picture.bits > 8 and float(np.abs(pixels - pixels.astype(np.float16)).max()) > 0
                 write_image(temporary / file, pixels, "float" if wide or np.abs(pixels).max() > HALF_MAX else "half")
                 place = "direction" if self.kind == "directional" else "position"
                 lights.append({"kind": self.kind, place: list(entry.place), "role": role, "file": file})
@@ -70,8 +82,9 @@ class LightListImport:
                 "lights": lights,
             }
             if self.mask is not None:
-                mask = read_image(self.mask, 3)[:, :, :1]
-                require_finite(mask, self.mask)
+                mask_read = read_picture(self.mask, "linear")
+                mask = mask_read.pixels[:, :, :1]
+                notes.append((self.mask.name, mask_read.notes))
                 if mask.shape[:2] != size:
                     raise ImageError(f"expected a mask of {size[1]}x{size[0]} pixels, found {self.mask} of {mask.shape[1]}x{mask.shape[0]}")
                 write_image(temporary / "coverage.exr", np.clip(mask, 0, 1), "float")
@@ -80,15 +93,18 @@ class LightListImport:
                 "srbf": srbf.__version__,
                 "lights": self.lights.name,
                 "transfer": self.transfer,
-                "bits": max(bits_of(path) for path, _, _ in pairs),
+                "bits": bits,
             }
+            said = said_once(notes)
+            if said:
+                manifest["source"]["pictures"] = said
             files.write_json(temporary / MANIFEST, manifest)
+        for line in said:
+            say(line)
         return manifest
 
-    def _read(self, path: Path) -> np.ndarray:
-        pixels = read_image(path, 3)
-        require_finite(pixels, path)
-        return decode_srgb(pixels).astype(np.float32) if self.transfer == "srgb" else pixels
+    def _read(self, path: Path) -> Picture:
+        return read_picture(path, self.transfer, self.layer)
 
 
 def paired(light_list: Path, kind: LightKind = "directional") -> list[tuple[Path, LightListEntry]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,8 @@ import numpy as np
 
 from srbf import files, schemas
 from srbf.errors import InputError
-from srbf.image import read_image
 from srbf.lights import DirectionalLight, EnvironmentLight, Falloff, Light, PointLight, SpotLight
+from srbf.pictures import read_picture, said_once
 
 
 def parse_directional(text: str) -> DirectionalLight:
@@ -32,8 +33,8 @@ def parse_spot(text: str, a0: float, falloff: Falloff) -> SpotLight:
 
 
 def read_environment(path: Path) -> EnvironmentLight:
-    """An equirectangular EXR or picture, as stored."""
-    return EnvironmentLight(read_image(path, 3))
+    """An equirectangular EXR or picture, its values taken as linear. What was done that is not plain is a warning."""
+    return EnvironmentLight(_environment(path))
 
 
 def read_frames(path: Path) -> list[list[Light]]:
@@ -52,10 +53,16 @@ def read_frames(path: Path) -> list[list[Light]]:
 def _light(entry: dict[str, Any], folder: Path) -> Light:
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
     if entry["kind"] == "environment":
-        image = read_image(folder / fields.pop("file"), 3)
-        return EnvironmentLight(image, **fields)
+        return EnvironmentLight(_environment(folder / fields.pop("file")), **fields)
     kinds: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight}
     return kinds[entry["kind"]](**fields)
+
+
+def _environment(path: Path) -> np.ndarray:
+    picture = read_picture(path, "linear")
+    for line in said_once([(path.name, picture.notes)]):
+        warnings.warn(line, stacklevel=2)
+    return picture.pixels
 
 
 def _numbers(text: str, counts: tuple[int, int], usage: str) -> list[float]:

@@ -1,0 +1,57 @@
+"""What a file holds before its colors are converted and it is turned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32
+
+Model = Literal["gray", "rgb", "cmyk", "lab"]
+# Raw files of cameras. Their suffix is tried after those of pictures where a name without one fits several.
+RAW_SUFFIXES = (
+    *(".dng", ".nef", ".nrw", ".cr2", ".cr3", ".crw", ".arw", ".srf", ".sr2", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".3fr"),
+    *(".fff", ".iiq", ".kdc", ".dcr", ".mrw", ".x3f", ".erf", ".mef", ".mos"),
+)
+
+
+@dataclass(frozen=True)
+class Tags:
+    """What a file says of its values. All are absent from most files, which are then decoded as the user says.
+
+    profile: an ICC profile. gamma: light = value^gamma. curve: light of each stored level, (n,) or (n, 3). chromaticities: x and y of
+    red, green, blue and white. srgb: the file says that it is sRGB. orientation: EXIF's, 1 to 8.
+    """
+
+    profile: bytes | None = None
+    gamma: float | None = None
+    curve: ndarray | None = None
+    chromaticities: tuple[float, ...] | None = None
+    space: str = ""
+    srgb: bool = False
+    orientation: int = 1
+
+
+@dataclass(frozen=True)
+class Found:
+    """Pixels as stored, without alpha: (H, W, 1, 3 or 4), integers over their maximum; inks of CMYK 1 where full; L*, a*, b* of Lab.
+
+    levels: what integers were divided by, 0 for floats.
+    """
+
+    pixels: Float32[ndarray, "H W C"]
+    model: Model
+    bits: int
+    tags: Tags
+    notes: tuple[str, ...] = ()
+    levels: int = 0
+
+
+def stripped(pixels: ndarray) -> tuple[Float32[ndarray, "H W C"], Model]:
+    """Gray or RGB without the channels beyond: alpha, depth and the like."""
+    pixels = pixels[:, :, None] if pixels.ndim == 2 else pixels
+    kept = 1 if pixels.shape[2] < 3 else 3
+    return np.ascontiguousarray(pixels[:, :, :kept], np.float32), "gray" if kept == 1 else "rgb"
