@@ -26,9 +26,12 @@ def import_capture(
         Literal["directional", "point"], typer.Option(help="Whether the lists hold directions, or positions in metres.")
     ] = "directional",
     quantity: Annotated[Literal["radiance", "irradiance"], typer.Option(help="What the images measure.")] = "radiance",
+    images: Annotated[
+        Path | None, typer.Option(help="Folder of the images, where they are not beside the list.", show_default=False)
+    ] = None,
     force: Force = False,
 ) -> None:
     """Pair images with the lights of a list by name, and write a capture."""
     with progress_bar("import") as update:
-        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity, light_kind).write(output, force, update)
+        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity, light_kind, images).write(output, force, update, note)
     note(f"imported {len(manifest['lights'])} images of {manifest['width']}x{manifest['height']} into {output}")
