@@ -14,7 +14,9 @@ from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap, Tiles
 from srbf.stitch import Stitch
 
-__all__ = ["DEFAULT_BUDGET", "encode", "method_for", "settings_of"]
+__all__ = ["DEFAULT_BUDGET", "DEFAULT_METHOD", "encode", "method_for", "method_of", "more_maps_than_lights", "settings_of"]
+
+DEFAULT_METHOD = "relighting-map"
 
 CLASSES: dict[str, type[RelightingMap] | type[EigenMap] | type[ClusteredEigenMap]] = {
     "relighting-map": RelightingMap,
@@ -27,6 +29,21 @@ OF_METHOD = {
     "clustered-eigen-map": {"scalars", "clusters", "encoding"},
     "auto": {"budget", "psnr"},
 }
+
+
+IMPLIED_BY = (  # the first that was given names the method
+    ("auto", ("budget", "psnr")),
+    ("relighting-map", ("k", "basis", "centers")),
+    ("clustered-eigen-map", ("clusters",)),
+    ("eigen-map", ("scalars", "weighting")),
+)
+
+
+def method_of(method: str | None, given: dict[str, Any]) -> str:
+    """The method asked for, else the one that has the settings that were `given` (None: not), else the default."""
+    if method is not None:
+        return method
+    return next((name for name, settings in IMPLIED_BY if any(given.get(s) is not None for s in settings)), DEFAULT_METHOD)
 
 
 def settings_of(method: str, given: dict[str, Any], domain: str, spread: str, ridge: str) -> dict[str, Any]:
@@ -46,9 +63,21 @@ def method_for(
 ) -> RelightingMap | Planes:
     """The method with its settings; `auto` tries what fits on a sample of the capture. InputError where its lights are not directional."""
     capture.require_directional(f"--method {method}")
+    if settings.get("domain") == "hemisphere":
+        _require_above(capture)
     if method == "auto":
         return within_budget(capture, say=say, **settings)
     return CLASSES[method](**settings)
+
+
+def more_maps_than_lights(chosen: RelightingMap | Planes, capture: Capture) -> str | None:
+    """A caution where a relighting map has more maps than the capture has train lights: the ridge alone decides between solutions."""
+    lights = len(capture.indices("train"))
+    if not isinstance(chosen, RelightingMap) or chosen.k <= lights:
+        return None
+    return (
+        f"caution: {chosen.k} maps of {lights} train lights hold more than was seen; more photographs, or -k {lights} and fewer, cost less"
+    )
 
 
 def encode(
@@ -66,6 +95,15 @@ def encode(
     if tiles is not None:
         raise InputError("expected a relighting map to be fitted by tiles, found another method")
     return chosen.encode(capture, progress, look, stitch)
+
+
+def _require_above(capture: Capture) -> None:
+    """InputError where all train lights are below the hemisphere that was asked for."""
+    heights = capture.directions(capture.indices("train"))[:, 2]
+    if len(heights) and (heights <= 0).all():
+        raise InputError(
+            f"expected train lights above the horizon (z > 0) for --domain hemisphere, found all {len(heights)} below; leave --domain auto"
+        )
 
 
 def _spread(text: str, method: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,17 +14,19 @@ from srbf import files
 from srbf.capture import MANIFEST, LightKind, Quantity, Role
 from srbf.errors import ImageError, InputError
 from srbf.image import HALF_MAX, write_image
-from srbf.light_list import LightListEntry, read_light_list
+from srbf.image_pairing import paired
+from srbf.light_list import LightListEntry, below_the_horizon
 from srbf.pictures import Picture, Transfer, read_picture, said_once
 
 
 @dataclass(frozen=True)
 class LightListImport:
-    """A .lp list and its images (JPG, PNG, TIFF, EXR), paired by the name in the list; an optional list of unseen lights.
+    """A .lp list and its images, paired by the name in the list; an optional list of unseen lights.
 
     transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are; what files say of their own values comes first
     (`srbf.pictures`). `layer` names one of multilayer EXR. `mask` becomes coverage. `kind` says whether the lists hold directions, or
-    positions of point lights in metres, whose irradiance the images have at 1 m from each.
+    positions of point lights in metres, whose irradiance the images have at 1 m from each. `images` is a folder
+    that images may be in besides the list's own.
     """
 
     lights: Path
@@ -34,6 +36,7 @@ class LightListImport:
     quantity: Quantity = "radiance"
     kind: LightKind = "directional"
     layer: str | None = None
+    images: Path | None = None
 
     def write(
         self,
@@ -48,9 +51,9 @@ class LightListImport:
         """
         if self.transfer not in ("srgb", "linear"):
             raise InputError(f"expected a transfer of srgb, linear, found {self.transfer!r}")
-        pairs: list[tuple[Path, LightListEntry, Role]] = [(p, e, "train") for p, e in paired(self.lights, self.kind)]
+        pairs: list[tuple[Path, LightListEntry, Role]] = self._pairs(self.lights, "train", say)
         if self.holdout is not None:
-            pairs += [(p, e, "holdout") for p, e in paired(self.holdout, self.kind)]
+            pairs += self._pairs(self.holdout, "holdout", say)
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
             (temporary / "lights").mkdir()
             size: tuple[int, int] = (0, 0)
@@ -103,38 +106,12 @@ class LightListImport:
             say(line)
         return manifest
 
+    def _pairs(self, light_list: Path, role: Role, say: Callable[[str], None]) -> list[tuple[Path, LightListEntry, Role]]:
+        pairs = paired(light_list, self.kind, self.images, say)
+        below = below_the_horizon([entry for _, entry in pairs], light_list.name) if self.kind == "directional" else None
+        if below is not None:
+            say(below)
+        return [(path, entry, role) for path, entry in pairs]
+
     def _read(self, path: Path) -> Picture:
         return read_picture(path, self.transfer, self.layer)
-
-
-def paired(light_list: Path, kind: LightKind = "directional") -> list[tuple[Path, LightListEntry]]:
-    """Each entry of a list with its image beside the list: by the name as written, else its last part, else its stem alone."""
-    entries = read_light_list(light_list, kind)
-    folder = light_list.parent
-    stems: dict[str, list[Path]] = {}
-    for path in sorted(folder.iterdir()):
-        if path.is_file() and path.suffix.lower() in (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".exr"):
-            stems.setdefault(path.stem.lower(), []).append(path)
-    pairs: list[tuple[Path, LightListEntry]] = []
-    taken: dict[Path, str] = {}
-    for entry in entries:
-        written = PureWindowsPath(entry.name)  # splits at both kinds of slash
-        last = written.name
-        alike = stems.get(Path(last).stem.lower(), [])
-        as_written = folder / written.as_posix()
-        if as_written.is_file() and as_written.resolve().is_relative_to(folder.resolve()):
-            path = as_written
-        elif (folder / last).is_file():
-            path = folder / last
-        elif len(alike) == 1:
-            path = alike[0]
-        else:
-            found = f"several with that stem ({', '.join(p.name for p in alike)})" if alike else "none"
-            raise ImageError(f"expected the image {last!r} of {light_list.name} in {folder}, found {found}")
-        if path in taken:
-            raise ImageError(
-                f"expected an image of its own for {entry.name!r} in {light_list.name}, found {path.name} taken by {taken[path]!r}"
-            )
-        taken[path] = entry.name
-        pairs.append((path, entry))
-    return pairs

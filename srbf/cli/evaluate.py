@@ -30,7 +30,7 @@ from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.direct.choice import Added, chosen
 from srbf.errors import InputError
 from srbf.evaluation import evaluate as evaluate_capture
-from srbf.fitting import method_for, settings_of
+from srbf.fitting import method_for, method_of, settings_of
 from srbf.leaving_out import leave_one_out as errors_left_out
 
 
@@ -55,7 +55,7 @@ def evaluate(
     ] = None,
     samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
     seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
-    method: Method = "relighting-map",
+    method: Method = None,
     k: Maps = None,
     basis: Basis = None,
     centers: Centers = None,
@@ -77,13 +77,14 @@ def evaluate(
     if leave_one_out:
         if reference is not None or point_reference is not None or direct is not None:
             raise InputError("expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct")
-        settings = settings_of(method, given, domain, spread, ridge)
+        kind = method_of(method, given)
+        settings = settings_of(kind, given, domain, spread, ridge)
         with progress_bar("leave one out") as update:
-            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
+            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, kind, settings).encode(c), update), json)
         return
     if reference is None:
         raise InputError("expected an asset and a capture, found one path; or add --leave-one-out to fit a capture")
-    if any(value is not None for value in given.values()) or (method, domain, spread, ridge) != ("relighting-map", "auto", "auto", "auto"):
+    if any(value is not None for value in given.values()) or (method, domain, spread, ridge) != (None, "auto", "auto", "auto"):
         raise InputError("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
     opened = Asset.open(asset)
     if point_reference is not None:

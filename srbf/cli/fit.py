@@ -31,14 +31,14 @@ from srbf.cluster import Cluster, checked
 from srbf.errors import InputError
 from srbf.evaluation import TrainWatch, evaluate
 from srbf.files import check_replaceable
-from srbf.fitting import encode, method_for, settings_of
+from srbf.fitting import encode, method_for, method_of, more_maps_than_lights, settings_of
 from srbf.tiles import fit_tiles
 
 
 def fit(
     capture: CaptureFolder,
     output: Output,
-    method: Method = "relighting-map",
+    method: Method = None,
     k: Maps = None,
     basis: Basis = None,
     centers: Centers = None,
@@ -62,15 +62,16 @@ def fit(
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
     they are many: `srbf evaluate` reads them all again. With --dask other machines fit tiles of rows, and train is read once more here.
     """
-    if dask is not None and method != "relighting-map":
-        raise InputError(f"expected --dask with --method relighting-map, whose tiles are independent, found it with {method}")
     given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
     given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
-    settings = settings_of(method, given, domain, spread, ridge)
+    kind = method_of(method, given)
+    if dask is not None and kind != "relighting-map":
+        raise InputError(f"expected --dask with --method relighting-map, whose tiles are independent, found it with {kind}")
+    settings = settings_of(kind, given, domain, spread, ridge)
     check_replaceable(output, force, MANIFEST)
     opened = Capture.open(capture)
     started = time.perf_counter()
-    chosen = method_for(opened, method, settings, note)
+    chosen = method_for(opened, kind, settings, note)
     watch = None
     if dask is not None:
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
@@ -80,6 +81,8 @@ def fit(
         with progress_bar("fit") as update:
             asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
+    if (caution := more_maps_than_lights(chosen, opened)) is not None:
+        note(caution)
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}

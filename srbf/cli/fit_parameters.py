@@ -6,11 +6,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from srbf.fitting import DEFAULT_BUDGET
+from srbf.fitting import DEFAULT_BUDGET, DEFAULT_METHOD
 
 Method = Annotated[
-    Literal["relighting-map", "eigen-map", "clustered-eigen-map", "auto"],
-    typer.Option(help="How light transport is compressed; auto: the best within --budget."),
+    Literal["relighting-map", "eigen-map", "clustered-eigen-map", "auto"] | None,
+    typer.Option(
+        help=f"How light transport is compressed; auto: the best within --budget. Without it, by the other flags, else {DEFAULT_METHOD}.",
+        show_default=False,
+    ),
 ]
 Maps = Annotated[int | None, typer.Option("-k", help="relighting-map: how many maps (25).", show_default=False)]
 Basis = Annotated[

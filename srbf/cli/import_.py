@@ -29,9 +29,12 @@ def import_capture(
     layer: Annotated[
         str | None, typer.Option(help="Layer or part of multilayer EXR files, where several may be meant.", show_default=False)
     ] = None,
+    images: Annotated[
+        Path | None, typer.Option(help="Folder of the images, where they are not beside the list.", show_default=False)
+    ] = None,
     force: Force = False,
 ) -> None:
     """Pair images with the lights of a list by name, and write a capture."""
     with progress_bar("import") as update:
-        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity, light_kind, layer).write(output, force, update, note)
+        manifest = LightListImport(lp, transfer, holdout_lp, mask, quantity, light_kind, layer, images).write(output, force, update, note)
     note(f"imported {len(manifest['lights'])} images of {manifest['width']}x{manifest['height']} into {output}")

@@ -12,10 +12,11 @@ from srbf.arrays import Float32
 
 Model = Literal["gray", "rgb", "cmyk", "lab"]
 # Raw files of cameras. Their suffix is tried after those of pictures where a name without one fits several.
-RAW_SUFFIXES = (
-    *(".dng", ".nef", ".nrw", ".cr2", ".cr3", ".crw", ".arw", ".srf", ".sr2", ".raf", ".rw2", ".orf", ".pef", ".srw", ".raw", ".3fr"),
-    *(".fff", ".iiq", ".kdc", ".dcr", ".mrw", ".x3f", ".erf", ".mef", ".mos"),
+RAW_NAMES = (
+    "3fr arw bay cap cr2 cr3 crw dcr dng erf fff iiq k25 kc2 kdc mdc mef mos mrw nef nrw orf pef ptx pxn raf raw rw2 rwl sr2 srf srw "
+    "sti x3f"
 )
+RAW_SUFFIXES = tuple(f".{name}" for name in RAW_NAMES.split())
 
 
 @dataclass(frozen=True)

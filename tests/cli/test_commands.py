@@ -325,8 +325,10 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
-        (["--budget", 8], "--budget with --method auto"),
+        (["--method", "relighting-map", "--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
+        (["--method", "relighting-map", "--budget", 8], "--budget with --method auto"),
+        (["-k", 9, "--budget", 8], "-k with --method relighting-map"),
+        (["-k", 9, "--clusters", 8], "--clusters with --method clustered-eigen-map"),
         (["--method", "eigen-map", "-k", 9], "-k with --method relighting-map"),
         (["--method", "eigen-map", "--clusters", 4], "--clusters"),
         (["--method", "eigen-map", "--psnr", 30], "--psnr with --method auto"),
