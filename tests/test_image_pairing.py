@@ -136,7 +136,7 @@ def srbf_import(light_list: Path, output: Path, *more: object):  # type: ignore[
     return CliRunner().invoke(app, list(map(str, ["import", "--lp", light_list, "-o", output, "--transfer", "linear", *more])))
 
 
-def test_the_command_says_it_in_lines_and_leaves_nothing_by_halves(tmp_path: Path) -> None:
+def test_the_command_says_it_in_lines_and_leaves_nothing_half_written(tmp_path: Path) -> None:
     for name in "ab":
         png(tmp_path / "photos" / f"{name}.PNG")
     (tmp_path / "lists").mkdir()
