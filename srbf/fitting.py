@@ -64,7 +64,9 @@ def method_for(
     """The method with its settings; `auto` tries what fits on a sample of the capture. InputError where its lights are not directional."""
     capture.require_directional(f"--method {method}")
     if settings.get("domain") == "hemisphere":
-        _require_above(capture)
+        _require_above(capture, "--domain hemisphere")
+    if settings.get("basis") == "hemispherical-harmonics":
+        _require_above(capture, "--basis hemispherical-harmonics")
     if method == "auto":
         return within_budget(capture, say=say, **settings)
     return CLASSES[method](**settings)
@@ -97,13 +99,11 @@ def encode(
     return chosen.encode(capture, progress, look, stitch)
 
 
-def _require_above(capture: Capture) -> None:
-    """InputError where all train lights are below the hemisphere that was asked for."""
+def _require_above(capture: Capture, flags: str) -> None:
+    """InputError where all train lights are below the hemisphere that `flags` ask for."""
     heights = capture.directions(capture.indices("train"))[:, 2]
     if len(heights) and (heights <= 0).all():
-        raise InputError(
-            f"expected train lights above the horizon (z > 0) for --domain hemisphere, found all {len(heights)} below; leave --domain auto"
-        )
+        raise InputError(f"expected train lights above the horizon (z > 0) for {flags}, found all {len(heights)} below; leave it out")
 
 
 def _spread(text: str, method: str) -> Any:

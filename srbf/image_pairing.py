@@ -181,7 +181,7 @@ class _Search:
         if outside and os.path.isfile(asked):  # noqa: PTH113 - Path.is_file raises where a name is too long
             return ImageError(
                 f"expected the image {name!r} of {self.light_list.name} below {where}, found it outside: paths outside the list's folder "
-                f"are followed only below --images FOLDER; add --images {os.path.relpath(asked.parent)}"
+                f"are followed only below --images FOLDER; add --images {asked.parent}"
             )
         elsewhere = "; if it is in another folder, add --images FOLDER" if len(self.roots) == 1 else ""
         near = get_close_matches(last, self._folder(self.roots[0]).names, 1)

@@ -66,7 +66,7 @@ def common_manifest(
             **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
             **{key: made[key] for key in ("scene_sha256",) if key in made},
             "settings": settings,
-            "fit": {"train_lights": len(capture.indices("train")), **_finite(fit)},
+            "fit": {"train_lights": len(capture.indices("train")), **_elevations(capture), **_finite(fit)},
         },
     }
 
@@ -140,7 +140,7 @@ def finish(asset: Asset, total: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "
 def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
     """A line for each light that shines from where nothing was captured; such lights evaluate unchanged."""
     if asset.domain == "sphere":
-        return []
+        return _beyond_elevations(asset, lights)
     notes = []
     for i, light in enumerate(lights):
         light = moved(light, asset.asset_from_world)
@@ -151,6 +151,39 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
             below = float((light.position[2] <= heights[asset.covered]).mean()) if asset.covered.any() else 0.0
             if below > 0:
                 notes.append(f"light {i} is below {below:.0%} of the receivers, outside the captured hemisphere: extrapolated there")
+    return notes
+
+
+def _elevations(capture: Capture) -> dict[str, Any]:
+    """The lowest and the highest train light of a directional capture, radians above the horizon."""
+    train = capture.indices("train")
+    if not train or capture.kind != "directional":
+        return {}
+    elevations = np.arcsin(np.clip(capture.directions(train)[:, 2], -1, 1))
+    return {"elevations": [float(elevations.min()), float(elevations.max())]}
+
+
+def _beyond_elevations(asset: Asset, lights: Sequence[Light]) -> list[str]:
+    """A line for each directional light farther above or below all train lights than they are from each other on a whole sphere.
+
+    None for assets that do not say where their train lights were.
+    """
+    fit = asset.manifest["source"].get("fit", {})
+    if "elevations" not in fit:
+        return []
+    lowest, highest = fit["elevations"]
+    spacing = np.sqrt(4 * np.pi / fit["train_lights"])
+    notes = []
+    for i, light in enumerate(lights):
+        light = moved(light, asset.asset_from_world)
+        if not isinstance(light, DirectionalLight):
+            continue
+        elevation = float(np.arcsin(np.clip(light.direction[2] / np.linalg.norm(light.direction), -1, 1)))
+        if not lowest - spacing <= elevation <= highest + spacing:
+            notes.append(
+                f"light {i} is at {np.degrees(elevation):.0f} degrees of elevation, far from all captured lights "
+                f"({np.degrees(lowest):.0f} to {np.degrees(highest):.0f}): its response is extrapolated, likely black"
+            )
     return notes
 
 

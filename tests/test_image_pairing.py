@@ -75,7 +75,7 @@ def test_a_folder_of_exports(tmp_path: Path) -> None:
     assert found(list_of(tmp_path, "exports/a.png", "Exports\\B.png"))[0] == images
     assert found(list_of(tmp_path, "a.png", "b.tif")) == (
         images,
-        ["1 of 2 images of l.lp were found by another extension", "2 of 2 images of l.lp were found by a folder inside"],
+        ["2 of 2 images of l.lp were found by a folder inside", "1 of 2 images of l.lp were found by another extension"],
     )
     png(tmp_path / "thumbnails" / "a.png")
     with pytest.raises(ImageError, match=r"several with that stem \(exports/a.png, thumbnails/a.png\)"):
@@ -136,7 +136,7 @@ def srbf_import(light_list: Path, output: Path, *more: object):  # type: ignore[
     return CliRunner().invoke(app, list(map(str, ["import", "--lp", light_list, "-o", output, "--transfer", "linear", *more])))
 
 
-def test_the_command_says_it_in_lines_and_leaves_nothing_by_halves(tmp_path: Path) -> None:
+def test_the_command_says_it_in_lines_and_leaves_nothing_half_written(tmp_path: Path) -> None:
     for name in "ab":
         png(tmp_path / "photos" / f"{name}.PNG")
     (tmp_path / "lists").mkdir()
