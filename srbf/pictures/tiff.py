@@ -37,6 +37,8 @@ def read_tiff(path: Path) -> Found:
             pages = _pages(file.pages)
             if any(page.photometric in RAW for page in pages) or _is_canon(path):
                 return read_raw(path)
+            if not pages:
+                raise ImageError(f"cannot read image {path}: it has no page; is it damaged or cut short?")
             page = _largest(pages)
             size = path.stat().st_size
             if len(page.dataoffsets) < math.prod(page.chunked) or page.imagewidth * page.imagelength > MOST_PIXELS:
