@@ -82,17 +82,6 @@ def holds_half(path: Path) -> bool:
     return half
 
 
-def bits_of(path: Path) -> int:
-    """Bits a channel of a stored image: 8, 16 or 32."""
-    oiio = _oiio()
-    source = oiio.ImageInput.open(str(path))
-    if source is None:
-        raise ImageError(f"cannot read image {path}: {_first_line(oiio.geterror())}")
-    bits = int(source.spec().format.basesize()) * 8
-    source.close()
-    return bits
-
-
 def size_of(path: Path) -> tuple[int, int]:
     """(height, width) from the header alone; ImageError where there is none to read."""
     oiio = _oiio()

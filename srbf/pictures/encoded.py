@@ -16,6 +16,7 @@ from srbf.pictures.found import Found, Tags, stripped
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ORIENTATION, EXIF, INTEROPERABILITY, COLOR_SPACE = 0x112, 0x8769, 0xA005, 0xA001
+BROKEN_EXIF = (OSError, SyntaxError, ValueError, KeyError, TypeError, AttributeError, struct.error)
 SRGB_GAMMA = 2.2
 CICP_PRIMARIES = {1: ("Rec.709", REC709), 9: ("Rec.2020", REC2020), 12: ("Display P3", DISPLAY_P3)}
 CICP_CURVES = {8: 1.0, 4: 2.2, 5: 2.8, 13: None}  # None: sRGB's
@@ -27,7 +28,7 @@ def read_jpeg(path: Path) -> Found:
     try:
         with Image.open(path) as image:
             image.load()
-            tags = _exif_tags(image.getexif(), image.info.get("icc_profile"))
+            tags = _exif_tags(_exif_of(image), image.info.get("icc_profile"))
             stored = np.asarray(image, np.float32) / np.float32(255)
             mode = image.mode
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
@@ -40,7 +41,10 @@ def read_jpeg(path: Path) -> Found:
 
 def read_other(path: Path) -> Found:
     """The first image of a file of any kind that OpenImageIO reads; of PNG with what its chunks say."""
-    parts = parts_of(path)
+    try:
+        parts = parts_of(path)
+    except ImageError as error:
+        raise ImageError(f"{error}; export it as JPEG, PNG, TIFF or EXR") from error
     part = parts[0]
     pixels, model = stripped(read_channels(path, part, range(len(part.channels))))
     with path.open("rb") as file:
@@ -52,16 +56,28 @@ def read_other(path: Path) -> Found:
 
 def _exif_tags(exif: Any, profile: bytes | None) -> Tags:
     """Orientation and, without a profile, the Adobe RGB that cameras tell by EXIF alone."""
-    orientation = exif.get(ORIENTATION, 1)
-    orientation = orientation if isinstance(orientation, int) else 1
+    orientation = _orientation(exif)
     if profile:
         return Tags(profile=profile, orientation=orientation)
-    details = exif.get_ifd(EXIF)
-    index = exif.get_ifd(INTEROPERABILITY).get(1)
-    adobe = details.get(COLOR_SPACE) == 2 or (details.get(COLOR_SPACE) == 0xFFFF and str(index).strip("\0") == "R03")
-    if adobe:
+    try:
+        space, index = exif.get_ifd(EXIF).get(COLOR_SPACE), exif.get_ifd(INTEROPERABILITY).get(1)
+    except BROKEN_EXIF:
+        space, index = None, None
+    if space == 2 or (space == 0xFFFF and str(index).strip("\0") == "R03"):
         return Tags(gamma=563 / 256, chromaticities=ADOBE_RGB, space="Adobe RGB", orientation=orientation)
     return Tags(orientation=orientation)
+
+
+def _exif_of(image: Any) -> Any:
+    try:
+        return image.getexif()
+    except BROKEN_EXIF:
+        return {}
+
+
+def _orientation(exif: Any) -> int:
+    found = exif.get(ORIENTATION, 1)
+    return found if isinstance(found, int) else 1
 
 
 def _png_tags(path: Path) -> Tags:
@@ -69,13 +85,15 @@ def _png_tags(path: Path) -> Tags:
     Image = _pillow()
     chunks = dict(_chunks(path))
     exif = Image.Exif()
-    if b"eXIf" in chunks:
-        exif.load(chunks[b"eXIf"])
-    elif b"Raw profile type exif" in chunks:
-        with Image.open(path) as image:
-            exif = image.getexif()
-    orientation = exif.get(ORIENTATION, 1)
-    orientation = orientation if isinstance(orientation, int) else 1
+    try:
+        if b"eXIf" in chunks:
+            exif.load(chunks[b"eXIf"])
+        elif b"Raw profile type exif" in chunks:
+            with Image.open(path) as image:
+                exif = image.getexif()
+    except BROKEN_EXIF:
+        exif = Image.Exif()
+    orientation = _orientation(exif)
     cicp = chunks.get(b"cICP", b"")
     if cicp[:2] == b"\x01\x0d":
         return Tags(srgb=True, orientation=orientation)
@@ -83,8 +101,11 @@ def _png_tags(path: Path) -> Tags:
         name, primaries = CICP_PRIMARIES[cicp[0]]
         return Tags(gamma=CICP_CURVES[cicp[1]], chromaticities=primaries, space=name, orientation=orientation)
     if b"iCCP" in chunks:
-        with Image.open(path) as image:
-            return Tags(profile=image.info.get("icc_profile") or b"", orientation=orientation)
+        try:
+            with Image.open(path) as image:
+                return Tags(profile=image.info.get("icc_profile") or b"", orientation=orientation)
+        except (OSError, SyntaxError, ValueError, struct.error):
+            return Tags(profile=b"", orientation=orientation)
     if b"sRGB" in chunks:
         return Tags(srgb=True, orientation=orientation)
     gamma, chromaticities = chunks.get(b"gAMA", b""), chunks.get(b"cHRM", b"")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -42,7 +43,9 @@ def read_picture(path: Path, transfer: Transfer, layer: str | None = None) -> Pi
 
     ImageError where the file is missing, empty, damaged, not finite, of no picture, or where its layers leave open which is meant.
     """
-    found = _found(path, layer)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # other libraries': they name no file, and what matters is checked here
+        found = _found(path, layer)
     require_finite(found.pixels, path)
     pixels, notes = linear(found, transfer)
     if found.tags.orientation in range(2, 9):

@@ -19,6 +19,7 @@ from srbf.pictures.raw import read_raw
 logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what it warns of is checked here, or is of no account
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, INKS, YCBCR, CIELAB, ICCLAB = 0, 1, 2, 3, 5, 6, 8, 9
 RAW = (32803, 34892)  # a mosaic of a sensor; linear values in a camera's own space
+FAX = (2, 3, 4)  # kinds of compression that tifffile leaves out
 MOST_PIXELS = 2**30  # 12 GB as float32
 REDUCED, MASK = 1, 4  # bits of NewSubfileType
 ORIENTATION, TRANSFER_FUNCTION, WHITE_POINT, PRIMARIES, PROFILE = 274, 301, 318, 319, 34675
@@ -36,6 +37,8 @@ def read_tiff(path: Path) -> Found:
             pages = _pages(file.pages)
             if any(page.photometric in RAW for page in pages) or _is_canon(path):
                 return read_raw(path)
+            if not pages:
+                raise ImageError(f"cannot read image {path}: it has no page; is it damaged or cut short?")
             page = _largest(pages)
             size = path.stat().st_size
             if len(page.dataoffsets) < math.prod(page.chunked) or page.imagewidth * page.imagelength > MOST_PIXELS:
@@ -48,7 +51,20 @@ def read_tiff(path: Path) -> Found:
             bits = 8 if page.bitspersample <= 8 else 16 if page.bitspersample <= 16 else 32
             whole = page.dtype is not None and page.dtype.kind == "u" and page.bitspersample in (8, 16) and page.photometric != PALETTE
             return Found(pixels, model, bits, tags, notes, 2**bits - 1 if whole else 0)
-    except (tifffile.TiffFileError, RuntimeError, ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error) as error:
+    except ImageError:
+        raise
+    except (
+        tifffile.TiffFileError,
+        OSError,
+        SyntaxError,
+        RuntimeError,
+        ValueError,
+        KeyError,
+        IndexError,
+        TypeError,
+        AttributeError,
+        struct.error,
+    ) as error:
         raise ImageError(f"cannot read image {path}: {' '.join(str(error).split())[:120]}; is it damaged or cut short?") from error
 
 
@@ -80,10 +96,11 @@ def _is_canon(path: Path) -> bool:
 def _meant(page: Any, path: Path) -> tuple[Float32[ndarray, "H W C"], Any]:
     """Samples as gray, RGB, inks or Lab, by the page's photometric interpretation."""
     kind = int(page.photometric)
-    known = (WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, INKS, CIELAB, ICCLAB)
-    if kind not in known and not (kind == YCBCR and page.compression in (6, 7)):  # a JPEG's decoder gives RGB
+    if int(page.compression) in FAX or (kind == YCBCR and page.compression not in (6, 7)):
+        return _by_pillow(page, path)
+    if kind not in (WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, INKS, YCBCR, CIELAB, ICCLAB):
         raise ImageError(f"expected gray, RGB, palette, CMYK or Lab in {path}, found photometric {kind}; export it as RGB")
-    samples = np.asarray(page.asarray())
+    samples = np.asarray(page.asarray())  # of a JPEG's YCbCr already RGB
     if page.planarconfig == 2 and page.samplesperpixel > 1:
         samples = np.moveaxis(samples.reshape(page.samplesperpixel, page.imagelength, page.imagewidth), 0, -1)
     samples = samples.reshape(page.imagelength, page.imagewidth, -1)
@@ -100,6 +117,18 @@ def _meant(page: Any, path: Path) -> tuple[Float32[ndarray, "H W C"], Any]:
     if kind == WHITE_IS_ZERO:
         return 1 - values[:, :, :1], "gray"
     return stripped(values)
+
+
+def _by_pillow(page: Any, path: Path) -> tuple[Float32[ndarray, "H W C"], Any]:
+    """What libtiff undoes for Pillow, with white as 1 already. ImageError where the page is not of the first row of pages."""
+    from PIL import Image
+
+    if not isinstance(page.index, int):
+        raise ImageError(f"expected a packing of {path} that sub-pages are read in, found {page.compression.name}; export it as LZW")
+    with Image.open(path) as image:
+        image.seek(page.index)
+        stored = np.asarray(image if image.mode in ("1", "L", "RGB") else image.convert("RGB"))
+    return stripped(stored.astype(np.float32) / np.float32(1 if stored.dtype == bool else 255))
 
 
 def _unit(samples: ndarray, bits: int) -> Float32[ndarray, "H W C"]:

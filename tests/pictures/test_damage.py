@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import tifffile
 from picture_files import asymmetrical, encoded, exr, png, rgb
+from PIL import Image
 
 from srbf.errors import ImageError
 from srbf.importing import LightListImport
@@ -25,6 +26,10 @@ def _packed(path: Path) -> None:
     tifffile.imwrite(path, NOISE, photometric="rgb", metadata=None, rowsperstrip=8, compression="deflate")
 
 
+def _fax(path: Path) -> None:
+    Image.fromarray(NOISE[:, :, 0] > 99).save(path, compression="group4")
+
+
 WHOLE: dict[str, Callable[[Path], object]] = {
     "a.jpg": lambda path: path.write_bytes(encoded(NOISE, "JPEG")),
     "progressive.jpg": lambda path: path.write_bytes(encoded(NOISE, "JPEG", progressive=True)),
@@ -32,6 +37,7 @@ WHOLE: dict[str, Callable[[Path], object]] = {
     "wide.png": lambda path: path.write_bytes(png(NOISE.astype(np.uint16) * 257)),
     "a.tif": _tiff,
     "packed.tif": _packed,
+    "fax.tif": _fax,
     "a.exr": lambda path: exr(path, {"channels": rgb("", (1, 2, 3), (60, 80))}),
 }
 

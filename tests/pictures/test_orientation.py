@@ -84,3 +84,11 @@ def test_masks_are_turned_with_the_photographs(tmp_path: Path) -> None:
     (tmp_path / "l.lp").write_text("1\n6.png 0 0 1\n")
     LightListImport(tmp_path / "l.lp", "linear", mask=path).write(tmp_path / "capture")
     np.testing.assert_array_equal(Capture.open(tmp_path / "capture").coverage(), mask[:, :, 0] / 255)
+
+
+@pytest.mark.parametrize("block", [b"", b"MM", b"Exif\0\0broken", b"MM\0*\0\0\0\x08\0\x05\x01\x12", b"II*\0\xff\xff\xff\x7f"])
+def test_broken_exif_turns_nothing(tmp_path: Path, block: bytes) -> None:
+    (tmp_path / "a.png").write_bytes(png(asymmetrical(), (b"eXIf", block)))
+    (tmp_path / "a.jpg").write_bytes(encoded(asymmetrical(), "JPEG", quality=100, subsampling=0, exif=b"Exif\0\0" + block))
+    for name in ("a.png", "a.jpg"):
+        np.testing.assert_allclose(read_picture(tmp_path / name, "linear").pixels, asymmetrical() / 255, atol=3 / 255)

@@ -163,3 +163,20 @@ def test_a_set_of_raw_files_becomes_a_capture(tmp_path: Path) -> None:
     capture = Capture.open(tmp_path / "capture")
     np.testing.assert_allclose([capture.image(i)[20, 20, 0] for i in range(3)], [0.1, 0.2, 0.3], atol=0.001)
     assert said == ["developed 3 images from raw by LibRaw: linear, white balance of daylight, no automatic brightness"]
+
+
+@pytest.mark.parametrize("packing", ["group3", "group4", "tiff_ccitt", "packbits", "tiff_lzw"])
+def test_one_bit_in_every_packing(tmp_path: Path, packing: str) -> None:
+    from PIL import Image
+
+    bits = asymmetrical(16, 32)[:, :, 0] > 90
+    Image.fromarray(bits).save(tmp_path / "a.tif", compression=packing)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.tif", "linear").pixels, np.repeat(bits[:, :, None], 3, axis=2))
+
+
+def test_jpeg_in_a_tiff(tmp_path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(FULL).save(tmp_path / "a.tif", compression="jpeg", quality=95)
+    stored = np.asarray(Image.open(tmp_path / "a.tif"))
+    np.testing.assert_allclose(read_picture(tmp_path / "a.tif", "linear").pixels, stored / 255, atol=2.5 / 255)  # two decoders
