@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import materials, precision, soundness, unwrap, world_normals
+from blender_bake import materials, precision, sample_spread, soundness, unwrap, world_normals
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.receiver_objects import prepare, select
 from blender_bake.seam_edges import seam_edges
@@ -78,7 +78,7 @@ class LightmapReceiver:
 
     def geometry(self) -> dict[str, np.ndarray]:
         """World position at texel centres, world normal, albedo and coverage; (1, E, 8) `seams` where the layers have any."""
-        position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample stands on the texel centre
+        position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample lies at the texel's center
         encoded = self._bake("NORMAL", self._objects, 1, 0, normal_space="OBJECT")[:, :, :3]
         of_object = 2 * (encoded - NORMAL_OFFSET) - 1
         normal = np.empty_like(of_object)
@@ -101,9 +101,9 @@ class LightmapReceiver:
     def answer(self, samples: int, seed: int) -> np.ndarray:
         """Irradiance E = pi x Cycles' DIFFUSE without colour, or radiance seen from straight above each texel."""
         if self._irradiance:
-            return self._bake("DIFFUSE", self._objects, samples, seed, pass_filter={"DIRECT", "INDIRECT"})[:, :, :3] * np.float32(math.pi)
+            return self._light("DIFFUSE", samples, seed, {"DIRECT", "INDIRECT"}) * np.float32(math.pi)
         every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
-        return self._bake("COMBINED", self._objects, samples, seed, pass_filter=every)[:, :, :3]
+        return self._light("COMBINED", samples, seed, every)
 
     def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
         """(`answer`, the direct diffuse light in it with `translucent` on): same seed, so that one is exactly part of the other."""
@@ -117,12 +117,17 @@ class LightmapReceiver:
         """The direct diffuse light alone, in the units of `answer`."""
         parts = {"DIRECT"} if self._irradiance else {"DIRECT", "COLOR"}
         scale = math.pi if self._irradiance else 1.0
-        return self._bake("DIFFUSE", self._objects, samples, seed, pass_filter=parts)[:, :, :3] * np.float32(scale)
+        return self._light("DIFFUSE", samples, seed, parts) * np.float32(scale)
 
-    def _bake(self, kind: str, objects: list[bpy.types.Object], samples: int, seed: int, **options: Any) -> np.ndarray:
+    def _light(self, kind: str, samples: int, seed: int, parts: set[str]) -> np.ndarray:
+        return self._bake(kind, self._objects, samples, seed, spread=True, pass_filter=parts)[:, :, :3]
+
+    def _bake(
+        self, kind: str, objects: list[bpy.types.Object], samples: int, seed: int, *, spread: bool = False, **options: Any
+    ) -> np.ndarray:
+        """(H, W, 4), its samples `spread` over the footprint, or the first of them at the texel's center."""
         select(objects)
-        self._scene.cycles.samples = samples
-        self._scene.cycles.seed = seed
+        sample_spread.take(self._scene, samples, seed, spread=spread)
         try:
             result = bpy.ops.object.bake(
                 type=kind,

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import elsewhere, materials, precision, soundness
+from blender_bake import elsewhere, materials, precision, sample_spread, soundness
 from blender_bake.channel import Channel, WorkerError
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
@@ -84,7 +84,7 @@ class ViewReceiver:
         lens = self._camera.data.dof
         blurred = lens.use_dof
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
-        centre = self._render(1, 0, ("Combined", "Position", "Normal"))
+        centre = self._render(1, 0, ("Combined", "Position", "Normal"), spread=False)
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
         self._measure_coverage()
         hit = (centre["Combined"][:, :, 3:] > 0).astype(np.float32)
@@ -183,9 +183,8 @@ class ViewReceiver:
         layer.use_pass_combined = layer.use_pass_position = layer.use_pass_normal = True
         layer.use_pass_diffuse_color = layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = True
 
-    def _render(self, samples: int, seed: int, passes: tuple[str, ...]) -> dict[str, np.ndarray]:
-        self._scene.cycles.samples = samples
-        self._scene.cycles.seed = seed
+    def _render(self, samples: int, seed: int, passes: tuple[str, ...], *, spread: bool = True) -> dict[str, np.ndarray]:
+        sample_spread.take(self._scene, samples, seed, spread=spread)
         self._file.unlink(missing_ok=True)
         try:
             result = bpy.ops.render.render(write_still=True)
