@@ -23,7 +23,7 @@ WIDEST = 1.0  # rad: past it the R table has a cusp
 USUAL_SPREAD, USUAL_RIDGE = 0.85, RIDGES[7]  # of the mean distance between neighboring centers; on the diagonal
 NARROWEST = 0.05  # rad
 SAMPLE_TEXELS = 1 << 13
-MARGIN = 3.0  # times the squared error of the best, geometric mean over lights, that the usual choice may have
+MARGIN = 2.0  # times the squared error of the best, geometric mean over lights, that the usual choice may have
 SURE = 2.0  # the margin is whole where there are fewer than so many lights to a function
 
 

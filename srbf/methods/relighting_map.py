@@ -106,7 +106,7 @@ class RelightingMap:
             )
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
-        basis, ridge, choice = self.model(capture, domain)
+        basis, ridge, choice = self.model(lambda: TexelSample.of(capture), domain)
         if tiles is not None:
             solved, report = tiles(capture, train, basis.evaluate(directions), ridge, progress)
         else:
@@ -148,19 +148,19 @@ class RelightingMap:
             manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses)
         return asset
 
-    def model(self, capture: Capture, domain: Domain) -> tuple[Basis, float, Choice | None]:
-        """(basis, ridge, what chose them, if anything was to be chosen)."""
+    def model(self, read_sample: Callable[[], TexelSample], domain: Domain) -> tuple[Basis, float, Choice | None]:
+        """(basis, ridge, what chose them, if anything was to be chosen, which alone needs a texel sample)."""
         if self.basis != "gaussian":
             basis: Basis = HARMONICS[self.basis](self.k)
             if self.ridge != "auto":
                 return basis, self.ridge, None
-            sample = TexelSample.of(capture)
+            sample = read_sample()
             choice = choose(sample, [(0.0, basis.evaluate(sample.directions))], self._ridges(), self._rounding(sample))
             return basis, choice.ridge, choice
         centers = point_set("fibonacci" if self.centers == "auto" else self.centers, self.k, domain)
         if self.spread != "auto" and self.ridge != "auto":
             return GaussianBasis(centers, spread_of(centers, self.spread)), self.ridge, None
-        sample = TexelSample.of(capture)
+        sample = read_sample()
         mean = spread_of(centers, "mean")
         spreads = spread_candidates(mean) if self.spread == "auto" else [spread_of(centers, self.spread)]
         candidates = ((spread, GaussianBasis(centers, spread).evaluate(sample.directions)) for spread in spreads)
