@@ -66,7 +66,7 @@ def _bake_table(places: Places, steps: Steps) -> str:
     sun = f"{np.degrees(settings.sun_angle):.1f}°" if settings.sun_angle else "a point"
     samples = f"{settings.samples}" if places.scene.dome else f"{settings.samples}, held out {settings.holdout_samples}"
     cells = {
-        "receiver": f"`{places.scene.receiver}`",
+        "receiver": ", ".join(f"`{word}`" for word in places.scene.receivers),
         "texels": f"{capture.width} × {capture.height}",
         "lights": f"{trained} and {held} held out",
         "samples": samples,

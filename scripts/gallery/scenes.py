@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from srbf.bake.point_lights import PointGrid
-from srbf.bake.settings import BakeSettings, Receiver
+from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.capture import Transport
 from srbf.direct.choice import Direct
 
@@ -65,10 +65,10 @@ class Sun:
 @dataclass(frozen=True)
 class Scene:
     """All that is decided of one scene. `moving` are the folders of the fits in the clip, `tested` directions (azimuth and elevation,
-    degrees) near which the strip's held-out lights are taken."""
+    degrees) near which the strip's held-out lights are taken. Of several `receivers`, all lightmaps, one atlas is baked."""
 
     name: str
-    receiver: str
+    receivers: tuple[str, ...]
     size: tuple[int, int]
     fits: tuple[Fit, ...]
     clip: Sun | Lantern
@@ -91,9 +91,15 @@ class Scene:
         """The fits of the clip; the first carries the lantern."""
         return tuple(next(fit for fit in self.fits if fit.folder == folder) for folder in self.moving)
 
+    @property
+    def receiver(self) -> Receiver:
+        """What is baked, as `srbf bake` takes its --receiver words."""
+        (receiver,) = captures_of([Receiver.parse(word) for word in self.receivers])
+        return receiver
+
     def bake_settings(self) -> BakeSettings:
         """As `srbf bake` takes them; a dome's light list is added by who writes it."""
-        receiver = Receiver.parse(self.receiver)
+        receiver = self.receiver
         settings = BakeSettings(
             receiver,
             *self.size,
@@ -113,7 +119,7 @@ class Scene:
         """A bake of true lamps on the lantern's path, by which the relit lantern is measured."""
         if not isinstance(self.clip, Lantern):
             return None
-        receiver = Receiver.parse(self.receiver)
+        receiver = self.receiver
         grid = PointGrid(1.0, grid=self.clip.path)
         return BakeSettings(receiver, *self.size, samples=samples, validation=0, holdout=0, quantity="radiance", points=grid)
 
@@ -143,10 +149,12 @@ MAPS_AND_RAYS = replace(MAPS, folder="asset-indirect-25-maps", label="25 maps + 
 SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, all light")
 SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"scalars": 16, "encoding": "uint8"}, light="indirect")
 
+STILL_LIFE = tuple(f"lightmap:{name}" for name in ("Table", "Tall Vase", "Egg", "Faceted Vase", "Mirrored Jar", "Sheared Bowl", "Ring"))
+
 SCENES = (
     Scene(
         name="caustics",
-        receiver="lightmap:Table",
+        receivers=("lightmap:Table",),
         size=(512, 512),
         samples=4,
         holdout=24,
@@ -156,7 +164,7 @@ SCENES = (
     ),
     Scene(
         name="house",
-        receiver="view",
+        receivers=("view",),
         size=(384, 288),
         validation=0,
         transport="indirect",
@@ -172,7 +180,7 @@ SCENES = (
     ),
     Scene(
         name="coloured_room",
-        receiver="view",
+        receivers=("view",),
         size=(384, 288),
         soft_sun=True,
         fits=(MAPS, SMALL),
@@ -182,7 +190,7 @@ SCENES = (
     ),
     Scene(
         name="lattice",
-        receiver="view",
+        receivers=("view",),
         size=(384, 288),
         transport="indirect",
         fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
@@ -192,12 +200,22 @@ SCENES = (
     ),
     Scene(
         name="coin",
-        receiver="view",
+        receivers=("view",),
         size=(384, 384),
         samples=16,
         fits=(MAPS, SMALL),
         dome=Dome(80, 20, 12),
         clip=Sun(15, 22, 2),
         tested=((60, 60), (200, 35), (320, 16)),
+    ),
+    Scene(
+        name="still_life",
+        receivers=STILL_LIFE,
+        size=(320, 320),
+        transport="indirect",
+        fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
+        clip=Sun(20, 60, 2),
+        moving=("asset-25-maps", "asset"),
+        clip_width=800,
     ),
 )

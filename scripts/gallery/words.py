@@ -26,6 +26,7 @@ TITLES = {
     "coloured_room": "Glossy things in a coloured room",
     "lattice": "Shadows of laths and leaves",
     "coin": "A coin under a dome of lamps",
+    "still_life": "Vases and a ring in one atlas",
 }
 
 WORDS = {
@@ -65,5 +66,11 @@ imported by `srbf import --lp dirs.lp --holdout-lp test.lp --transfer srgb`. The
 
 Where it fails: 25 maps lighten the shadows behind face and letters, lose the coin's own on the felt, and leave dark blotches. The best of
 16 bytes comes within a decibel of all photographs interpolated; its shadows have grainy edges where the lamps stand too far apart.
+""",
+    "still_life": """
+Seven objects in one lightmap: spheres scaled along three axes, a scaled cube under them, a mirrored jar, a bowl sheared by its parent and a
+ring; smooth and flat shading. No scale is applied. Rays add the direct light, 16 scalars what the objects reflect onto each other.
+
+Where it fails: all light in 25 maps blurs the shadows that the objects cast on the table and on themselves, and rings show on round shapes.
 """,
 }

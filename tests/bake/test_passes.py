@@ -91,15 +91,18 @@ def test_the_mean_of_passes_has_no_bias_at_chart_borders(bake, tmp_path: Path, s
         assert abs(error[where].mean()) < 2e-3 * wanted[covered].mean()
 
 
-def test_passes_of_a_camera_differ(bake, tmp_path: Path) -> None:
-    """At the plane's edges against nothing, where coverage is what varies, and at the shadow's: light is as much as was met of a pixel."""
-    sun = (0.53, 0.0, 0.86)
-    capture = bake("occluder", "view", width=40, height=30, holdout=0, light_list=suns(tmp_path / "suns.lp", sun, PASSES)).capture
-    seen = values(capture) * capture.coverage()
-    deviation = seen.std(axis=0)
-    edge = deviation > 0.1 * seen.max()
+def test_passes_of_a_camera_add_up(bake, tmp_path: Path) -> None:
+    """At the edges of a colored square against nothing: each pass meets it or not, as coins of the pixel's coverage fall."""
+    sun = (0.5, 0.0, 0.86)
+    capture = bake("view", "view", width=40, height=30, holdout=0, light_list=suns(tmp_path / "suns.lp", sun, PASSES)).capture
+    coverage = capture.coverage()
+    edge = (coverage > 0.1) & (coverage < 0.9)
     assert edge.sum() > 20
-    squares = ((seen[0] - seen[1]) ** 2)[edge].mean() / (2 * deviation[edge] ** 2).mean()
-    assert 0.4 < squares < 1.6
-    noise = (seen - seen.mean(axis=0))[:, edge]
+    seen = values(capture)[:, edge] * coverage[edge] / (0.4 * sun[2] / np.linalg.norm(sun) / np.pi)
+    chance = coverage[edge].astype(np.float64)
+    coin = chance * (1 - chance)
+    assert abs((seen.mean(axis=0) - chance).mean()) < 0.02
+    assert 0.4 < ((seen[0] - seen[1]) ** 2).mean() / (2 * coin).mean() < 1.6
+    assert seen.var(axis=0, ddof=1).mean() / coin.mean() == pytest.approx(1, abs=0.1)
+    noise = seen - seen.mean(axis=0)
     assert abs((noise[1:] * noise[:-1]).mean() / (noise**2).mean()) < 0.05
