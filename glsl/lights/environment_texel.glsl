@@ -5,15 +5,16 @@
            straddles it is cut there, its centre the middle of what is left
    twin:   srbf.lights.environment_samples
    cite:   - */
+#include "lights/sine_cosine.glsl"
+
 vec4 srbfEnvironmentTexel(ivec2 texel, ivec2 size, bool cut) {
-    float step = 3.14159265358979 / float(size.y);
-    float lowest = cut ? 0.0 : -1.57079632679490;
-    float top = max(step * (0.5 * float(size.y) - float(texel.y)), lowest);
-    float bottom = max(step * (0.5 * float(size.y) - float(texel.y + 1)), lowest);
-    float elevation = 0.5 * (top + bottom);
-    float azimuth = 6.28318530717959 * (0.5 - (float(texel.x) + 0.5) / float(size.x));
-    float around = cos(elevation);
+    // elevations in right angles, times the rows: whole numbers
+    int lowest = cut ? 0 : -size.y;
+    int top = max(size.y - 2 * texel.y, lowest);
+    int bottom = max(size.y - 2 * (texel.y + 1), lowest);
+    vec2 elevation = srbfSineCosine(top + bottom, 2 * size.y);
+    vec2 azimuth = srbfSineCosine(2 * (size.x - 2 * texel.x - 1), size.x);
     // sin a - sin b without taking one number near 1 from another
-    float solidAngle = 2.0 * around * sin(0.5 * (top - bottom)) * (6.28318530717959 / float(size.x));
-    return vec4(around * cos(azimuth), around * sin(azimuth), sin(elevation), solidAngle);
+    float solidAngle = 2.0 * elevation.y * srbfSineCosine(top - bottom, 2 * size.y).x * (6.28318530717959 / float(size.x));
+    return vec4(elevation.y * azimuth.y, elevation.y * azimuth.x, elevation.x, solidAngle);
 }

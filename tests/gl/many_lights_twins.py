@@ -262,6 +262,18 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
 ENVIRONMENT = EnvironmentLight(np.random.default_rng(39).random((7, 12, 3)).astype(np.float32))  # its middle row straddles the horizon
 
 
+@twin("lights/sine_cosine.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Every part of turns of few, odd and many steps, and some turns more; whole right angles exactly."""
+    for whole in (1, 2, 3, 7, 256, 4095):
+        part = np.unique(np.linspace(-9 * whole, 9 * whole, 997).astype(int))
+        found = evaluate("lights/sine_cosine.glsl", f"vec4(srbfSineCosine(int(a.x), {whole}), 0.0, 0.0)", vec4(part))
+        angle = part / whole * (np.pi / 2)
+        np.testing.assert_allclose(found[:, :2], np.stack([np.sin(angle), np.cos(angle)], axis=1), atol=3e-7)
+        right = part % whole == 0
+        np.testing.assert_array_equal(found[right, :2], np.round(np.stack([np.sin(angle), np.cos(angle)], axis=1))[right])
+
+
 @twin("lights/environment_texel.glsl")
 def _(evaluate: Evaluate) -> None:
     rows, columns = np.mgrid[:7, :12]
