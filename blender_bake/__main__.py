@@ -101,20 +101,12 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
-        cut = translucency.cut_outs(scene)
-        if cut:
-            channel.warn(
-                f"transparency that varies over the surface is held as one mean tint by the direct light of an indirect capture: "
-                f"{', '.join(repr(name) for name in cut)}; bake combined where such shadows matter"
-            )
         translucent = translucency.find(scene)
         tints = job.get("tints")
         if tints is None:
             aims = [partial(illuminant.aim, light) for light in job["probes"]]
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-            seen_by = None
-            if job["receiver"]["kind"] == "lightmap":
-                seen_by = {described["object"]: described["uv_layer"] for described in receiver.descriptions()}
+            seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
             (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
             if missed := without_triangles.line(scene):
                 channel.warn(missed)

@@ -28,17 +28,13 @@ TRIANGLES = 4
 
 @dataclass(frozen=True)
 class Part:
-    """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order.
-
-    `lightmap` (V, 2) is where a receiver's corners lie in its lightmap, v down as glTF has it.
-    """
+    """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order."""
 
     object: str
     material: str | None
     casts: bool
     corners: np.ndarray
     normals: np.ndarray
-    lightmap: np.ndarray | None = None
 
 
 def show_as_rendered(scene: bpy.types.Scene) -> None:
@@ -59,11 +55,8 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
             obj.data.resolution_u = obj.data.render_resolution_u
 
 
-def parts(receivers: Mapping[str, str] | None) -> Iterator[Part]:
-    """Every renderable object that casts shadows or receives light, by material.
-
-    `receivers` names the lightmap's UV layer of each; None where all that a camera sees receives.
-    """
+def parts(receivers: set[str] | None) -> Iterator[Part]:
+    """Every renderable object that casts shadows or receives light (`receivers`: all of them where None), by material."""
     for shown in rendered():
         obj = shown.object
         casts = obj.visible_shadow
@@ -71,8 +64,7 @@ def parts(receivers: Mapping[str, str] | None) -> Iterator[Part]:
             continue
         mesh = obj.to_mesh()
         if mesh is not None:
-            layer = None if receivers is None or shown.is_instance else receivers.get(shown.name)
-            yield from _by_material(shown, casts, mesh, layer)
+            yield from _by_material(shown, casts, mesh)
             obj.to_mesh_clear()
 
 
@@ -126,29 +118,22 @@ def corners_of(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Corners:
     return Corners(loops, corners, turned, materials)
 
 
-def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh, layer: str | None) -> Iterator[Part]:
+def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh) -> Iterator[Part]:
     found, slots = corners_of(mesh, shown.matrix), shown.object.material_slots
-    lightmap = None
-    if layer is not None and layer in mesh.uv_layers:
-        uv = np.empty(len(mesh.loops) * 2, np.float32)
-        mesh.uv_layers[layer].uv.foreach_get("vector", uv)
-        lightmap = (uv.reshape(-1, 2) * [1, -1] + [0, 1])[found.loops]
     for index in np.unique(found.materials):
         chosen = np.repeat(found.materials == index, 3)
         slot = slots[index].material if index < len(slots) else None
         if slot is not None and is_only_volume(slot):
             continue
         places, normals = found.places[chosen].astype("<f4"), found.normals[chosen].astype("<f4")
-        own = None if lightmap is None else lightmap[chosen].astype("<f4")
-        yield Part(shown.name, slot.name if slot else None, casts, places, normals, own)
+        yield Part(shown.name, slot.name if slot else None, casts, places, normals)
 
 
 def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
     """The parts as one .glb; `tints` names the materials that light passes straight, and what one wall of them lets through.
 
     That is told twice: to any reader as a transmission of the mean tint, to ours by the extras `tint_by_cosine`.
-    The node of an object that does not cast shadows at all says `casts_shadow: false` in its extras, that of a receiver with a lightmap
-    `lightmap_texcoord: 0`, the TEXCOORD that holds its place there.
+    An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`.
     """
     names = sorted({part.material for part in parts if part.material is not None})
     meshes: list[dict[str, Any]] = []
@@ -164,9 +149,8 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         return len(accessors) - 1
 
     for part in parts:
-        columns = [part.corners, part.normals, *([] if part.lightmap is None else [part.lightmap])]
-        both, index = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)
-        corners, normals = np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:6])
+        both, index = np.unique(np.concatenate([part.corners, part.normals], axis=1), axis=0, return_inverse=True)
+        corners, normals = np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:])
         limits = {"min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()}
         primitive: dict[str, Any] = {
             "attributes": {
@@ -176,14 +160,10 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
             "indices": put(index.ravel().astype("<u4"), UNSIGNED_INT, "SCALAR", ELEMENT_ARRAY_BUFFER),
             "mode": TRIANGLES,
         }
-        extras: dict[str, Any] = {} if part.casts else {"casts_shadow": False}
-        if part.lightmap is not None:
-            primitive["attributes"]["TEXCOORD_0"] = put(np.ascontiguousarray(both[:, 6:8]), FLOAT, "VEC2", ARRAY_BUFFER)
-            extras["lightmap_texcoord"] = 0
         if part.material is not None:
             primitive["material"] = names.index(part.material)
         meshes.append({"name": part.object, "primitives": [primitive]})
-        nodes.append({"name": part.object, "mesh": len(meshes) - 1, **({"extras": extras} if extras else {})})
+        nodes.append({"name": part.object, "mesh": len(meshes) - 1, **({} if part.casts else {"extras": {"casts_shadow": False}})})
     root = {"name": "z-up to y-up", "rotation": Z_UP_TO_Y_UP, "children": list(range(len(nodes)))}
     passing = any(name in tints for name in names)
     document = {

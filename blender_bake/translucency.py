@@ -88,13 +88,6 @@ def find(scene: bpy.types.Scene) -> list[Translucent]:
     return [Translucent(m) for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
 
 
-def cut_outs(scene: bpy.types.Scene) -> list[str]:
-    """Names of the materials whose transparency an image or a procedure varies over the surface, which one tint per wall cannot hold."""
-    slots = [slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots]
-    used = {m for m in slots if m} | {m for mesh in bpy.data.meshes for m in mesh.materials if m}
-    return sorted(m.name for m in used if m.use_nodes and m.node_tree and _passes(m) and _varies(m.node_tree))
-
-
 def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]) -> dict[str, Curve]:
     """The tint of each material that comes nearest, in least squares, to the direct light behind it.
 
@@ -166,21 +159,6 @@ def _curve(walls: np.ndarray, whole: np.ndarray, passed: np.ndarray) -> Curve:
 def _passes(material: bpy.types.Material) -> bool:
     output = material.node_tree.get_output_node("CYCLES")
     return output is not None and bool(output.inputs["Surface"].links) and _lets_through(material.node_tree)
-
-
-def _varies(tree: bpy.types.NodeTree) -> bool:
-    """Whether an alpha, the color of a Transparent BSDF, or its share in a mixture is driven by nodes."""
-    for node in tree.nodes:
-        if node.bl_idname == "ShaderNodeBsdfPrincipled" and node.inputs["Alpha"].links:
-            return True
-        if node.bl_idname == "ShaderNodeBsdfTransparent":
-            reached = [link.to_node for output in node.outputs for link in output.links]
-            mixed = any(other.bl_idname == "ShaderNodeMixShader" and other.inputs[0].links for other in reached)
-            if reached and (node.inputs["Color"].links or mixed):
-                return True
-        if node.bl_idname == "ShaderNodeGroup" and node.node_tree and _varies(node.node_tree):
-            return True
-    return False
 
 
 def _lets_through(tree: bpy.types.NodeTree) -> bool:

@@ -100,24 +100,6 @@ def pane():
     glass.data.materials[0] = material("glass", (0.8, 0.4, 0.2), "ShaderNodeBsdfTransparent")
 
 
-def ball(smooth):
-    """A UV sphere of 24 by 12 faces, alone."""
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12, radius=1)
-    bpy.context.object.name = "Ball"
-    bpy.context.object.data.polygons.foreach_set("use_smooth", [smooth] * len(bpy.context.object.data.polygons))
-
-
-def leaf():
-    """The square under a card whose alpha is a checker."""
-    quad("Plane")
-    card = quad("Card", corners=[(-0.5, -0.5, 0.4), (0.5, -0.5, 0.4), (0.5, 0.5, 0.4), (-0.5, 0.5, 0.4)])
-    leaf = bpy.data.materials.new("leaf")
-    leaf.use_nodes = True
-    checker = leaf.node_tree.nodes.new("ShaderNodeTexChecker")
-    leaf.node_tree.links.new(checker.outputs["Fac"], leaf.node_tree.nodes["Principled BSDF"].inputs["Alpha"])
-    card.data.materials[0] = leaf
-
-
 def sharp(kind="PERSP"):
     """A coloured plane and the wall before a camera without depth of field."""
     quad("Plane", color=(0.8, 0.4, 0.2))
@@ -324,9 +306,6 @@ SCENES = {
     "ortho": lambda: view("ORTHO"),
     "pano": lambda: view("PANO"),
     "pane": pane,
-    "flat ball": lambda: ball(False),
-    "smooth ball": lambda: ball(True),
-    "leaf": leaf,
     "sharp": sharp,
     "sharp ortho": lambda: sharp("ORTHO"),
     "emissive": emissive,

@@ -11,8 +11,6 @@ precision highp sampler2D;
 
 uniform sampler2D points;
 uniform sampler2D normals;
-uniform sampler2D faces;
-uniform sampler2D lifts;
 uniform sampler2D heights;
 uniform sampler2D tints;
 uniform sampler2D wallHeights;
@@ -25,22 +23,16 @@ uniform float weight;
 
 layout(location = 0) out vec4 answer;
 
-const float STEEPEST = 1000.0;  // metres a metre: beyond it single precision holds no plane
-const float BIAS = 0.5;         // map texels
-const float TERMINATOR = 0.1;   // cosine below which light meets the rounded surface [Hanika2021], as Cycles has it by default
+const float STEEPEST = 16.0;  // metres a metre: beyond it a receiver's plane tells nothing
+const float BIAS = 0.5;       // map texels
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec3 normal = texelFetch(normals, at, 0).xyz;
-    vec3 face = texelFetch(faces, at, 0).xyz;
-    float NoL = dot(normal, toLight);
-    float NgL = dot(face, toLight);
-    float rounded = clamp(NoL < TERMINATOR ? 2.0 - (NgL + NoL) / TERMINATOR : 1.0 - NgL / TERMINATOR, 0.0, 1.0);
-    vec3 lift = texelFetch(lifts, at, 0).xyz * rounded;
-    vec3 place = srbfShadowPlace(texelFetch(points, at, 0).xyz + lift, across, up, toLight, low, extent);
+    vec3 place = srbfShadowPlace(texelFetch(points, at, 0).xyz, across, up, toLight, low, extent);
     float step = extent / float(textureSize(heights, 0).x);
-    vec3 plane = NgL < NoL && dot(lift, lift) > 0.0 ? mix(face, normal, rounded) : face;
-    vec2 slope = clamp(-vec2(dot(plane, across), dot(plane, up)) / max(dot(plane, toLight), 1.0 / STEEPEST), -STEEPEST, STEEPEST) * step;
+    float NoL = max(dot(normal, toLight), 1.0 / STEEPEST);
+    vec2 slope = clamp(-vec2(dot(normal, across), dot(normal, up)) / NoL, -STEEPEST, STEEPEST) * step;
     float bias = BIAS * step;
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);

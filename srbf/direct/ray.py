@@ -12,8 +12,7 @@ from scipy import ndimage
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.dilation import dilate, nearest_covered
-from srbf.direct.footprints import Footprints
-from srbf.direct.receivers import Receivers, disc_points, hashed, on_surface, pixel_filter, spread_points
+from srbf.direct.receivers import Receivers, disc_points, hashed, pixel_filter, spread_points
 from srbf.direct.shadow import wall_tint
 from srbf.errors import MissingLibraryError
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, spot_cone
@@ -23,18 +22,18 @@ SAMPLES = 32  # of a texel whose first ones differ
 DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbours
 KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
 TEXELS = 1 << 16  # at a time
-LIFT = 4e-6  # of the largest coordinate of its triangle, some steps of single precision: how far off its surface a shadow ray starts
-STEP = 1e-5  # m at the origin and a part of the distance from it: how far behind a wall the way goes on
-PROBE = 1e-4  # likewise, how near a lightmap's texel its triangle is looked for, at least
+LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off its surface a shadow ray starts
+PROBE = 1e-4  # likewise, how near a lightmap's texel its triangle is looked for
 MOST_WALLS = 32
 TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
 TINY = 1e-12  # a share below which nothing is diffuse
 NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbours of a pixel
+SMOOTH_COS = 0.9999  # corner normals closer than that to the face's are a flat face's
 
 
 @dataclass(frozen=True)
 class Samples:
-    """n points on surfaces: texel each belongs to, its weight (0: nothing there), position, shading and face normal, offsets."""
+    """n points on surfaces: texel each belongs to, its weight (0: nothing there), position, shading and face normal, rounding offset."""
 
     texel: Int[ndarray, " n"]
     weight: Float32[ndarray, " n"]
@@ -42,7 +41,6 @@ class Samples:
     normal: Float32[ndarray, "n 3"]
     face: Float32[ndarray, "n 3"]
     lift: Float32[ndarray, "n 3"]
-    off: Float32[ndarray, " n"]  # m: how far a shadow ray starts off the surface
     share: Float32[ndarray, "n 3"] | Float32[ndarray, "n 1"]  # in its texel's mean: its albedo, where a pixel shows several
 
 
@@ -73,7 +71,6 @@ class RayTracer:
         if receivers.camera is not None and receivers.quantity == "radiance":
             self._pure = self._materials_of_pixels()
         if receivers.camera is None:
-            self._footprints = Footprints.of(triangles, receivers.images["position"])
             self._slopes = [g.reshape(-1, 3) for name in ("position", "normal") for g in receivers.gradients(name)]
 
     def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
@@ -137,7 +134,7 @@ class RayTracer:
         low_sun = NoL[lit] < TERMINATOR
         amount = np.where(low_sun, 2 - (NgL + NoL[lit]) / TERMINATOR, 1 - NgL / TERMINATOR)
         origin = point + samples.lift[lit] * np.clip(amount, 0, 1)[:, None]
-        origin += face * (np.where(NgL < 0, -1, 1) * samples.off[lit])[:, None]
+        origin += face * (np.where(NgL < 0, -1, 1) * LIFT * (1 + np.abs(point).max(axis=1)))[:, None]
         passed = self._passed(origin, direction, None if distance is None else distance[lit])
         result[lit] = passed * (NoL * strength)[lit, None]
         return result
@@ -184,7 +181,7 @@ class RayTracer:
             if not len(active):
                 break
             passed[active] *= self._tint(hit, bary, direction[active])
-            step = far + STEP * (1 + np.abs(start).max(axis=1))
+            step = far + LIFT * (1 + np.abs(start).max(axis=1))
             start = start + direction[active] * step[:, None]
             left = None if left is None else left[meets] - step
         return passed
@@ -204,57 +201,34 @@ class RayTracer:
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         offset = ((square - 0.5) * self._receivers.sampling.get("footprint", 1.0)).astype(np.float32)
-        triangle = np.full(len(texel), -1) if self._footprints is None else self._footprints.triangle[texel]
-        point, normal, hit, bary = self._near(texel, offset, triangle < 0)
-        shown = np.flatnonzero(triangle >= 0)
-        if self._footprints is not None:
-            hit[shown], bary[shown] = triangle[shown], self._footprints.weights(texel[shown], offset[shown])
-        on = np.flatnonzero(hit >= 0)
-        face, lift, off = normal.copy(), np.zeros_like(point), np.zeros(len(texel), np.float32)
-        off[:] = STEP * (1 + np.abs(point).max(axis=1))
-        point[on], rounded, facing, lift[on], off[on] = self._surface(hit[on], bary[on])
-        front = self._receivers.images["normal"].reshape(-1, 3)[texel[on]]
-        front = np.where(np.einsum("nc,nc->n", facing, front) < 0, -1, 1)[:, None].astype(np.float32)
-        normal[on], face[on] = rounded * front, facing * front
-        lift[on] *= front
-        whole = np.ones((len(texel), 1), np.float32)
-        return Samples(texel, whole[:, 0], point, normal, face, lift, off, whole)
-
-    def _near(
-        self, texel: np.ndarray, offset: np.ndarray, open_: Bool[ndarray, " n"]
-    ) -> tuple[np.ndarray, np.ndarray, Int[ndarray, " n"], Float32[ndarray, "n 3"]]:
-        """(point, normal, triangle, barycentric place): `open_` samples moved along the position map's slope, and back onto the mesh."""
         images = {name: self._receivers.images[name].reshape(-1, 3) for name in ("position", "normal")}
         right, down, turn_right, turn_down = (slope[texel] for slope in self._slopes)
-        moved = right * offset[:, :1] + down * offset[:, 1:]
-        point = images["position"][texel] + moved
+        point = images["position"][texel] + right * offset[:, :1] + down * offset[:, 1:]
         normal = images["normal"][texel] + turn_right * offset[:, :1] + turn_down * offset[:, 1:]
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        hit, bary = np.full(len(texel), -1), np.zeros((len(texel), 3), np.float32)
-        chosen = np.flatnonzero(open_)
-        start, way = point[chosen], normal[chosen]
-        reach = PROBE * (1 + np.abs(start).max(axis=1)) + np.linalg.norm(moved[chosen], axis=1)
-        nearest = np.full(len(chosen), np.inf)
-        for origin, direction in ((start + way * reach[:, None], -way), (start - way * reach[:, None], way), (start, way), (start, -way)):
-            found, far, place = self._all.first_hit(origin, direction)
-            away = np.where(found >= 0, np.abs(np.where(found >= 0, far, 0) - np.linalg.norm(origin - start, axis=1)), np.inf)
-            corners = self._corners[found]
-            face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            agrees = np.abs(np.einsum("nc,nc->n", face, way)) > 0.2 * np.linalg.norm(face, axis=1)
-            better = agrees & (away <= reach) & (away < nearest)
-            nearest[better], hit[chosen[better]], bary[chosen[better]] = away[better], found[better], place[better]
-        return point, normal, hit, bary
+        reach = PROBE * (1 + np.abs(point).max(axis=1))
+        hit, far, _ = self._all.first_hit(point + normal * reach[:, None], -normal)
+        found = (hit >= 0) & (far < 2 * reach)
+        _, face, lift = self._surface(np.where(found, hit, 0), point)
+        agrees = np.einsum("nc,nc->n", face, normal)
+        face = face * np.where(agrees < 0, -1, 1)[:, None].astype(np.float32)
+        lift = lift * np.where(agrees < 0, -1, 1)[:, None].astype(np.float32)
+        found &= np.abs(agrees) > 0.2
+        face = np.where(found[:, None], face, normal)
+        whole = np.ones((len(texel), 1), np.float32)
+        return Samples(texel, whole[:, 0], point, normal, face, np.where(found[:, None], lift, 0), whole)
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         origin, direction = self._looks(texel, square)
-        hit, _, bary = self._all.first_hit(origin, direction)
+        hit, far, _ = self._all.first_hit(origin, direction)
         real = hit >= 0
         triangle = np.where(real, hit, 0)
-        point, normal, face, lift, off = self._surface(triangle, bary)
+        point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
+        normal, face, lift = self._surface(triangle, point)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
         weight = real.astype(np.float32)
         share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
-        return Samples(texel, weight, point, normal * away, face * away, lift * away, off, share)
+        return Samples(texel, weight, point, normal * away, face * away, lift * away, share)
 
     def _looks(self, texel: np.ndarray, square: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
         """The camera's rays: origin and direction."""
@@ -303,10 +277,28 @@ class RayTracer:
             open_ = open_[~found]
         return np.maximum(image[source], 0)
 
-    def _surface(self, triangle: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"]) -> tuple[np.ndarray, ...]:
-        """`on_surface`, and how far (m) off it a shadow ray starts."""
-        corners = self._corners[triangle]
-        return *on_surface(corners, self._normals[triangle], bary), LIFT * np.abs(corners).max(axis=(1, 2))
+    def _surface(self, triangle: Int[ndarray, " n"], point: Float32[ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(shading normal, face normal, offset onto the surface that the corner normals round) at points of triangles [Hanika2021]."""
+        corners, normals = self._corners[triangle], self._normals[triangle]
+        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.maximum(np.einsum("nc,nc->n", face, face), 1e-30)
+        bary = np.stack(
+            [
+                np.einsum("nc,nc->n", np.cross(corners[:, (i + 2) % 3] - corners[:, (i + 1) % 3], point - corners[:, (i + 1) % 3]), face)
+                / area
+                for i in range(3)
+            ],
+            axis=1,
+        )
+        bary = np.clip(bary, 0, 1).astype(np.float32)
+        face = face / np.sqrt(area)[:, None]
+        face = face * np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
+        normal = np.einsum("nk,nkc->nc", bary, normals)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
+        below = np.minimum(np.einsum("nkc,nkc->nk", point[:, None] - corners, normals), 0)
+        lift = -np.einsum("nk,nk,nkc->nc", bary, below, normals)
+        flat = (np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
+        return normal, face.astype(np.float32), np.where(flat[:, None], 0, lift).astype(np.float32)
 
 
 def _add(total: np.ndarray, share: np.ndarray, samples: Samples, light: np.ndarray) -> None:

@@ -17,7 +17,6 @@ from srbf.scene_file import Triangles, read_triangles
 
 SAME_SURFACE_COS = 0.9  # of the normals of two neighbours that lie on one smooth surface
 OFF_PLANE = 0.2  # of their distance: how far a neighbour may lie off the tangent plane
-SMOOTH_COS = 0.9999  # corner normals closer than that to the face's are a flat face's
 LONGER = 2.0  # a neighbour farther off than this many times the other side's lies across a seam
 
 
@@ -97,23 +96,6 @@ class Receivers:
         real = np.ones(length.shape, bool) if covered is None else (covered > 0)
         neighbour = np.roll(real, -sign, axis)
         return flat & ((turned * normal).sum(axis=2) >= SAME_SURFACE_COS) & (length > 0) & real & neighbour
-
-
-def on_surface(
-    corners: Float32[ndarray, "n 3 3"], normals: Float32[ndarray, "n 3 3"], bary: Float32[ndarray, "n 3"]
-) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"], Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
-    """(point, shading normal, face normal, offset onto the surface that the corner normals round) in triangles [Hanika2021]."""
-    bary = np.clip(bary, 0, 1).astype(np.float32)
-    point = np.einsum("nk,nkc->nc", bary, corners)
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face = face / np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
-    face = face * np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
-    normal = np.einsum("nk,nkc->nc", bary, normals)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-    below = np.minimum(np.einsum("nkc,nkc->nk", point[:, None] - corners, normals), 0)
-    lift = -np.einsum("nk,nk,nkc->nc", bary, below, normals)
-    flat = (np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
-    return point, normal, face.astype(np.float32), np.where(flat[:, None], 0, lift).astype(np.float32)
 
 
 def spread_points(count: int) -> Float64[ndarray, "S 4"]:

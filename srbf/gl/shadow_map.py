@@ -11,8 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.direct.footprints import Footprints
-from srbf.direct.receivers import Receivers, disc_points, on_surface, spread_points
+from srbf.direct.receivers import Receivers, disc_points, spread_points
 from srbf.direct.shadow import SunFrame
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits, compile_program, create_context
@@ -100,11 +99,16 @@ class ShadowMapper:
         if not covered.any():
             covered[:] = True
         centre = position[covered].mean(axis=0, dtype=np.float64)  # single precision is finest about the origin
+        right, down = receivers.gradients("position")
+        turn_right, turn_down = receivers.gradients("normal")
+        footprint = receivers.sampling.get("footprint", 1.0)
         self._places = []
         every = []
-        for surface in self._surfaces(position, normal):
-            point = surface["points"] - centre
-            self._places.append({name: self._texture(pixels) for name, pixels in {**surface, "points": point}.items()})
+        for x, y in CORNERS:
+            point = position - centre + footprint * (x * right + y * down)
+            turned = normal + footprint * (x * turn_right + y * turn_down)
+            turned /= np.maximum(np.linalg.norm(turned, axis=2, keepdims=True), 1e-20)
+            self._places.append((self._texture(point), self._texture(turned)))
             every.append(point[covered])
         self._points = np.concatenate(every).astype(np.float64)
         triangles = receivers.triangles
@@ -124,36 +128,6 @@ class ShadowMapper:
         lookup = self._program("fullscreen.vert", "direct.frag")
         corners = self._kept(gl.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
         self._lookup = self._kept(gl.vertex_array(lookup, [(corners, "2f", "corner")]))
-
-    def _surfaces(self, position: Float32[ndarray, "H W 3"], normal: Float32[ndarray, "H W 3"]) -> Iterator[dict[str, ndarray]]:
-        """Points of each texel's footprint, shading and face normals there, and offsets onto the rounded surface; (H, W, 3) each.
-
-        On the triangles that the texels show, where the scene has the lightmap's coordinates; else along the slopes of the images.
-        """
-        receivers, triangles = self._receivers, self._receivers.triangles
-        right, down = receivers.gradients("position")
-        turn_right, turn_down = receivers.gradients("normal")
-        footprint = receivers.sampling.get("footprint", 1.0)
-        footprints = Footprints.of(triangles, position) if receivers.camera is None else None
-        for x, y in CORNERS:
-            turned = normal + footprint * (x * turn_right + y * turn_down)
-            turned /= np.maximum(np.linalg.norm(turned, axis=2, keepdims=True), 1e-20)
-            found = {
-                "points": position + footprint * (x * right + y * down),
-                "normals": turned,
-                "faces": turned.copy(),
-                "lifts": np.zeros_like(position),
-            }
-            if footprints is not None:
-                texel = np.flatnonzero(footprints.triangle >= 0)
-                own = footprints.triangle[texel]
-                offset = np.broadcast_to(np.array([x, y], np.float32) * np.float32(footprint), (len(texel), 2))
-                point, rounded, face, lift = on_surface(triangles.corners[own], triangles.normals[own], footprints.weights(texel, offset))
-                front = np.where(np.einsum("nc,nc->n", face, normal.reshape(-1, 3)[texel]) < 0, -1, 1)[:, None]
-                surface = {"points": point, "normals": rounded * front, "faces": face * front, "lifts": lift * front}
-                for name, values in surface.items():
-                    found[name].reshape(-1, 3)[texel] = values
-            yield found
 
     def _draw_map(self, frame: SunFrame) -> None:
         gl: Any = self._context
@@ -178,8 +152,8 @@ class ShadowMapper:
         self._sum.use()
         gl.enable_only(gl.BLEND)
         gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
-        for places in self._places:
-            textures = {**places, **{name: texture for name, (texture, _) in self._maps.items()}}
+        for points, normals in self._places:
+            textures = {"points": points, "normals": normals, **{name: texture for name, (texture, _) in self._maps.items()}}
             for unit, texture in enumerate(textures.values()):
                 texture.use(unit)
             units = {name: unit for unit, name in enumerate(textures)}

@@ -65,25 +65,6 @@ def test_rays_give_the_direct_light_back(bake, scene: str, receiver: str) -> Non
         assert (error > 0.1 * true.max()).mean() < 0.01
 
 
-@pytest.mark.parametrize("scene", ["flat ball", "smooth ball"])
-def test_a_ball_does_not_shade_itself(bake, scene: str) -> None:
-    """Against Cycles' own direct light; the lightmap's coordinates come with the scene."""
-    settings = {"width": 48, "height": 48, "lights": 2, "holdout": 3, "holdout_samples": 256}
-    capture = bake(scene, "lightmap:Ball", transport="indirect", **settings).capture
-    receivers, covered = Receivers.of(capture), capture.coverage() > 0
-    assert receivers.triangles.lightmap is not None
-    suns = capture.directions(capture.indices("holdout"))
-    true = np.stack([capture.combined().image(i) - capture.image(i) for i in capture.indices("holdout")])[:, covered]
-    rays = RayTracer(receivers).directional(suns)[:, covered]
-    assert -10 * np.log10(((rays - true) ** 2).mean() / true.max() ** 2) > 60
-
-
-def test_transparency_that_varies_is_named(bake) -> None:
-    said = bake("leaf", "lightmap:Plane", transport="indirect", lights=2).said
-    assert sum("varies over the surface" in line and "'leaf'" in line for line in said) == 1
-    assert not any("varies" in line for line in bake("pane", "lightmap:Plane", "glass", transport="indirect", lights=2).said)
-
-
 def test_glass_leaves_little_in_the_images(bake) -> None:
     """What a pane lets through is traded for its tint by angle: light behind it is direct light then, not caustic."""
     capture = bake("pane", "lightmap:Plane", transport="indirect", lights=24).capture

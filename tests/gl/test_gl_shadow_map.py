@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import ball, build_plane, quad
-from rounded import rounded
 from scipy import ndimage
 
 from srbf.direct.ray import RayTracer
@@ -64,17 +63,3 @@ def test_lamps_are_refused_and_environments_pass(context: Any) -> None:
         with pytest.raises(InputError, match="--direct ray"):
             mapper.answer([PointLight((0.0, 0.0, 1.0))])
         assert (mapper.answer([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
-
-
-@pytest.mark.parametrize("kind", ["ball", "torus"])
-@pytest.mark.parametrize("smooth", [False, True])
-@pytest.mark.parametrize(("around", "across", "size"), [(12, 6, 48), (24, 12, 64), (64, 32, 160)])
-def test_rounded_receivers_have_no_stripes(context: Any, kind: str, smooth: bool, around: int, across: int, size: int) -> None:
-    """The map against exact rays: both on the triangles that the texels show."""
-    receivers = rounded(kind, around, across, size, smooth)
-    covered = receivers.images["coverage"] > 0
-    suns = random_directions(3, "sphere", np.random.default_rng(4))
-    rays = RayTracer(receivers).directional(suns)[:, covered]
-    with ShadowMapper(receivers, context=context) as mapper:
-        mapped = mapper.directional(suns)[:, covered]
-    assert -10 * np.log10(((mapped - rays) ** 2).mean() / rays.max() ** 2) > 40

@@ -115,8 +115,6 @@ export class DirectLight {
         ...this.frame,
         points: { value: null },
         normals: { value: null },
-        faces: { value: null }, // the page knows no triangles of its texels: their shading normals serve
-        lifts: { value: texture(new Float32Array(4 * width * height), width, height) },
         heights: { value: this.heights.texture },
         wallHeights: { value: this.wallHeights.texture },
         tints: { value: this.tints.texture },
@@ -169,7 +167,6 @@ export class DirectLight {
       for (const { points, normals } of this.corners) {
         uniforms.points.value = points;
         uniforms.normals.value = normals;
-        uniforms.faces.value = normals;
         this.renderer.render(this.quad, this.camera);
       }
     }
