@@ -101,8 +101,9 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
         if tints is None:
             aims = [partial(illuminant.aim, light) for light in job["probes"]]
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-            seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
-            (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+            lightmap = job["receiver"]["kind"] == "lightmap"
+            layers = {described["object"]: described["uv_layer"] for described in receiver.descriptions()} if lightmap else None
+            (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(layers)), tints))
             channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)
         switch = translucency.Switch(translucent, tints)
     channel.emit("ready")
