@@ -70,11 +70,11 @@ class Footprints:
         return self._parts[side]
 
 
-def footprints(receivers: Receivers, slopes: list[Float32[ndarray, "P 3"]], first_hit: FirstHit) -> Footprints:
+def footprints(receivers: Receivers, slopes: list[Float32[ndarray, "P 3"]], first_hit: FirstHit | None) -> Footprints:
     """The footprints of all texels: by the scene's lightmap coordinates, else by probing along the normal from both sides.
 
     `slopes`: change of the position a texel to the right and down, used where the scene has no lightmap coordinates. `first_hit` is
-    Embree's: (triangle, distance, barycentric place) of rays.
+    Embree's, where there is one: (triangle, distance, barycentric place) of rays.
     """
     triangles = receivers.triangles
     position, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
@@ -84,8 +84,9 @@ def footprints(receivers: Receivers, slopes: list[Float32[ndarray, "P 3"]], firs
     if triangles.lightmap is not None:
         _drawn(receivers, triangle)
         triangle[~covered] = -1
-    texels = np.flatnonzero(covered & (triangle < 0))
-    triangle[texels] = _under(triangles, position[texels], normal[texels], first_hit)
+    if first_hit is not None:
+        texels = np.flatnonzero(covered & (triangle < 0))
+        triangle[texels] = _under(triangles, position[texels], normal[texels], first_hit)
     found = np.maximum(triangle, 0)
     corners = triangles.corners[found].astype(np.float64)
     center, frame = _places(corners, position), _barycentric_frame(corners)

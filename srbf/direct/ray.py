@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
 from scipy import ndimage
 
-from srbf.arrays import Bool, Float, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.dilation import dilate, nearest_covered
-from srbf.direct.footprints import footprints
+from srbf.direct.embree import EmbreeTriangles
+from srbf.direct.lightmap_points import LightmapPoints
 from srbf.direct.receivers import Receivers, disc_points, hashed, pixel_filter, spread_points
 from srbf.direct.shadow import wall_tint
-from srbf.errors import MissingLibraryError
+from srbf.direct.surface import surface_at
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, spot_cone
 
 FIRST = 4  # samples of every texel
@@ -31,7 +31,6 @@ MOST_WALLS = 32
 TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
 TINY = 1e-12  # a share below which nothing is diffuse
 NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbours of a pixel
-SMOOTH_COS = 1 - 1e-6  # corner normals closer than that to the face's are a flat face's
 
 
 @dataclass(frozen=True)
@@ -54,10 +53,9 @@ class RayTracer:
         self._receivers = receivers
         self._count = max(samples, FIRST)
         triangles = receivers.triangles
-        self._corners, self._normals = triangles.corners, triangles.normals
-        self._all = _Scene(self._corners)
-        self._occluders = _Scene(self._corners[triangles.occluders])
-        self._filters = _Scene(self._corners[triangles.filters])
+        self._all = EmbreeTriangles(triangles.corners)
+        self._occluders = EmbreeTriangles(triangles.corners[triangles.occluders])
+        self._filters = EmbreeTriangles(triangles.corners[triangles.filters])
         self._tints = triangles.tints
         self._filter_material = triangles.material[triangles.filters]
         self._filter_normals = triangles.normals[triangles.filters]
@@ -75,8 +73,7 @@ class RayTracer:
         if receivers.camera is not None and receivers.quantity == "radiance":
             self._pure = self._materials_of_pixels()
         if receivers.camera is None:
-            self._slopes = [g.reshape(-1, 3) for name in ("position", "normal") for g in receivers.gradients(name)]
-            self._footprints = footprints(receivers, self._slopes[:2], self._all.first_hit)
+            self._lightmap = LightmapPoints(receivers, self._all.first_hit)
 
     def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; environments add nothing."""
@@ -207,31 +204,8 @@ class RayTracer:
         return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
-        """Points on the triangles under the texels' centers; along the maps' slopes where no triangle is."""
-        side = self._receivers.sampling.get("footprint", 1.0)
-        mesh = self._footprints
-        triangle = mesh.triangle[texel]
-        found = triangle >= 0
-        bary, weight = mesh.points(texel, square, side)
-        corners = self._corners[np.maximum(triangle, 0)]
-        normal, face, lift = self._surface(np.maximum(triangle, 0), bary)
-        point = np.einsum("nk,nkc->nc", bary, corners).astype(np.float32)
-        center = self._receivers.images["normal"].reshape(-1, 3)[texel]
-        turned = np.where(np.einsum("nc,nc->n", normal, center) < 0, -1, 1)[:, None].astype(np.float32)
-        normal, face, lift = normal * turned, face * turned, lift * turned
-        if not found.all():
-            lost = ~found
-            point[lost], normal[lost] = self._off_mesh(texel[lost], ((square[lost] - 0.5) * side).astype(np.float32))
-            face[lost], lift[lost], weight[lost] = normal[lost], 0, 1
-        return Samples(texel, weight, point, normal, face, lift, weight[:, None])
-
-    def _off_mesh(self, texel: np.ndarray, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(point, normal) a part of a texel off its center, along the slopes of position and normal map."""
-        position, normal = (self._receivers.images[name].reshape(-1, 3)[texel] for name in ("position", "normal"))
-        right, down, turn_right, turn_down = (slope[texel] for slope in self._slopes)
-        normal = normal + turn_right * offset[:, :1] + turn_down * offset[:, 1:]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        return position + right * offset[:, :1] + down * offset[:, 1:], normal
+        found = self._lightmap.at(texel, square)
+        return Samples(texel, found.weight, found.point, found.normal, found.face, found.lift, found.weight[:, None])
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         origin, direction = self._looks(texel, square)
@@ -239,7 +213,7 @@ class RayTracer:
         real = hit >= 0
         triangle = np.where(real, hit, 0)
         point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
-        normal, face, lift = self._surface(triangle, bary)
+        normal, face, lift = surface_at(self._receivers.triangles, triangle, bary)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
         weight = real.astype(np.float32)
         share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
@@ -292,44 +266,6 @@ class RayTracer:
             open_ = open_[~found]
         return np.maximum(image[source], 0)
 
-    def _surface(self, triangle: Int[ndarray, " n"], bary: Float[ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(shading normal, face normal, offset onto the surface that the corner normals round) at places of triangles.
-
-        The offset is that of Cycles: half a parabola through the corners, or the lowest of the planes at the corners, whichever is more
-        [Hanika2021].
-        """
-        corners, normals = self._corners[triangle].astype(np.float64), self._normals[triangle].astype(np.float64)
-        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
-        face *= np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
-        mean = np.einsum("nk,nkc->nc", bary, normals)
-        normal = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-20)
-        lift = mean * _rounding(corners, normals, bary)[:, None]
-        flat = (np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
-        lift[flat] = 0
-        return normal.astype(np.float32), face.astype(np.float32), lift.astype(np.float32)
-
-
-def _rounding(
-    corners: Float64[ndarray, "n 3 3"], normals: Float64[ndarray, "n 3 3"], bary: Float[ndarray, "n 3"]
-) -> Float64[ndarray, " n"]:
-    """Height (m) of the rounded surface above its triangle, as Cycles estimates it."""
-
-    def along(i: int, edge_from: int, edge_to: int) -> np.ndarray:
-        return np.einsum("nc,nc->n", normals[:, i], corners[:, edge_to] - corners[:, edge_from])
-
-    u, v = bary[:, 0], bary[:, 1]
-    a = along(2, 2, 0) - along(0, 2, 0)
-    b = along(2, 2, 1) - along(1, 2, 1)
-    c = along(1, 0, 1) - along(0, 0, 1)
-    parabola = a * u * (u - 1) + (a + b + c) * u * v + b * v * (v - 1)
-    point = np.einsum("nk,nkc->nc", bary, corners)
-    planes = []
-    for i in range(3):
-        highest = np.maximum(np.maximum(along(i, i, (i + 1) % 3), along(i, i, (i + 2) % 3)), 0)
-        planes.append(np.maximum(np.einsum("nc,nc->n", corners[:, i] - point, normals[:, i]) + highest, 0))
-    return np.maximum(np.minimum.reduce(planes), parabola / 2)
-
 
 @dataclass(frozen=True)
 class _Sums:
@@ -357,41 +293,3 @@ class _Sums:
     def spread(self, texels: Int[ndarray, " e"]) -> Float32[ndarray, " e"]:
         """How far the samples of `texels` differ."""
         return (self.high[texels] - self.low[texels]).max(axis=1)
-
-
-class _Scene:
-    """Triangles behind Embree."""
-
-    def __init__(self, corners: Float32[ndarray, "T 3 3"]) -> None:
-        try:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-        except ImportError as error:
-            raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use --direct shadow-map") from error
-        self._scene: Any = EmbreeScene()
-        self._empty = not len(corners)
-        if not self._empty:
-            self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(corners, np.float32))
-
-    def occluded(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Bool[ndarray, " n"]:
-        """Whether anything is in the way."""
-        if self._empty or not len(origin):
-            return np.zeros(len(origin), bool)
-        far = np.full(len(origin), 1e30, np.float32) if distance is None else distance.astype(np.float32)
-        hits = self._scene.run(_f(origin), _f(direction), far, query="OCCLUDED")
-        return np.asarray(hits) >= 0
-
-    def first_hit(
-        self, origin: np.ndarray, direction: np.ndarray
-    ) -> tuple[Int[ndarray, " n"], Float32[ndarray, " n"], Float32[ndarray, "n 3"]]:
-        """(triangle, distance, barycentric place) of the nearest on each ray; -1 where there is none."""
-        count = len(origin)
-        if self._empty or not count:
-            return np.full(count, -1), np.full(count, np.inf, np.float32), np.zeros((count, 3), np.float32)
-        hits = self._scene.run(_f(origin), _f(direction), query="INTERSECT", output=1)
-        u, v = np.asarray(hits["u"]), np.asarray(hits["v"])
-        return np.asarray(hits["primID"]), np.asarray(hits["tfar"]), np.stack([1 - u - v, u, v], axis=1)
-
-
-def _f(array: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(array, np.float32)

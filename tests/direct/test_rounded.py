@@ -14,7 +14,7 @@ from srbf.sphere import random_directions
 
 ROUNDING = 1e-5
 BEND = 2e-4  # of irradiance: what N.L changes over a footprint of 1e-4 texels, and normals in single precision
-SUNS = random_directions(4, "sphere", np.random.default_rng(11))
+SUNS = random_directions(2, "sphere", np.random.default_rng(11))
 
 
 def covered(mapped: Lightmap) -> np.ndarray:
