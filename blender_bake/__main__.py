@@ -96,6 +96,12 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
+        if names := translucency.cut_out(scene):
+            listed = ", ".join(repr(name) for name in names[:8]) + (", …" if len(names) > 8 else "")
+            channel.warn(
+                f"cut-out transparency of {listed} is not in scene.glb: rays and shadow maps tint evenly what it lets through, "
+                "without its outline; bake combined if its shadows matter"
+            )
         translucent = translucency.find(scene)
         tints = job.get("tints")
         if tints is None:

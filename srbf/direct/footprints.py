@@ -61,12 +61,14 @@ class Footprints:
     def _inside(self, side: float) -> Float64[ndarray, " P"]:
         """Of every texel's footprint the part that lies inside its triangle."""
         if side not in self._parts:
+            corners = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
             every = np.arange(len(self.triangle))
+            whole = np.all([(self._at(every, place[None], side) > RIM).all(axis=1) for place in corners], axis=0)
+            cut = np.flatnonzero(~whole)
             grid = (np.stack(np.meshgrid(np.arange(GRID), np.arange(GRID)), axis=-1).reshape(-1, 2) + 0.5) / GRID
-            part = np.zeros(len(every))
-            for place in grid:
-                part += (self._at(every, place[None], side) > RIM).all(axis=1)
-            self._parts[side] = part / len(grid)
+            part = np.ones(len(every))
+            part[cut] = np.mean([(self._at(cut, place[None], side) > RIM).all(axis=1) for place in grid], axis=0) if len(cut) else 0
+            self._parts[side] = part
         return self._parts[side]
 
 

@@ -20,10 +20,10 @@ from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, S
 
 FIRST = 4  # samples of every texel
 SAMPLES = 32  # of a texel whose first ones differ
-MOST = 512  # of a texel that a shadow's edge crosses
+MOST = 512  # of a texel whose samples still differ, at a shadow's edge above all
 BUDGET = 64  # samples that edges may take, for each texel of the picture: where everything is an edge, each gets fewer
 DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbours
-EDGE = 0.1  # likewise between samples of a texel: a shadow's edge crosses it
+EDGE = 0.03  # likewise between samples of a texel: it takes up to MOST, as where a shadow's edge crosses it
 KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
 TEXELS = 1 << 16  # at a time
 LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off its surface a shadow ray starts

@@ -25,9 +25,9 @@ def surface_at(
     face *= np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
     mean = np.einsum("nk,nkc->nc", bary, normals)
     normal = mean / np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-20)
-    lift = mean * _rounding(corners, normals, bary)[:, None]
-    flat = (np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
-    lift[flat] = 0
+    bent = ~(np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
+    lift = np.zeros_like(mean)
+    lift[bent] = mean[bent] * _rounding(corners[bent], normals[bent], bary[bent])[:, None]
     return normal.astype(np.float32), face.astype(np.float32), lift.astype(np.float32)
 
 
