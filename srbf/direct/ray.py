@@ -23,6 +23,7 @@ SAMPLES = 32  # of a texel whose first ones differ
 MOST = 512  # of a texel whose samples still differ, at a shadow's edge above all
 BUDGET = 64  # samples that edges may take, for each texel of the picture: where everything is an edge, each gets fewer
 DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbours
+JUMP = 0.2  # between neighbors: a shadow's edge may cross a corner that no sample has met
 EDGE = 0.03  # likewise between samples of a texel: it takes up to MOST, as where a shadow's edge crosses it
 KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
 TEXELS = 1 << 16  # at a time
@@ -100,7 +101,7 @@ class RayTracer:
             weight += np.bincount(samples.texel, samples.weight, texels)
         ragged = self._ragged(sums.mean(), sums.low, sums.high, weight)
         self._refine(sums, light, ragged, range(FIRST, self._count))
-        edges = ragged[sums.spread(ragged) > EDGE]
+        edges = ragged[(sums.spread(ragged) > EDGE) | (self._steps(sums.mean())[ragged] > JUMP)]
         most = min(self._most, self._count + BUDGET * len(self._texels) // max(1, len(edges)))
         self._refine(sums, light, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
@@ -114,12 +115,15 @@ class RayTracer:
 
     def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
         """Texels whose samples differ, or that differ from a neighbour."""
-        shape = (self._receivers.height, self._receivers.width)
-        image = mean.max(axis=1).reshape(shape)
-        beside = ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3) > DIFFERENT
+        beside = self._steps(mean) > DIFFERENT
         within = ((high - low).max(axis=1) > DIFFERENT) | ((weight > 0) & (weight < FIRST))
-        chosen = (beside.ravel() | within)[self._texels]
+        chosen = (beside | within)[self._texels]
         return self._texels[chosen]
+
+    def _steps(self, mean: np.ndarray) -> Float64[ndarray, " P"]:
+        """How far each texel and its neighbors differ."""
+        image = mean.max(axis=1).reshape(self._receivers.height, self._receivers.width)
+        return (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
 
     def _first(self, start: int) -> Samples:
         if start in self._kept:
