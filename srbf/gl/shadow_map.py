@@ -130,7 +130,7 @@ class ShadowMapper:
         for material in np.unique(triangles.material[triangles.filters]):
             chosen = vertices[triangles.filters & (triangles.material == material)]
             self._walls.append((padded(triangles.tints[material]), self._mesh(height, chosen), self._mesh(tint, chosen)))
-        lookup = self._program("fullscreen.vert", "direct.frag")
+        lookup = self._program("fullscreen.vert", "direct_on_mesh.frag")
         corners = self._kept(gl.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
         self._lookup = self._kept(gl.vertex_array(lookup, [(corners, "2f", "corner")]))
 
