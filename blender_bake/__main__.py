@@ -101,13 +101,20 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
+        if names := translucency.cut_out(scene):
+            listed = ", ".join(repr(name) for name in names[:8]) + (", …" if len(names) > 8 else "")
+            channel.warn(
+                f"cut-out transparency of {listed} is not in scene.glb: rays and shadow maps tint evenly what it lets through, "
+                "without its outline; bake combined if its shadows matter"
+            )
         translucent = translucency.find(scene)
         tints = job.get("tints")
         if tints is None:
             aims = [partial(illuminant.aim, light) for light in job["probes"]]
             tints = translucency.fit_tints(translucent, aims, lambda: receiver.direct(1, 0))
-            seen_by = {described["object"] for described in receiver.descriptions()} if job["receiver"]["kind"] == "lightmap" else None
-            (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(seen_by)), tints))
+            lightmap = job["receiver"]["kind"] == "lightmap"
+            layers = {described["object"]: described["uv_layer"] for described in receiver.descriptions()} if lightmap else None
+            (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(layers)), tints))
             if missed := without_triangles.line(scene):
                 channel.warn(missed)
             channel.emit("file", file="scene.glb", sampling=receiver.sampling(), tints=tints)

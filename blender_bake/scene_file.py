@@ -28,13 +28,17 @@ TRIANGLES = 4
 
 @dataclass(frozen=True)
 class Part:
-    """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order."""
+    """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order.
+
+    `lightmap` (V, 2): where a receiver's corners lie in the lightmap, (0, 0) at the top left of its image; None of anything else.
+    """
 
     object: str
     material: str | None
     casts: bool
     corners: np.ndarray
     normals: np.ndarray
+    lightmap: np.ndarray | None = None
 
 
 def show_as_rendered(scene: bpy.types.Scene) -> None:
@@ -55,8 +59,11 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
             obj.data.resolution_u = obj.data.render_resolution_u
 
 
-def parts(receivers: set[str] | None) -> Iterator[Part]:
-    """Every renderable object that casts shadows or receives light (`receivers`: all of them where None), by material."""
+def parts(receivers: Mapping[str, str] | None) -> Iterator[Part]:
+    """Every renderable object that casts shadows or receives light, by material.
+
+    `receivers`: the UV layer of each object of a lightmap; all that the camera sees receives light where None.
+    """
     for shown in rendered():
         obj = shown.object
         casts = obj.visible_shadow
@@ -64,7 +71,8 @@ def parts(receivers: set[str] | None) -> Iterator[Part]:
             continue
         mesh = obj.to_mesh()
         if mesh is not None:
-            yield from _by_material(shown, casts, mesh)
+            layer = None if receivers is None or shown.is_instance else mesh.uv_layers.get(receivers.get(shown.name, ""))
+            yield from _by_material(shown, casts, mesh, layer)
             obj.to_mesh_clear()
 
 
@@ -118,22 +126,28 @@ def corners_of(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Corners:
     return Corners(loops, corners, turned, materials)
 
 
-def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh) -> Iterator[Part]:
+def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh, layer: bpy.types.MeshUVLoopLayer | None) -> Iterator[Part]:
     found, slots = corners_of(mesh, shown.matrix), shown.object.material_slots
+    lightmap = None
+    if layer is not None:
+        uv = np.empty(len(mesh.loops) * 2, np.float32)
+        layer.uv.foreach_get("vector", uv)
+        lightmap = (uv.reshape(-1, 2) * [1, -1] + [0, 1])[found.loops].astype("<f4")
     for index in np.unique(found.materials):
         chosen = np.repeat(found.materials == index, 3)
         slot = slots[index].material if index < len(slots) else None
         if slot is not None and is_only_volume(slot):
             continue
         places, normals = found.places[chosen].astype("<f4"), found.normals[chosen].astype("<f4")
-        yield Part(shown.name, slot.name if slot else None, casts, places, normals)
+        yield Part(shown.name, slot.name if slot else None, casts, places, normals, None if lightmap is None else lightmap[chosen])
 
 
 def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
     """The parts as one .glb; `tints` names the materials that light passes straight, and what one wall of them lets through.
 
     That is told twice: to any reader as a transmission of the mean tint, to ours by the extras `tint_by_cosine`.
-    An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`.
+    An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`. A receiver's lightmap coordinates
+    are the attribute `_LIGHTMAP`.
     """
     names = sorted({part.material for part in parts if part.material is not None})
     meshes: list[dict[str, Any]] = []
@@ -149,8 +163,9 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         return len(accessors) - 1
 
     for part in parts:
-        both, index = np.unique(np.concatenate([part.corners, part.normals], axis=1), axis=0, return_inverse=True)
-        corners, normals = np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:])
+        columns = [part.corners, part.normals, *([] if part.lightmap is None else [part.lightmap])]
+        both, index = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)
+        corners, normals = np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:6])
         limits = {"min": corners.min(axis=0).tolist(), "max": corners.max(axis=0).tolist()}
         primitive: dict[str, Any] = {
             "attributes": {
@@ -160,6 +175,8 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
             "indices": put(index.ravel().astype("<u4"), UNSIGNED_INT, "SCALAR", ELEMENT_ARRAY_BUFFER),
             "mode": TRIANGLES,
         }
+        if part.lightmap is not None:
+            primitive["attributes"]["_LIGHTMAP"] = put(np.ascontiguousarray(both[:, 6:]), FLOAT, "VEC2", ARRAY_BUFFER)
         if part.material is not None:
             primitive["material"] = names.index(part.material)
         meshes.append({"name": part.object, "primitives": [primitive]})

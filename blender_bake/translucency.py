@@ -88,6 +88,13 @@ def find(scene: bpy.types.Scene) -> list[Translucent]:
     return [Translucent(m) for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
 
 
+def cut_out(scene: bpy.types.Scene) -> list[str]:
+    """Names of materials whose transparency a texture or an attribute decides, such as leaves on cards: no tint holds their outline."""
+    used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
+    used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}
+    return sorted(m.name for m in used if m.use_nodes and m.node_tree and _passes(m) and _varies(m.node_tree))
+
+
 def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]) -> dict[str, Curve]:
     """The tint of each material that comes nearest, in least squares, to the direct light behind it.
 
@@ -169,4 +176,43 @@ def _lets_through(tree: bpy.types.NodeTree) -> bool:
             return True
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree and _lets_through(node.node_tree):
             return True
+    return False
+
+
+def _varies(tree: bpy.types.NodeTree) -> bool:
+    for node in tree.nodes:
+        inputs = []
+        if node.bl_idname == "ShaderNodeBsdfTransparent" and any(output.links for output in node.outputs):
+            inputs = [node.inputs["Color"]]
+        elif node.bl_idname == "ShaderNodeBsdfPrincipled":
+            inputs = [node.inputs["Alpha"]]
+        elif node.bl_idname == "ShaderNodeMixShader" and any(_is_transparent(socket) for socket in node.inputs[1:]):
+            inputs = [node.inputs[0]]
+        elif node.bl_idname == "ShaderNodeGroup" and node.node_tree and _lets_through(node.node_tree):
+            inputs = list(node.inputs)
+            if _varies(node.node_tree):
+                return True
+        if any(_is_textured(socket) for socket in inputs):
+            return True
+    return False
+
+
+def _is_transparent(socket: bpy.types.NodeSocket) -> bool:
+    return any(link.from_node.bl_idname == "ShaderNodeBsdfTransparent" for link in socket.links)
+
+
+def _is_textured(socket: bpy.types.NodeSocket) -> bool:
+    """Whether a texture or an attribute of the mesh stands behind a socket."""
+    waiting, seen = [link.from_node for link in socket.links], set()
+    while waiting:
+        node = waiting.pop()
+        if node.name in seen:
+            continue
+        seen.add(node.name)
+        kind = node.bl_idname
+        if (kind.startswith("ShaderNodeTex") and kind != "ShaderNodeTexCoord") or kind in {"ShaderNodeAttribute", "ShaderNodeVertexColor"}:
+            return True
+        if kind == "ShaderNodeGroup" and node.node_tree and any(n.bl_idname.startswith("ShaderNodeTex") for n in node.node_tree.nodes):
+            return True
+        waiting += [link.from_node for each in node.inputs for link in each.links]
     return False

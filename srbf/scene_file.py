@@ -17,7 +17,7 @@ MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
 TRIANGLES = 4
 KNOTS = 8
 DTYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-WIDTHS = {"SCALAR": 1, "VEC3": 3}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 Z_UP_FROM_Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
 
 
@@ -26,7 +26,8 @@ class Triangles:
     """T triangles: corners and the normals there (T, 3, 3), the material of each, and who casts. World frame, metres.
 
     `tints` (M, KNOTS, 3) is what one wall of a material lets through of a shadow ray that meets its normal at the cosine
-    0, 1/(KNOTS-1), …, 1; 0 throughout is opaque.
+    0, 1/(KNOTS-1), …, 1; 0 throughout is opaque. `lightmap`: where a receiver's corners lie in the lightmap, (0, 0) at the top left of
+    its image; NaN of what is no receiver, None in a scene without any.
     """
 
     corners: Float32[ndarray, "T 3 3"]
@@ -34,6 +35,7 @@ class Triangles:
     material: Int[ndarray, " T"]
     casts: Bool[ndarray, " T"]
     tints: Float32[ndarray, "M KNOTS 3"]
+    lightmap: Float32[ndarray, "T 3 2"] | None = None
 
     @property
     def translucent(self) -> Bool[ndarray, " T"]:
@@ -88,11 +90,12 @@ class _Reader:
             self._visit(root, turned, found)
         if not found:
             raise ValueError("no triangles in it")
-        corners, normals, material, casts = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        corners, normals, material, casts, places = (np.concatenate(parts) for parts in zip(*found, strict=True))
         tints = np.stack([np.zeros((KNOTS, 3)), *map(_tint, document.get("materials", []))])
         if not (np.isfinite(corners).all() and np.isfinite(normals).all()):
             raise ValueError("corners that are not finite")
-        return Triangles(corners.astype(np.float32), normals.astype(np.float32), material, casts, tints.astype(np.float32))
+        lightmap = places.astype(np.float32) if np.isfinite(places).any() else None
+        return Triangles(corners.astype(np.float32), normals.astype(np.float32), material, casts, tints.astype(np.float32), lightmap)
 
     def _visit(self, index: int, parent: Float64[ndarray, "4 4"], found: list[tuple[np.ndarray, ...]]) -> None:
         node = self._document["nodes"][index]
@@ -116,7 +119,10 @@ class _Reader:
             normals = np.repeat(flat[:, None], 3, axis=1)
         normals = normals / np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-30)
         count = len(corners)
-        return corners, normals, np.full(count, primitive.get("material", -1) + 1), np.full(count, casts)
+        places = np.full((count, 3, 2), np.nan)
+        if "_LIGHTMAP" in primitive["attributes"]:
+            places = self._accessor(primitive["attributes"]["_LIGHTMAP"]).astype(np.float64)[self._indices(primitive, len(points))]
+        return corners, normals, np.full(count, primitive.get("material", -1) + 1), np.full(count, casts), places
 
     def _indices(self, primitive: dict[str, Any], count: int) -> np.ndarray:
         if "indices" not in primitive:

@@ -74,3 +74,22 @@ def test_what_is_no_scene_is_refused_in_one_line(data: bytes) -> None:
     with pytest.raises(ManifestError, match="binary glTF") as caught:
         read_triangles(data)
     assert "\n" not in str(caught.value)
+
+
+def test_lightmap_coordinates_come_back_for_receivers_alone() -> None:
+    places = np.array([[0.25, 0.5], [1, 0], [0, 1]], np.float32)
+    accessors = [
+        {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+        {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
+    ]
+    found = read_triangles(
+        glb(
+            body=CORNERS.tobytes() + places.tobytes(),
+            accessors=accessors,
+            bufferViews=[{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
+            meshes=[{"primitives": [{"attributes": {"POSITION": 0, "_LIGHTMAP": 1}}, {"attributes": {"POSITION": 0}}]}],
+        )
+    )
+    np.testing.assert_array_equal(found.lightmap[0], places)
+    assert np.isnan(found.lightmap[1]).all()
+    assert read_triangles(glb()).lightmap is None

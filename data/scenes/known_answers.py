@@ -100,6 +100,18 @@ def pane():
     glass.data.materials[0] = material("glass", (0.8, 0.4, 0.2), "ShaderNodeBsdfTransparent")
 
 
+def leaves():
+    """A card over the plane whose alpha a texture cuts out."""
+    occluder()
+    card = quad("Card", location=(0, 0, 1))
+    made = bpy.data.materials.new("Leaf")
+    made.use_nodes = True
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    checker = nodes.new("ShaderNodeTexChecker")
+    links.new(checker.outputs["Fac"], nodes["Principled BSDF"].inputs["Alpha"])
+    card.data.materials[0] = made
+
+
 def sharp(kind="PERSP"):
     """A coloured plane and the wall before a camera without depth of field."""
     quad("Plane", color=(0.8, 0.4, 0.2))
@@ -306,6 +318,7 @@ SCENES = {
     "ortho": lambda: view("ORTHO"),
     "pano": lambda: view("PANO"),
     "pane": pane,
+    "leaves": leaves,
     "sharp": sharp,
     "sharp ortho": lambda: sharp("ORTHO"),
     "emissive": emissive,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Sequence
 from contextlib import ExitStack
 from types import TracebackType
@@ -14,6 +13,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.direct.embree import has_embree
 from srbf.direct.ray import RayTracer
 from srbf.direct.receivers import Receivers
 from srbf.errors import InputError
@@ -47,7 +47,7 @@ def chosen(asset: Asset, asked: Direct | None) -> Direct:
         return asked
     if asset.scene is None:
         return "none"
-    return "ray" if importlib.util.find_spec("embreex") is not None else "shadow-map"
+    return "ray" if has_embree() else "shadow-map"
 
 
 class Added:

@@ -1,34 +1,37 @@
-"""Exact direct light by rays: several a texel, spread over its footprint and over the sun's disc, traced by Embree."""
+"""Exact direct light by rays: several per texel, on the mesh over its footprint and over the sun's disc, traced by Embree."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
 from scipy import ndimage
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.dilation import dilate, nearest_covered
+from srbf.direct.embree import EmbreeTriangles
+from srbf.direct.lightmap_points import LightmapPoints
 from srbf.direct.receivers import Receivers, disc_points, hashed, pixel_filter, spread_points
 from srbf.direct.shadow import wall_tint
-from srbf.errors import MissingLibraryError
+from srbf.direct.surface import surface_at
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, spot_cone
 
 FIRST = 4  # samples of every texel
 SAMPLES = 32  # of a texel whose first ones differ
+MOST = 512  # of a texel whose samples still differ, at a shadow's edge above all
+BUDGET = 64  # samples that edges may take, for each texel of the picture: where everything is an edge, each gets fewer
 DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbours
+JUMP = 0.2  # between neighbors: a shadow's edge may cross a corner that no sample has met
+EDGE = 0.03  # likewise between samples of a texel: it takes up to MOST, as where a shadow's edge crosses it
 KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
 TEXELS = 1 << 16  # at a time
 LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off its surface a shadow ray starts
-PROBE = 1e-4  # likewise, how near a lightmap's texel its triangle is looked for
 MOST_WALLS = 32
 TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
 TINY = 1e-12  # a share below which nothing is diffuse
 NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbours of a pixel
-SMOOTH_COS = 0.9999  # corner normals closer than that to the face's are a flat face's
 
 
 @dataclass(frozen=True)
@@ -51,16 +54,16 @@ class RayTracer:
         self._receivers = receivers
         self._count = max(samples, FIRST)
         triangles = receivers.triangles
-        self._corners, self._normals = triangles.corners, triangles.normals
-        self._all = _Scene(self._corners)
-        self._occluders = _Scene(self._corners[triangles.occluders])
-        self._filters = _Scene(self._corners[triangles.filters])
+        self._all = EmbreeTriangles(triangles.corners)
+        self._occluders = EmbreeTriangles(triangles.corners[triangles.occluders])
+        self._filters = EmbreeTriangles(triangles.corners[triangles.filters])
         self._tints = triangles.tints
         self._filter_material = triangles.material[triangles.filters]
         self._filter_normals = triangles.normals[triangles.filters]
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
-        points = spread_points(self._count)
+        self._most = max(self._count, MOST)
+        points = spread_points(self._most)
         self._square, self._disc = points[:, :2], points[:, 2:]
         coverage = receivers.images.get("coverage")
         covered = np.ones(height * width, bool) if coverage is None else coverage.ravel() > 0
@@ -71,7 +74,7 @@ class RayTracer:
         if receivers.camera is not None and receivers.quantity == "radiance":
             self._pure = self._materials_of_pixels()
         if receivers.camera is None:
-            self._slopes = [g.reshape(-1, 3) for name in ("position", "normal") for g in receivers.gradients(name)]
+            self._lightmap = LightmapPoints(receivers, self._all.first_hit)
 
     def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; environments add nothing."""
@@ -88,31 +91,39 @@ class RayTracer:
 
     def _irradiance(self, light: DirectionalLight | PointLight) -> Float32[ndarray, "P 3"]:
         texels = self._receivers.height * self._receivers.width
-        total, share, weight = np.zeros((texels, 3)), np.zeros((texels, 3)), np.zeros(texels)
-        low, high = np.full((texels, 3), np.inf, np.float32), np.zeros((texels, 3), np.float32)
+        sums = _Sums(
+            np.zeros((texels, 3)), np.zeros((texels, 3)), np.full((texels, 3), np.inf, np.float32), np.zeros((texels, 3), np.float32)
+        )
+        weight = np.zeros(texels)
         for start in range(0, len(self._texels), TEXELS):
             samples = self._first(start)
-            light_in = self._lit(samples, light, 0)
-            real = samples.weight > 0
-            np.minimum.at(low, samples.texel[real], light_in[real])
-            np.maximum.at(high, samples.texel[real], light_in[real])
-            _add(total, share, samples, light_in)
+            sums.add(samples, self._lit(samples, light, range(FIRST)))
             weight += np.bincount(samples.texel, samples.weight, texels)
-        ragged = self._ragged(total / np.maximum(share, TINY), low, high, weight)
-        for start in range(0, len(ragged), TEXELS):
-            chunk = ragged[start : start + TEXELS]
-            samples = self._samples(chunk, range(FIRST, self._count))
-            _add(total, share, samples, self._lit(samples, light, FIRST))
-        return (total / np.maximum(share, TINY)).astype(np.float32)
+        ragged = self._ragged(sums.mean(), sums.low, sums.high, weight)
+        self._refine(sums, light, ragged, range(FIRST, self._count))
+        edges = ragged[(sums.spread(ragged) > EDGE) | (self._steps(sums.mean())[ragged] > JUMP)]
+        most = min(self._most, self._count + BUDGET * len(self._texels) // max(1, len(edges)))
+        self._refine(sums, light, edges, range(self._count, most))
+        return sums.mean().astype(np.float32)
+
+    def _refine(self, sums: _Sums, light: DirectionalLight | PointLight, texels: Int[ndarray, " e"], numbers: range) -> None:
+        """Add samples `numbers` of `texels`."""
+        step = max(1, TEXELS * SAMPLES // max(1, len(numbers)))
+        for start in range(0, len(texels) if len(numbers) else 0, step):
+            samples = self._samples(texels[start : start + step], numbers)
+            sums.add(samples, self._lit(samples, light, numbers))
 
     def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
         """Texels whose samples differ, or that differ from a neighbour."""
-        shape = (self._receivers.height, self._receivers.width)
-        image = mean.max(axis=1).reshape(shape)
-        beside = ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3) > DIFFERENT
+        beside = self._steps(mean) > DIFFERENT
         within = ((high - low).max(axis=1) > DIFFERENT) | ((weight > 0) & (weight < FIRST))
-        chosen = (beside.ravel() | within)[self._texels]
+        chosen = (beside | within)[self._texels]
         return self._texels[chosen]
+
+    def _steps(self, mean: np.ndarray) -> Float64[ndarray, " P"]:
+        """How far each texel and its neighbors differ."""
+        image = mean.max(axis=1).reshape(self._receivers.height, self._receivers.width)
+        return (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
 
     def _first(self, start: int) -> Samples:
         if start in self._kept:
@@ -122,9 +133,9 @@ class RayTracer:
             self._kept[start] = samples
         return samples
 
-    def _lit(self, samples: Samples, light: DirectionalLight | PointLight, first: int) -> Float32[ndarray, "n 3"]:
+    def _lit(self, samples: Samples, light: DirectionalLight | PointLight, numbers: range) -> Float32[ndarray, "n 3"]:
         """N.L times what reaches each sample, for a white light."""
-        to_light, distance, strength = self._towards(samples, light, first)
+        to_light, distance, strength = self._towards(samples, light, numbers)
         NoL = np.einsum("nc,nc->n", samples.normal, to_light)
         lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (strength > 0))
         result = np.zeros((len(NoL), 3), np.float32)
@@ -140,7 +151,7 @@ class RayTracer:
         return result
 
     def _towards(
-        self, samples: Samples, light: DirectionalLight | PointLight, first: int
+        self, samples: Samples, light: DirectionalLight | PointLight, numbers: range
     ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
         """(unit vector to the light, distance or None, strength) of every sample."""
         count = len(samples.texel)
@@ -155,15 +166,12 @@ class RayTracer:
         axis = np.array(light.direction)
         if self._receivers.sun_angle == 0:
             return np.broadcast_to(axis, (count, 3)), None, np.ones(count)
-        number = first + np.arange(count) // max(1, count // self._per_texel(first))
+        number = numbers.start + np.arange(count) // max(1, count // len(numbers))
         disc = disc_points((self._disc[number] + self._turn[samples.texel, 2:]) % 1) * np.tan(self._receivers.sun_angle / 2)
         across = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.9 else [0, 1, 0])
         across /= np.linalg.norm(across)
         unit = axis + disc[:, :1] * across + disc[:, 1:] * np.cross(axis, across)
         return unit / np.linalg.norm(unit, axis=1, keepdims=True), None, np.ones(count)
-
-    def _per_texel(self, first: int) -> int:
-        return FIRST if first == 0 else self._count - FIRST
 
     def _passed(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Float32[ndarray, "n 3"]:
         """What of a ray's light comes through: 0 behind what is opaque, else the product of the tints on the way."""
@@ -200,31 +208,16 @@ class RayTracer:
         return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
-        offset = ((square - 0.5) * self._receivers.sampling.get("footprint", 1.0)).astype(np.float32)
-        images = {name: self._receivers.images[name].reshape(-1, 3) for name in ("position", "normal")}
-        right, down, turn_right, turn_down = (slope[texel] for slope in self._slopes)
-        point = images["position"][texel] + right * offset[:, :1] + down * offset[:, 1:]
-        normal = images["normal"][texel] + turn_right * offset[:, :1] + turn_down * offset[:, 1:]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        reach = PROBE * (1 + np.abs(point).max(axis=1))
-        hit, far, _ = self._all.first_hit(point + normal * reach[:, None], -normal)
-        found = (hit >= 0) & (far < 2 * reach)
-        _, face, lift = self._surface(np.where(found, hit, 0), point)
-        agrees = np.einsum("nc,nc->n", face, normal)
-        face = face * np.where(agrees < 0, -1, 1)[:, None].astype(np.float32)
-        lift = lift * np.where(agrees < 0, -1, 1)[:, None].astype(np.float32)
-        found &= np.abs(agrees) > 0.2
-        face = np.where(found[:, None], face, normal)
-        whole = np.ones((len(texel), 1), np.float32)
-        return Samples(texel, whole[:, 0], point, normal, face, np.where(found[:, None], lift, 0), whole)
+        found = self._lightmap.at(texel, square)
+        return Samples(texel, found.weight, found.point, found.normal, found.face, found.lift, found.weight[:, None])
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         origin, direction = self._looks(texel, square)
-        hit, far, _ = self._all.first_hit(origin, direction)
+        hit, far, bary = self._all.first_hit(origin, direction)
         real = hit >= 0
         triangle = np.where(real, hit, 0)
         point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
-        normal, face, lift = self._surface(triangle, point)
+        normal, face, lift = surface_at(self._receivers.triangles, triangle, bary)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
         weight = real.astype(np.float32)
         share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
@@ -277,71 +270,30 @@ class RayTracer:
             open_ = open_[~found]
         return np.maximum(image[source], 0)
 
-    def _surface(self, triangle: Int[ndarray, " n"], point: Float32[ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(shading normal, face normal, offset onto the surface that the corner normals round) at points of triangles [Hanika2021]."""
-        corners, normals = self._corners[triangle], self._normals[triangle]
-        face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.maximum(np.einsum("nc,nc->n", face, face), 1e-30)
-        bary = np.stack(
-            [
-                np.einsum("nc,nc->n", np.cross(corners[:, (i + 2) % 3] - corners[:, (i + 1) % 3], point - corners[:, (i + 1) % 3]), face)
-                / area
-                for i in range(3)
-            ],
-            axis=1,
-        )
-        bary = np.clip(bary, 0, 1).astype(np.float32)
-        face = face / np.sqrt(area)[:, None]
-        face = face * np.where(np.einsum("nc,nc->n", face, normals.sum(axis=1)) < 0, -1, 1)[:, None]
-        normal = np.einsum("nk,nkc->nc", bary, normals)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        below = np.minimum(np.einsum("nkc,nkc->nk", point[:, None] - corners, normals), 0)
-        lift = -np.einsum("nk,nk,nkc->nc", bary, below, normals)
-        flat = (np.einsum("nkc,nc->nk", normals, face) > SMOOTH_COS).all(axis=1)
-        return normal, face.astype(np.float32), np.where(flat[:, None], 0, lift).astype(np.float32)
 
+@dataclass(frozen=True)
+class _Sums:
+    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance whatever mixture it shows; least and most."""
 
-def _add(total: np.ndarray, share: np.ndarray, samples: Samples, light: np.ndarray) -> None:
-    """Sums of light and of shares by texel: their ratio times the texel's own albedo is its radiance, whatever mixture it shows."""
-    every = np.broadcast_to(samples.share, light.shape)
-    for channel in range(3):
-        total[:, channel] += np.bincount(samples.texel, light[:, channel] * every[:, channel], len(total))
-        share[:, channel] += np.bincount(samples.texel, every[:, channel], len(share))
+    total: Float64[ndarray, "P 3"]
+    share: Float64[ndarray, "P 3"]
+    low: Float32[ndarray, "P 3"]
+    high: Float32[ndarray, "P 3"]
 
+    def add(self, samples: Samples, light: Float32[ndarray, "n 3"]) -> None:
+        """Add the light at `samples`."""
+        every = np.broadcast_to(samples.share, light.shape)
+        for channel in range(3):
+            self.total[:, channel] += np.bincount(samples.texel, light[:, channel] * every[:, channel], len(self.total))
+            self.share[:, channel] += np.bincount(samples.texel, every[:, channel], len(self.share))
+        real = samples.weight > 0
+        np.minimum.at(self.low, samples.texel[real], light[real])
+        np.maximum.at(self.high, samples.texel[real], light[real])
 
-class _Scene:
-    """Triangles behind Embree."""
+    def mean(self) -> Float64[ndarray, "P 3"]:
+        """Light of every texel so far."""
+        return self.total / np.maximum(self.share, TINY)
 
-    def __init__(self, corners: Float32[ndarray, "T 3 3"]) -> None:
-        try:
-            from embreex.mesh_construction import TriangleMesh
-            from embreex.rtcore_scene import EmbreeScene
-        except ImportError as error:
-            raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use --direct shadow-map") from error
-        self._scene: Any = EmbreeScene()
-        self._empty = not len(corners)
-        if not self._empty:
-            self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(corners, np.float32))
-
-    def occluded(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Bool[ndarray, " n"]:
-        """Whether anything is in the way."""
-        if self._empty or not len(origin):
-            return np.zeros(len(origin), bool)
-        far = np.full(len(origin), 1e30, np.float32) if distance is None else distance.astype(np.float32)
-        hits = self._scene.run(_f(origin), _f(direction), far, query="OCCLUDED")
-        return np.asarray(hits) >= 0
-
-    def first_hit(
-        self, origin: np.ndarray, direction: np.ndarray
-    ) -> tuple[Int[ndarray, " n"], Float32[ndarray, " n"], Float32[ndarray, "n 3"]]:
-        """(triangle, distance, barycentric place) of the nearest on each ray; -1 where there is none."""
-        count = len(origin)
-        if self._empty or not count:
-            return np.full(count, -1), np.full(count, np.inf, np.float32), np.zeros((count, 3), np.float32)
-        hits = self._scene.run(_f(origin), _f(direction), query="INTERSECT", output=1)
-        u, v = np.asarray(hits["u"]), np.asarray(hits["v"])
-        return np.asarray(hits["primID"]), np.asarray(hits["tfar"]), np.stack([1 - u - v, u, v], axis=1)
-
-
-def _f(array: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(array, np.float32)
+    def spread(self, texels: Int[ndarray, " e"]) -> Float32[ndarray, " e"]:
+        """How far the samples of `texels` differ."""
+        return (self.high[texels] - self.low[texels]).max(axis=1)

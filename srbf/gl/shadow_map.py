@@ -11,6 +11,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
+from srbf.direct.embree import EmbreeTriangles, has_embree
+from srbf.direct.lightmap_points import LightmapPoints
 from srbf.direct.receivers import Receivers, disc_points, spread_points
 from srbf.direct.shadow import SunFrame
 from srbf.errors import InputError, ShaderError
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
 
 SIZE = 2048  # texels a side
 SUNS = 16  # shadow maps that stand for a sun of some size
-CORNERS = ((-0.25, -0.25), (0.25, -0.25), (-0.25, 0.25), (0.25, 0.25))  # of a texel's footprint: where its light is looked up
+FINE, COARSE = 4, 2  # points a side of a texel's footprint where its light is looked up
+FINE_TEXELS = 1 << 16  # of a lightmap, at most, for FINE points
 NOTHING = -1e30  # height where no occluder is
 
 
@@ -80,7 +83,7 @@ class ShadowMapper:
             for sun in suns:
                 frame = SunFrame.around(self._points, sun)
                 self._draw_map(frame)
-                self._look_up(frame, 1 / (len(suns) * len(CORNERS)))
+                self._look_up(frame, 1 / len(suns))
             data = self._sum.read(components=4, dtype="f4")
         image = np.frombuffer(data, np.float32).reshape(self._receivers.height, self._receivers.width, 4)
         return np.ascontiguousarray(image[..., :3])
@@ -93,24 +96,26 @@ class ShadowMapper:
             raise ShaderError(
                 f"expected at most {limit} texels a side on this GPU, found {max(self._size, receivers.width, receivers.height)}"
             )
-        position, normal = receivers.images["position"], receivers.images["normal"]
+        position = receivers.images["position"]
         coverage = receivers.images.get("coverage")
         covered = np.ones(position.shape[:2], bool) if coverage is None else coverage > 0
         if not covered.any():
             covered[:] = True
         centre = position[covered].mean(axis=0, dtype=np.float64)  # single precision is finest about the origin
-        right, down = receivers.gradients("position")
-        turn_right, turn_down = receivers.gradients("normal")
-        footprint = receivers.sampling.get("footprint", 1.0)
+        by_rays = has_embree() and receivers.camera is None and receivers.triangles.lightmap is None
+        places = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit if by_rays else None)
+        shape, every = position.shape[:2], np.arange(covered.size)
+        side = FINE if covered.size <= FINE_TEXELS else COARSE
+        grid = (np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2) + 0.5) / side
+        found = [places.at(every, np.broadcast_to(place, (covered.size, 2))) for place in grid]
+        total = np.sum([points.weight for points in found], axis=0)
         self._places = []
-        every = []
-        for x, y in CORNERS:
-            point = position - centre + footprint * (x * right + y * down)
-            turned = normal + footprint * (x * turn_right + y * turn_down)
-            turned /= np.maximum(np.linalg.norm(turned, axis=2, keepdims=True), 1e-20)
-            self._places.append((self._texture(point), self._texture(turned)))
-            every.append(point[covered])
-        self._points = np.concatenate(every).astype(np.float64)
+        for points in found:
+            point = np.concatenate([points.point - centre, (points.weight / total)[:, None]], axis=1)
+            height = np.einsum("nc,nc->n", points.lift, points.normal)
+            normals = np.concatenate([points.normal, height[:, None]], axis=1)
+            self._places.append(tuple(self._texture(image.reshape(*shape, -1)) for image in (point, normals, points.face)))
+        self._points = np.concatenate([points.point[covered.ravel()] - centre for points in found]).astype(np.float64)
         triangles = receivers.triangles
         vertices = np.concatenate([triangles.corners - centre, triangles.normals], axis=2).astype(np.float32)  # (T, 3, 6)
         square = (self._size, self._size)
@@ -125,7 +130,7 @@ class ShadowMapper:
         for material in np.unique(triangles.material[triangles.filters]):
             chosen = vertices[triangles.filters & (triangles.material == material)]
             self._walls.append((padded(triangles.tints[material]), self._mesh(height, chosen), self._mesh(tint, chosen)))
-        lookup = self._program("fullscreen.vert", "direct.frag")
+        lookup = self._program("fullscreen.vert", "direct_on_mesh.frag")
         corners = self._kept(gl.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
         self._lookup = self._kept(gl.vertex_array(lookup, [(corners, "2f", "corner")]))
 
@@ -152,8 +157,13 @@ class ShadowMapper:
         self._sum.use()
         gl.enable_only(gl.BLEND)
         gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
-        for points, normals in self._places:
-            textures = {"points": points, "normals": normals, **{name: texture for name, (texture, _) in self._maps.items()}}
+        for points, normals, faces in self._places:
+            textures = {
+                "points": points,
+                "normals": normals,
+                "faces": faces,
+                **{name: texture for name, (texture, _) in self._maps.items()},
+            }
             for unit, texture in enumerate(textures.values()):
                 texture.use(unit)
             units = {name: unit for unit, name in enumerate(textures)}

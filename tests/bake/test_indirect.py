@@ -7,6 +7,7 @@ import os
 import signal
 import struct
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ from srbf.capture import COVERED
 from srbf.direct.ray import RayTracer
 from srbf.direct.receivers import Receivers
 from srbf.evaluation import evaluate
+from srbf.gl.shadow_map import ShadowMapper
+from srbf.image import read_image
 from srbf.methods.relighting_map import RelightingMap
 from srbf.scene_file import read_triangles
 
@@ -65,6 +68,29 @@ def test_rays_give_the_direct_light_back(bake, scene: str, receiver: str) -> Non
         assert (error > 0.1 * true.max()).mean() < 0.01
 
 
+def test_a_rounded_receiver_has_the_direct_light_of_cycles(bake) -> None:
+    """A smooth torus that shades itself, over a floor; the reference has 512 samples, since its noise lies at the edges of shadows."""
+    settings = {"width": 64, "height": 64, "lights": 2, "holdout": 2, "holdout_samples": 512, "transport": "indirect"}
+    capture = bake("torus", "lightmap:Torus", **settings).capture
+    receivers = Receivers.of(capture)
+    assert receivers.triangles.lightmap is not None
+    older = replace(receivers, triangles=replace(receivers.triangles, lightmap=None))
+    covered = capture.coverage() >= COVERED
+    holdout = capture.indices("holdout")
+    true = np.stack([read_image(capture.folder / capture.lights[index].direct, 3) for index in holdout])[:, covered]
+    suns = capture.directions(holdout)
+    with ShadowMapper(receivers) as mapper:
+        mapped = mapper.directional(suns)[:, covered]
+    assert (true.max(axis=2) == 0).any() and true.max() > 0.9
+    found = [decibels(image - true) for image in (RayTracer(r).directional(suns)[:, covered] for r in (receivers, older))]
+    assert found[0] > 60 and found[1] > 50, found  # captures without coordinates know a footprint's outline less well
+    assert decibels(mapped - true) > 40
+
+
+def decibels(error: np.ndarray) -> float:
+    return float(-10 * np.log10((error**2).mean()))
+
+
 def test_glass_leaves_little_in_the_images(bake) -> None:
     """What a pane lets through is traded for its tint by angle: light behind it is direct light then, not caustic."""
     capture = bake("pane", "lightmap:Plane", transport="indirect", lights=24).capture
@@ -74,6 +100,13 @@ def test_glass_leaves_little_in_the_images(bake) -> None:
     triangles = read_triangles(capture.scene())
     (tint,) = [t for t in triangles.tints if t.any()]
     np.testing.assert_allclose(tint[4:], np.tile([0.8, 0.4, 0.2], (4, 1)), atol=0.02)  # steep light met it everywhere
+
+
+@pytest.mark.parametrize(("scene", "named"), [("leaves", True), ("pane", False)])
+def test_a_cut_out_is_named(bake, scene: str, named: bool) -> None:
+    """A texture's alpha cannot be a tint; an even pane's can."""
+    lines = [line for line in bake(scene, "lightmap:Plane", transport="indirect", lights=2).said if "cut-out" in line]
+    assert len(lines) == named and all("'Leaf'" in line for line in lines)
 
 
 def test_an_indirect_asset_is_measured_with_and_without_direct_light(bake) -> None:

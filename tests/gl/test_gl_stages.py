@@ -49,7 +49,7 @@ VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]
 def test_every_method_has_the_same_stages() -> None:
     kinds = ["accumulate", "directional", "folded", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
-    shadows = ["direct.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
+    shadows = ["direct.frag", "direct_on_mesh.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
     skies = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
     assert sorted([*methods, *shadows, *skies, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 

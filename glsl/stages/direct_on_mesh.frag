@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// Direct light of one sun at points of the receivers' mesh: N.L times visibility by a shadow map, times the tint of the walls above. Irradiance.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+
+#include "combine/direct.glsl"
+#include "shadow/shadow_fraction.glsl"
+#include "shadow/shadow_place.glsl"
+
+uniform sampler2D points;   // a: weight in the texel's mean
+uniform sampler2D normals;  // of shading; a: height of the rounded surface above its triangle, metres
+uniform sampler2D faces;    // normals of the triangles
+uniform sampler2D heights;
+uniform sampler2D tints;
+uniform sampler2D wallHeights;
+uniform vec3 across;
+uniform vec3 up;
+uniform vec3 toLight;
+uniform vec2 low;
+uniform float extent;
+uniform float weight;
+
+layout(location = 0) out vec4 answer;
+
+const float STEEPEST = 64.0;   // metres a metre: beyond it a receiver's plane tells nothing
+const float BIAS = 0.5;        // map texels
+const float TERMINATOR = 0.1;  // cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021]
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 point = texelFetch(points, at, 0);
+    vec4 shading = texelFetch(normals, at, 0);
+    vec3 normal = shading.xyz;
+    vec3 face = texelFetch(faces, at, 0).xyz;
+    float NoL = dot(normal, toLight);
+    float NgL = dot(face, toLight);
+    float lifted = clamp(NoL < TERMINATOR ? 2.0 - (NgL + NoL) / TERMINATOR : 1.0 - NgL / TERMINATOR, 0.0, 1.0);
+    lifted = shading.a == 0.0 ? 0.0 : lifted;
+    vec3 place = srbfShadowPlace(point.xyz + normal * (shading.a * lifted), across, up, toLight, low, extent);
+    vec3 plane = mix(face, normal, lifted);
+    float step = extent / float(textureSize(heights, 0).x);
+    vec2 slope = clamp(-vec2(dot(plane, across), dot(plane, up)) / max(dot(plane, toLight), 1.0 / STEEPEST), -STEEPEST, STEEPEST) * step;
+    float bias = BIAS * step;
+    vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
+    float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
+    visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
+    answer = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
+}
