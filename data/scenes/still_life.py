@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A still life whose shapes come from uneven scales that are not applied: one lightmap for all of it.
 
-Egg-shaped vases are scaled spheres, the table is a scaled cube, one jar is a mirrored copy, a bowl is sheared by its
-parent, a torus leans beside them; some are shaded smooth, some flat. All seven are receivers, in an atlas that the bake
-packs. What they show is whether normals and direct light by rays are right on rounded receivers: every shape
-shades itself and its neighbors, and colors bleed between them.
+Egg-shaped vases are scaled spheres, the table is a scaled cube, one jar is mirrored, a bowl is sheared by its parent, a
+ring leans between them; some are shaded smooth, some flat. All seven are receivers with a UV layer `lightmap`, side by side
+in one atlas. What they show is whether normals and direct light by rays are right on rounded receivers: every shape shades
+itself and its neighbors, and colors bleed between them.
 
     python data/scenes/still_life.py OUT.blend
 """
@@ -18,15 +18,19 @@ from staging import add_camera, add_daylight, start_cycles, write
 
 TABLE = (1.05, 0.8, 0.06)  # m: half extents of the table
 
-# ---- shapes ------------------------------------------------------------------------------------------------------
+# ---- shapes: a part is (points, faces, for every face the places of its corners in the unit square) ---------------------
 
 
-def shape(name, points, faces, material, matrix, smooth=True):
-    """An object of its own mesh, placed by a matrix that holds its scale."""
+def shape(name, part, material, matrix, chart, smooth=True):
+    """An object placed by a matrix that holds its scale; `chart` (u, v, width, height) is its place in the lightmap."""
+    points, faces, places = part
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(points, [], faces)
     mesh.polygons.foreach_set("use_smooth", [smooth] * len(faces))
     mesh.materials.append(material)
+    u, v, width, height = chart
+    flat = [value for corners in places for x, y in corners for value in (u + width * x, v + height * y)]
+    mesh.uv_layers.new(name="lightmap", do_init=False).data.foreach_set("uv", flat)
     return placed(bpy.data.objects.new(name, mesh), matrix)
 
 
@@ -42,26 +46,45 @@ def at(x, y, z, turn=(0, 0, 0), scale=(1, 1, 1)):
 
 
 def cube():
+    """Its top takes most of the chart, the sides strips below it, the bottom what is left beside them."""
     corners = [(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)]
-    return corners, [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (3, 2, 6, 7), (2, 0, 4, 6), (1, 3, 7, 5)]
+    strips = [(0, 0.195, 1, 0.045), (0, 0.13, 1, 0.045), (0, 0.065, 0.76, 0.045), (0, 0, 0.76, 0.045)]
+    charts = [(0.78, 0, 0.22, 0.11), (0, 0.26, 1, 0.74), *strips]
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return corners, faces, [[(u + w * x, v + h * y) for x, y in square] for u, v, w, h in charts]
+
+
+def woven(rows, closed=False):
+    """Quads between rings of points, triangles where a row is one point; longitude runs along u, the rows along v.
+
+    `closed`: the last row is the first.
+    """
+    around = max(len(row) for row in rows)
+    points, starts = [], []
+    for row in rows[:-1] if closed else rows:
+        starts.append(len(points))
+        points += row
+    starts += starts[:1] if closed else []
+    faces, places = [], []
+    for j in range(len(rows) - 1):
+        for i in range(around):
+            face, corners = [], []
+            for column, row in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)):
+                pole = len(rows[row]) == 1
+                index = starts[row] + (0 if pole else column % around)
+                if index not in face:
+                    face.append(index)
+                    corners.append(((i + 0.5 if pole else column) / around, row / (len(rows) - 1)))
+            faces.append(face)
+            places.append(corners)
+    return points, faces, places
 
 
 def turned(outline, around):
-    """An outline of (radius, height) turned about z; where it ends on the axis, in a fan."""
-    rings = [r for r in outline if r[0] > 0]
-    points = [(r * cos(2 * pi * i / around), r * sin(2 * pi * i / around), z) for r, z in rings for i in range(around)]
-    rows = range(len(rings) - 1)
-    faces = [
-        (j * around + i, j * around + (i + 1) % around, (j + 1) * around + (i + 1) % around, (j + 1) * around + i)
-        for j in rows
-        for i in range(around)
-    ]
-    for end, base, flip in ((outline[0], 0, True), (outline[-1], len(points) - around, False)):
-        if end[0] == 0:
-            points.append((0, 0, end[1]))
-            fan = [(base + i, base + (i + 1) % around, len(points) - 1) for i in range(around)]
-            faces += [face[::-1] for face in fan] if flip else fan
-    return points, faces
+    """An outline of (radius, height) turned about z."""
+    angles = [2 * pi * i / around for i in range(around)]
+    return woven([[(r * cos(a), r * sin(a), z) for a in angles] if r > 0 else [(0, 0, z)] for r, z in outline])
 
 
 def sphere(around=48, across=24):
@@ -78,11 +101,10 @@ def bowl(around=48, steps=14):
 
 
 def torus(major=1.0, minor=0.36, around=64, across=24):
-    steps = [(2 * pi * i / around, 2 * pi * j / across) for i in range(around) for j in range(across)]
-    points = [((major + minor * cos(b)) * cos(a), (major + minor * cos(b)) * sin(a), minor * sin(b)) for a, b in steps]
-    cells = [(i, j) for i in range(around) for j in range(across)]
-    corners = ((0, 0), (1, 0), (1, 1), (0, 1))
-    return points, [[(i + di) % around * across + (j + dj) % across for di, dj in corners] for i, j in cells]
+    """About the z axis."""
+    turns, sides = [2 * pi * i / around for i in range(around)], [2 * pi * j / across for j in range(across + 1)]
+    rows = [[((major + minor * cos(b)) * cos(a), (major + minor * cos(b)) * sin(a), minor * sin(b)) for a in turns] for b in sides]
+    return woven(rows, closed=True)
 
 
 # ---- materials ---------------------------------------------------------------------------------------------------
@@ -106,35 +128,38 @@ def clay(name, color):
 
 def add_table():
     """The scaled cube that all stands on, its top at z = 0."""
-    shape("Table", *cube(), clay("Linen", (0.74, 0.70, 0.62)), at(0, 0, -TABLE[2], scale=TABLE), smooth=False)
+    linen = clay("Linen", (0.74, 0.70, 0.62))
+    shape("Table", cube(), linen, at(0, 0, -TABLE[2], scale=TABLE), (0.01, 0.35, 0.62, 0.64), smooth=False)
 
 
 def add_vases():
-    """Spheres, scaled along three axes: one upright, one leaning against it, and a low flat-shaded one."""
-    shape("Tall Vase", *sphere(), clay("Terracotta", (0.66, 0.27, 0.14)), at(-0.38, 0.24, 0.5, scale=(0.22, 0.22, 0.5)))
-    shape("Egg", *sphere(), clay("Cream", (0.82, 0.74, 0.56)), at(0.42, -0.34, 0.148, (0, 78, 35), (0.15, 0.15, 0.23)))
-    shape(
-        "Faceted Vase", *sphere(14, 8), clay("Slate", (0.20, 0.30, 0.42)), at(0.5, 0.36, 0.33, (0, 0, 10), (0.28, 0.2, 0.33)), smooth=False
-    )
+    """Spheres, scaled along three axes: one upright, one lying, and one shaded flat."""
+    upright, lying = at(-0.38, 0.24, 0.5, scale=(0.22, 0.22, 0.5)), at(0.42, -0.34, 0.148, (0, 78, 35), (0.15, 0.15, 0.23))
+    shape("Tall Vase", sphere(), clay("Terracotta", (0.66, 0.27, 0.14)), upright, (0.01, 0.01, 0.32, 0.32))
+    shape("Egg", sphere(), clay("Cream", (0.82, 0.74, 0.56)), lying, (0.345, 0.12, 0.285, 0.21))
+    slate, behind = clay("Slate", (0.20, 0.30, 0.42)), at(0.5, 0.36, 0.33, (0, 0, 10), (0.28, 0.2, 0.33))
+    shape("Faceted Vase", sphere(14, 8), slate, behind, (0.645, 0.26, 0.345, 0.25), smooth=False)
 
 
 def add_mirrored():
-    """The tall vase's smaller copy, mirrored by a scale below zero."""
-    shape("Mirrored Jar", *sphere(), clay("Ochre", (0.76, 0.50, 0.12)), at(-0.72, -0.28, 0.2, (0, 0, 20), (-0.24, 0.17, 0.2)))
+    """A low jar, mirrored by a scale below zero."""
+    mirrored = at(-0.72, -0.28, 0.2, (0, 0, 20), (-0.24, 0.17, 0.2))
+    shape("Mirrored Jar", sphere(), clay("Ochre", (0.76, 0.50, 0.12)), mirrored, (0.645, 0.01, 0.345, 0.235))
 
 
 def add_bowl():
     """A bowl turned under a parent that is scaled unevenly: together a shear."""
     parent = placed(bpy.data.objects.new("Shear", None), at(-0.12, -0.42, 0.205, scale=(0.3, 0.2, 0.2)))
-    thing = shape("Sheared Bowl", *bowl(), clay("Celadon", (0.36, 0.56, 0.44)), Matrix())
+    thing = shape("Sheared Bowl", bowl(), clay("Celadon", (0.36, 0.56, 0.44)), Matrix(), (0.645, 0.525, 0.345, 0.29))
     thing.parent = parent
     thing.matrix_parent_inverse = Matrix()
     thing.matrix_basis = at(0, 0, 0, (12, 14, 35))
 
 
 def add_torus():
-    """A ring, flattened, that leans on the faceted vase."""
-    shape("Ring", *torus(), clay("Madder", (0.58, 0.10, 0.12)), at(0.1, 0.16, 0.175, (64, 0, 24), (0.2, 0.17, 0.17)))
+    """A ring, flattened, that leans."""
+    leaning = at(0.1, 0.16, 0.175, (64, 0, 24), (0.2, 0.17, 0.17))
+    shape("Ring", torus(), clay("Madder", (0.58, 0.10, 0.12)), leaning, (0.645, 0.83, 0.345, 0.16))
 
 
 def build():

@@ -211,7 +211,7 @@ SCENES = (
     Scene(
         name="still_life",
         receivers=STILL_LIFE,
-        size=(320, 320),
+        size=(288, 288),
         transport="indirect",
         fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
         clip=Sun(20, 60, 2),

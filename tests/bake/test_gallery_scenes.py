@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import Baked
 
+from scripts.gallery.scenes import SCENES
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 from srbf.demo import build_scene
+from srbf.direct.ray import RayTracer
+from srbf.direct.receivers import Receivers
 
 pytestmark = pytest.mark.blender
 
@@ -107,3 +111,26 @@ def test_a_coin_turns_its_shading_with_the_light(bake) -> None:
     beside = felt & (np.abs(y) < 0.3) & (np.abs(x) < 1.1)
     left, right = beside & (x < 0), beside & (x > 0)
     assert from_left[left].mean() > 4 * from_left[right].mean() and from_right[right].mean() > 4 * from_right[left].mean()  # its shadow
+
+
+def test_a_still_life_of_uneven_scales_shades_itself(tmp_path: Path) -> None:
+    """Seven receivers in one atlas, as it is laid out; rays give Cycles' own direct light back on every one of them."""
+    (scene,) = [scene for scene in SCENES if scene.name == "still_life"]
+    build_scene(scene.name, tmp_path / "still_life.blend")
+    settings = replace(scene.bake_settings(), width=64, height=64, lights=4, samples=1, holdout=2, holdout_samples=64, validation=0)
+    baked = Baked(tmp_path / "still_life.blend", tmp_path / "capture", settings)
+    capture = baked.capture
+    assert not any("packed" in line for line in baked.said)
+    described = capture.manifest["receivers"]
+    assert [one["object"] for one in described] == [word.partition(":")[2] for word in scene.receivers]
+    covered = capture.coverage() > 0
+    assert covered.mean() > 0.75
+    tracer = RayTracer(Receivers.of(capture))
+    for index in capture.indices("holdout"):
+        true = capture.combined().image(index) - capture.image(index)
+        found = tracer.directional(capture.directions([index]))[0]
+        error = np.abs(found - true)[covered].max(axis=1)
+        assert 20 * np.log10(true.max() / np.sqrt((error**2).mean())) > 38
+        assert np.median(error) < 2e-3 * true.max()
+    warm = capture.image(capture.indices("holdout")[0])[covered]
+    assert warm.max() > 0.05  # what they reflect onto each other
