@@ -71,6 +71,7 @@ Where it fails: 25 maps lighten the shadows behind face and letters, lose the co
 Seven objects in one lightmap: spheres scaled along three axes, a scaled cube under them, a mirrored jar, a bowl sheared by its parent and a
 ring; smooth and flat shading. No scale is applied. Rays add the direct light, 16 scalars what the objects reflect onto each other.
 
-Where it fails: all light in 25 maps blurs the shadows that the objects cast on the table and on themselves, and rings show on round shapes.
+Where it fails: all light in the maps blurs the shadows that the objects cast on the table and on each other, or breaks them into grain, and
+16 scalars turn the colors that the objects bounce into the shade gray.
 """,
 }
