@@ -124,7 +124,7 @@ def test_the_readme_says_what_every_stage_and_define_takes() -> None:
     after = text[text.index("## Defines") :]
     for name in STAGES:
         source = (ROOT / "stages" / name).read_text()
-        if name.split(".")[0] in ("direct", "shadow", "shadow_height", "shadow_tint", "add", "finish", "fullscreen"):
+        if name.split(".")[0] in ("direct", "direct_on_mesh", "shadow", "shadow_height", "shadow_tint", "add", "finish", "fullscreen"):
             continue
         kind = name.split("_")[-1]
         assert f"`{name}`" in after or (f"`…{kind}`" in after), name
