@@ -86,8 +86,8 @@ def test_true_lamps_over_an_empty_plane(blend, bake, tmp_path: Path) -> None:
     from srbf.methods.relighting_map import RelightingMap
 
     asset = RelightingMap(k=60).encode(bake("plane", "lightmap:Plane", lights=300).capture)
-    # One sample stands on the texel's centre, as the relighter does; more average over the texel, which differs close to a lamp.
-    result = compare_with_lamps(asset, blend("plane"), count=3, samples=1)
+    # Samples are spread over the texel; their mean is near enough to what the relighter says of its center, close to a lamp too.
+    result = compare_with_lamps(asset, blend("plane"), count=3, samples=16)
     assert result["all"]["inverse-square"]["relative_rmse"] < 0.03
     assert result["best_scale"]["inverse-square"] == pytest.approx(1, abs=0.01)
     assert result["all"]["linear"]["relative_rmse"] > result["all"]["inverse-square"]["relative_rmse"]
