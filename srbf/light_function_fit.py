@@ -14,6 +14,7 @@ from srbf.basis.light_functions import LightFunctions
 from srbf.basis.light_kernel import LightKernel, kernel_of_spread, mean_variance, narrowest
 from srbf.cross_validation import HeldOut
 from srbf.model_selection import NARROWEST, WIDEST, Rule, TexelSample
+from srbf.parallel import each, one_blas_thread
 from srbf.solve.kernel_ridge import KernelPath
 from srbf.sphere import Domain, mean_spacing, point_set
 
@@ -21,7 +22,7 @@ SPREADS = (0.5, 0.7, 1.0, 1.42, 2.0, 2.8, 4.0)  # of the lights' spacing
 NARROW, WIDE = (0.5, 0.7, 1.0), (1.42, 2.0, 2.8)  # of kernels of two spreads
 WIDE_SHARES = (0.7, 0.9, 0.99, 0.999)
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-6, 1.1))  # of the kernel's mean variance
-USUAL, USUAL_SHARE, USUAL_RIDGE = (0.7, 2.0), 0.99, RIDGES[3]
+USUAL, USUAL_SHARE, USUAL_RIDGE = (0.7, 2.0), 0.99, 3  # narrow and wide, share of the wide, which of RIDGES
 MARGIN = 1.5  # times the squared error of the best, geometric mean over lights, that the usual pair may have
 FEW = 8  # validation lights that change nothing about the margin
 APART = 1.3  # times as wide at least is the wide one
@@ -67,25 +68,26 @@ def choose_functions(
     held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
     rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
     usual = _usual_kernel(sample, centers)
-    best: tuple[float, FunctionModel] | None = None
-    usual_one: tuple[float, FunctionModel] | None = None
-    for kernel, matrix in _candidates(sample.directions, sample.train, centers, spread, ridge is not None):
+    kernels = list(_candidates(sample.directions, sample.train, centers, spread, ridge is not None))
+    found: list[list[tuple[float, FunctionModel]]] = [[] for _ in kernels]
+
+    def work(i: int) -> None:
+        kernel, matrix = kernels[i]
         path = KernelPath(matrix[: sample.train])
         scale = float(np.diag(matrix).mean())
-        for share in RIDGES if ridge is None else [ridge / scale]:
-            penalty = share * scale
+        for penalty in [share * scale for share in RIDGES] if ridge is None else [ridge]:
             single, banded = held_out.single(path, penalty), held_out.in_bands(path, penalty)
             unseen = held_out.validation(path, penalty, matrix[sample.train :]) if held_out.validated else None
             error = float((single if unseen is None else unseen).mean())
-            scored = held_out.score(single, banded, unseen), FunctionModel(kernel, penalty, rule, error)
-            if best is None or scored[0] < best[0]:
-                best = scored
-            if (kernel, share) == (usual, USUAL_RIDGE):
-                usual_one = scored
-    assert best is not None, "no spread or no ridge to choose from"
+            found[i].append((held_out.score(single, banded, unseen), FunctionModel(kernel, penalty, rule, error)))
+
+    with one_blas_thread():
+        each(work, len(kernels))
+    best = min((scored for models in found for scored in models), key=lambda scored: scored[0])
+    of_usual = [models[USUAL_RIDGE] for (kernel, _), models in zip(kernels, found, strict=True) if kernel == usual and ridge is None]
     margin = np.log(MARGIN) * min(1.0, FEW / max(1, len(sample.directions) - sample.train))
-    if usual_one is not None and usual_one[0] < best[0] + margin:
-        return usual_one[1]
+    if of_usual and of_usual[0][0] < best[0] + margin:
+        return of_usual[0][1]
     return best[1]
 
 

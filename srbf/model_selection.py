@@ -13,6 +13,7 @@ from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.capture import COVERED, STRIP, Capture
 from srbf.cross_validation import HeldOut
 from srbf.errors import InputError
+from srbf.parallel import each, one_blas_thread
 from srbf.solve.kernel_ridge import KernelPath
 
 Rule = Literal["validation", "leave-one-light-out"]
@@ -92,11 +93,12 @@ def choose(
     held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
     middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
     train = sample.train
-    best: tuple[float, Choice] | None = None
-    usual_one: tuple[float, Choice] | None = None
-    margin = 0.0
-    for spread, weights in candidates:
-        margin = np.log(MARGIN) * min(1.0, SURE * weights.shape[1] / train) ** 2
+    rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
+    tried = list(candidates)
+    found: list[list[tuple[float, Choice]]] = [[] for _ in tried]
+
+    def work(i: int) -> None:
+        spread, weights = tried[i]
         path = KernelPath(weights[:train] @ weights[:train].T)
         for ridge in ridges:
             single, banded = held_out.single(path, ridge), held_out.in_bands(path, ridge)
@@ -105,15 +107,19 @@ def choose(
                 lost = noise(path.solve(ridge, weights[:train]).T, weights)
                 single, banded = single + lost[:train], banded + lost[middles]
                 unseen = None if unseen is None else unseen + lost[train:]
-            score = held_out.score(single, banded, unseen)
-            rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
-            scored = score, Choice(spread, ridge, rule, float((single if unseen is None else unseen).mean()))
-            if best is None or score < best[0]:
-                best = scored
-            if (spread, ridge) == usual:
-                usual_one = scored
-    assert best is not None, "no spread or no ridge to choose from"
-    return usual_one[1] if usual_one is not None and usual_one[0] < best[0] + margin else best[1]
+            error = float((single if unseen is None else unseen).mean())
+            found[i].append((held_out.score(single, banded, unseen), Choice(spread, ridge, rule, error)))
+
+    with one_blas_thread():
+        each(work, len(tried))
+    scored = [one for choices in found for one in choices]
+    assert scored, "no spread or no ridge to choose from"
+    best = min(scored, key=lambda one: one[0])
+    margin = np.log(MARGIN) * min(1.0, SURE * tried[0][1].shape[1] / train) ** 2
+    for score, choice in scored:
+        if (choice.spread, choice.ridge) == usual and score < best[0] + margin:
+            return choice
+    return best[1]
 
 
 def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:
