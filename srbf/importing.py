@@ -85,7 +85,7 @@ class LightListImport:
                 "lights": lights,
             }
             if self.mask is not None:
-                mask_read = read_picture(self.mask, "linear")
+                mask_read = read_picture(self.mask, "linear", self.layer if self.mask.suffix.lower() == ".exr" else None)
                 mask = mask_read.pixels[:, :, :1]
                 notes.append((self.mask.name, mask_read.notes))
                 if mask.shape[:2] != size:
@@ -108,9 +108,10 @@ class LightListImport:
 
     def _pairs(self, light_list: Path, role: Role, say: Callable[[str], None]) -> list[tuple[Path, LightListEntry, Role]]:
         pairs = paired(light_list, self.kind, self.images, say)
-        below = below_the_horizon([entry for _, entry in pairs], light_list.name) if self.kind == "directional" else None
-        if below is not None:
-            say(below)
+        if role == "train" and self.kind == "directional":  # the domain is that of the lights to be fitted
+            below = below_the_horizon([entry for _, entry in pairs], light_list.name)
+            if below is not None:
+                say(below)
         return [(path, entry, role) for path, entry in pairs]
 
     def _read(self, path: Path) -> Picture:
