@@ -75,7 +75,7 @@ def test_a_folder_of_exports(tmp_path: Path) -> None:
     assert found(list_of(tmp_path, "exports/a.png", "Exports\\B.png"))[0] == images
     assert found(list_of(tmp_path, "a.png", "b.tif")) == (
         images,
-        ["2 of 2 images of l.lp were found by a folder inside", "1 of 2 images of l.lp were found by another extension"],
+        ["1 of 2 images of l.lp were found by another extension", "2 of 2 images of l.lp were found by a folder inside"],
     )
     png(tmp_path / "thumbnails" / "a.png")
     with pytest.raises(ImageError, match=r"several with that stem \(exports/a.png, thumbnails/a.png\)"):
