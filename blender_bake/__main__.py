@@ -70,8 +70,7 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
         channel.emit("mesh", **scene_mesh.answer(scene, job))
         return
     is_view = job["receiver"]["kind"] == "view"
-    for line in [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if is_view else ())]:
-        channel.warn(line)
+    left_out = [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if is_view else ())]
     no_shadow.let_light_through(scene, job["no_shadow"])
     own_light = scenes.OwnLight(scene)
     kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
@@ -79,6 +78,8 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     if apart:
         scene_file.show_as_rendered(scene)
     receiver = kind(scene, job, channel)
+    for line in left_out:  # of a receiver that is there
+        channel.warn(line)
     channel.emit("scene", blender=scenes.version(), receivers=receiver.descriptions(), **receiver.facts())
 
     def image(name: str, array: Any, started: float, **fields: Any) -> None:
