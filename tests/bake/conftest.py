@@ -44,6 +44,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 LEANING = {"normal mapped"}  # scenes whose materials turn normals away from the surface, as their tests check
+FINE = {"lattice", "coin"}  # scenes whose laths, leaves and relief are finer than the pixels of a tiny view: neighbors lie on other surfaces
 
 
 class Baked:
@@ -54,7 +55,7 @@ class Baked:
         self.job = Bake(scene, folder, settings)
         self.job.run(Reporter(say=self.said.append))
         self.capture = Capture.open(folder)
-        if scene.stem not in LEANING:
+        if scene.stem not in LEANING and not (scene.stem in FINE and settings.receiver.kind == "view"):
             check_normals(self.capture)
 
 

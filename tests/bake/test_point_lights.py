@@ -111,7 +111,7 @@ def test_no_room_is_said(blend, tmp_path: Path) -> None:
 @pytest.mark.blender
 def test_a_white_plane_under_lamps(blend, tmp_path: Path) -> None:
     """cos / d^2 of irradiance, through the command; and a directional asset of the plane foretells it, since nothing casts a shadow."""
-    flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 1, "--holdout-samples", 1]
+    flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 64, "--holdout-samples", 64]
     points = ["--light-set", "point:0.8", "--light-box", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
     done = subprocess.run(
         [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "lamps", *map(str, flags + points)],
@@ -127,8 +127,8 @@ def test_a_white_plane_under_lamps(blend, tmp_path: Path) -> None:
         vectors = lamp - position
         distance = np.linalg.norm(vectors, axis=2)
         np.testing.assert_allclose(
-            capture.image(index)[..., 0], vectors[..., 2] / distance**3, rtol=0.01
-        )  # the texel's point is near its centre
+            capture.image(index)[..., 0], vectors[..., 2] / distance**3, rtol=0.04
+        )  # the mean of 64 points about the texel's center
     with pytest.raises(InputError, match="directional"):
         RelightingMap(k=4).encode(capture)
 
