@@ -44,7 +44,10 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 
 LEANING = {"normal mapped"}  # scenes whose materials turn normals away from the surface, as their tests check
-FINE = {"lattice", "coin"}  # scenes whose laths, leaves and relief are finer than the pixels of a tiny view: neighbors lie on other surfaces
+FINE = {
+    "lattice",
+    "coin",
+}  # scenes whose laths, leaves and relief are finer than the pixels of a tiny view: neighbors lie on other surfaces
 
 
 class Baked:

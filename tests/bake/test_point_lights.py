@@ -126,9 +126,10 @@ def test_a_white_plane_under_lamps(blend, tmp_path: Path) -> None:
     for index, lamp in enumerate(capture.positions()):
         vectors = lamp - position
         distance = np.linalg.norm(vectors, axis=2)
-        np.testing.assert_allclose(
-            capture.image(index)[..., 0], vectors[..., 2] / distance**3, rtol=0.04
-        )  # the mean of 64 points about the texel's center
+        expected = vectors[..., 2] / distance**3
+        apart = np.abs(capture.image(index)[..., 0] / expected - 1)
+        # The mean of 64 points about the texel's center; closest to the light it is another than the center's.
+        assert np.quantile(apart, 0.9) < 0.02 and apart.max() < 0.2
     with pytest.raises(InputError, match="directional"):
         RelightingMap(k=4).encode(capture)
 
