@@ -18,7 +18,7 @@ from pathlib import Path
 
 from srbf.capture import Capture
 from srbf.demo import SCENES, build_scene
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap

@@ -18,11 +18,11 @@ import numpy as np
 
 from srbf.basis.gaussian import spread_of, weight
 from srbf.capture import COVERED, MANIFEST, Capture
-from srbf.importing import LightListImport
-from srbf.light_function_fit import dense_centers, functions_through
-from srbf.light_space import LightSpace
+from srbf.encode.light_function_fit import dense_centers, functions_through
+from srbf.encode.model_selection import TexelSample
+from srbf.encode.weighted_rows import LightSpace
+from srbf.importing.photographs import LightListImport
 from srbf.methods.relighting_map import RelightingMap
-from srbf.model_selection import TexelSample
 from srbf.solve.pca import principal_axes
 from srbf.solve.ridge import RidgePath
 from srbf.sphere import domain_of, mean_spacing, normalize, point_set

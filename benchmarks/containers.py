@@ -22,21 +22,21 @@ from scipy import ndimage
 
 from srbf.asset import LAYERS, Asset
 from srbf.capture import Capture
-from srbf.containers import read_texture_array
-from srbf.containers.blocks import decode, encode
-from srbf.evaluation import PEAK_QUANTILE, evaluate, psnr
+from srbf.encode.quantization import quantize, round_together
+from srbf.encode.uv_seams import Stitch
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, evaluate, psnr
 from srbf.export import Settings, export, rounding
 from srbf.export.layers import byte_ranges, functions_of
 from srbf.export.loss import relit_psnr
 from srbf.export.mips import chart_gap, coverage_of, levels_without_bleeding, shares
 from srbf.export.rounding import blocks_alone, blocks_together
-from srbf.fitting import encode as fit
+from srbf.fitting.options import encode as fit
+from srbf.io.containers import read_texture_array
+from srbf.io.containers.blocks import decode, encode
 from srbf.methods import directional_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
-from srbf.quantization import quantize, round_together
-from srbf.stitch import Stitch
 
 MIB = 1 << 20
 SIDE = 1024

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from srbf.capture import COVERED, Capture
-from srbf.direct.choice import Added
-from srbf.evaluation import PEAK_QUANTILE, PeakHistogram, psnr
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, psnr
+from srbf.relighting.direct_light import Added
 
 
 def main(folders: list[str]) -> None:

@@ -21,10 +21,10 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from srbf import files
 from srbf.capture import MANIFEST, Capture
-from srbf.image import write_image
-from srbf.parallel import cores
+from srbf.compute.threads import cores
+from srbf.io import files
+from srbf.io.image import write_image
 from srbf.sphere import normalize, point_set
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
-from srbf.image import write_image
-from srbf.motion import Motion, Reference, compare, dense_reference, great_circles, sampled_texels, sweep
-from srbf.shadow_sampling import shadow_sampling
+from srbf.evaluation.light_spacing import shadow_sampling
+from srbf.evaluation.temporal_stability import Motion, Reference, compare, dense_reference, great_circles, sampled_texels, sweep
+from srbf.io import files
+from srbf.io.image import write_image
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set
 
 SIDE = 48  # texels of our scenes

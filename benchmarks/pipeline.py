@@ -14,14 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf import files, methods
+from srbf import methods
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.evaluation import evaluate
-from srbf.gl.relighter import Relighter
-from srbf.image import write_image
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io import files
+from srbf.io.image import write_image
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
 from srbf.methods.relighting_map import RelightingMap
+from srbf.relighting.relighter import Relighter
 from srbf.sphere import point_set
 
 K = 25

@@ -20,18 +20,18 @@ from typing import get_args
 
 import numpy as np
 
-from srbf import files
-from srbf.asset import Asset
+from srbf.asset import Asset, layer_entries
 from srbf.capture import COVERED, MANIFEST, Capture, Quantity, Role
-from srbf.evaluation import PEAK_QUANTILE, PeakHistogram
-from srbf.image import Encoding, write_image
-from srbf.importing import LightListImport
-from srbf.leaving_out import leave_one_out
+from srbf.encode.quantization import quantize
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram
+from srbf.evaluation.leave_one_out import leave_one_out
+from srbf.evaluation.rate_distortion import ALL, NEAREST, Score, baselines, planes_bound, score_asset, spectrum
+from srbf.importing.photographs import LightListImport
+from srbf.io import files
+from srbf.io.image import Encoding, write_image
 from srbf.methods.clustered_eigen_map import TEXELS_A_CLUSTER, ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
-from srbf.quality import ALL, NEAREST, Score, baselines, planes_bound, score_asset, spectrum
-from srbf.quantization import layer_entries, quantize
 from srbf.sphere import domain_of, normalize, point_set
 
 Method = RelightingMap | EigenMap | ClusteredEigenMap

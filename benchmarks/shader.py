@@ -21,15 +21,15 @@ from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
 from srbf.basis.light_functions import LightFunctions
 from srbf.basis.octahedral_table import octahedral_table
+from srbf.encode.light_function_fit import dense_centers
 from srbf.gl.context import Limits, compile_program, create_context
 from srbf.gl.includes import resolve, resolve_text
 from srbf.gl.programs import Programs
-from srbf.gl.relighter import PASSES
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_lamps, padded
-from srbf.light_function_fit import dense_centers
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import folded_weights
+from srbf.relighting.relighter import PASSES
 from srbf.sphere import point_set
 
 LIGHTS = 400  # of the capture that the light functions are as dense as

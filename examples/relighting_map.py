@@ -4,8 +4,8 @@ import sys
 from pathlib import Path
 
 from srbf.capture import Capture
-from srbf.evaluation import evaluate
-from srbf.image import write_picture
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io.image import write_picture
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods.relighting_map import RelightingMap, relight
 

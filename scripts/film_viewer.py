@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from srbf.files import atomic_path
+from srbf.io.files import atomic_path
 from srbf.viewer.contents import contents_of
 from srbf.viewer.server import ViewerServer
 from tests.npm_package import WEB, browser_program, driven

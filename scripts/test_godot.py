@@ -29,7 +29,7 @@ from made_assets import build_asset, build_planes  # noqa: E402
 from srbf.asset import Asset  # noqa: E402
 from srbf.export.godot import write  # noqa: E402
 from srbf.export.settings import PLAIN, Settings  # noqa: E402
-from srbf.image import decode_srgb, encode_srgb  # noqa: E402
+from srbf.io.image import decode_srgb, encode_srgb  # noqa: E402
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
 from srbf.methods import relight  # noqa: E402
 

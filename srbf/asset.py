@@ -9,17 +9,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf import files, schemas
+from srbf import schemas
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.basis.gaussian import GaussianBasis, weight
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
-from srbf.containers import TextureArray, read_texture_array
-from srbf.containers.texture_array import level_bytes, level_size
 from srbf.errors import ImageError, InputError, ManifestError
-from srbf.image import Encoding, read_image, require_finite, write_images
-from srbf.quantization import layer_entries
+from srbf.io import files
+from srbf.io.containers import TextureArray, read_texture_array
+from srbf.io.containers.texture_array import level_bytes, level_size
+from srbf.io.image import Encoding, read_image, require_finite, write_images
 from srbf.sphere import Domain
 
 LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
@@ -249,6 +249,7 @@ class Asset:
 TEXEL_BITS: dict[LayerEncoding, int] = {"half": 64, "float": 128, "uint8": 32, "bc7": 8, "bc1": 4}  # of a layer
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
 _ENCODING: dict[str, Encoding] = {"float16": "half", "float32": "float", "uint8": "uint8"}
+SUFFIX: dict[Encoding, str] = {"half": "exr", "float": "exr", "uint8": "png"}
 
 
 @dataclass(frozen=True)
@@ -377,3 +378,16 @@ def _check_centers(listed: list[list[float]], path: Path) -> None:
     lengths = np.linalg.norm(np.array(listed, np.float64), axis=1)
     if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
         raise ManifestError(f"expected unit centers in {path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
+
+
+def layer_entries(stem: str, encoding: Encoding, scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]) -> list[dict]:
+    """The manifest's list of stored layers: file, encoding, scale, bias."""
+    return [
+        {
+            "file": f"{stem}_{i:02d}.{SUFFIX[encoding]}",
+            "encoding": encoding,
+            "scale": scale[i].astype(float).tolist(),
+            "bias": bias[i].astype(float).tolist(),
+        }
+        for i in range(len(scale))
+    ]

@@ -12,12 +12,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf import files, schemas
+from srbf import schemas
 from srbf.arrays import Float, Float32, Float64, Int
+from srbf.compute.threads import cores, each
 from srbf.errors import ImageError, InputError, ManifestError
-from srbf.half import finite_to_float32
-from srbf.image import holds_half, read_image, read_stored, require_finite, size_of
-from srbf.parallel import cores, each
+from srbf.io import files
+from srbf.io.float16 import finite_to_float32
+from srbf.io.image import holds_half, read_image, read_stored, require_finite, size_of
 
 LightKind = Literal["directional", "point"]
 Role = Literal["train", "validation", "holdout"]

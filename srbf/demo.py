@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Literal
 
 import srbf
-from srbf import files
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.budget import within_budget
 from srbf.capture import Capture, Quantity
 from srbf.errors import BakeError, InputError, OutputExistsError
-from srbf.evaluation import TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import TrainWatch, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
+from srbf.fitting.auto_method import within_budget
+from srbf.io import files
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 

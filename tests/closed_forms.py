@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from srbf.direct.receivers import Receivers
-from srbf.scene_file import KNOTS, Triangles
+from srbf.io.scene_glb import KNOTS, Triangles
+from srbf.visibility.receivers import Receivers
 
 OPAQUE, GLASS = 0, 1
 

@@ -27,10 +27,10 @@ install_import_hook(CHECKED, "annotation_checks.check")
 
 from made_assets import build_asset, build_planes  # noqa: E402
 
-from srbf import files  # noqa: E402
 from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
-from srbf.image import write_image  # noqa: E402
+from srbf.io import files  # noqa: E402
+from srbf.io.image import write_image  # noqa: E402
 from srbf.sphere import point_set, random_directions  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/

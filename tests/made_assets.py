@@ -10,7 +10,7 @@ from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
 from srbf.basis.light_functions import LightFunctions
 from srbf.basis.octahedral_table import octahedral_table
-from srbf.quantization import quantize
+from srbf.encode.quantization import quantize
 from srbf.sphere import point_set
 
 WIDEST = 1.0  # rad: wider tables break their own tolerance

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srbf.direct.receivers import Receivers
-from srbf.scene_file import KNOTS, Triangles
+from srbf.io.scene_glb import KNOTS, Triangles
+from srbf.visibility.receivers import Receivers
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]  # (s, t) in [0, 1] to points and unit normals
 

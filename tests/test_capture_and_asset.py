@@ -11,8 +11,8 @@ import pytest
 from srbf.asset import Asset
 from srbf.capture import BLOCK_BYTES, Capture
 from srbf.errors import ImageError, ManifestError, SrbfError
-from srbf.facts import describe
-from srbf.image import write_image
+from srbf.info import describe
+from srbf.io.image import write_image
 from srbf.methods.relighting_map import RelightingMap
 
 

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io import files
 
 pytestmark = pytest.mark.blender
 image = pytest.importorskip("PIL.Image")

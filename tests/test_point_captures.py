@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
 from srbf.errors import InputError, ManifestError
-from srbf.evaluation import evaluate
-from srbf.facts import describe
-from srbf.image import write_image
-from srbf.importing import LightListImport
-from srbf.light_list import read_light_list
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.importing.light_list import read_light_list
+from srbf.importing.photographs import LightListImport
+from srbf.info import describe
+from srbf.io import files
+from srbf.io.image import write_image
 from srbf.methods.relighting_map import RelightingMap
 
 LAMPS = {"train": [(0.3, 0.1, 0.8), (-0.4, 0.2, 0.6), (0.0, 0.0, 1.5)], "validation": [(0.5, -0.5, 0.9)], "holdout": [(-0.2, -0.6, 1.1)]}

@@ -6,7 +6,7 @@
    domain: planes, weights and cluster as in srbfCombinePlanesDirectional, weights 0 where no directional or environment light shines;
            level: of mip maps, 0 without; wTable as in srbfCombinePlanesPoint; directions, colors, shining from srbfLampsAt; result
            signed
-   twin:   srbf.scalar_planes.linear_response
+   twin:   srbf.methods.coefficient_maps.linear_response
    cite:   Sloan2003 */
 #include "basis/octahedral_encode.glsl"
 #include "basis/octahedral_mix.glsl"

@@ -2,7 +2,7 @@
 /* srbfReceiverFromDepth: the world position that a camera sees at a place of its picture, out of its depth buffer.
    use:    vec3 srbfReceiverFromDepth(float stored, vec2 place, SrbfCamera camera)
    domain: stored in [0, 1], as the depth buffer holds it; place from (-1, -1), the picture's lower left corner, to (1, 1)
-   twin:   srbf.depth.receivers
+   twin:   srbf.gl.depth_buffer.receivers
    cite:   Wong2005, "Point-Source Shader" */
 #include "depth/eye_depth.glsl"
 #include "depth/point_on_ray.glsl"

@@ -18,10 +18,10 @@ from scripts.gallery.making import is_done, make
 from scripts.gallery.places import Places
 from scripts.gallery.scenes import SCENES
 from scripts.gallery.steps import Steps
-from srbf import files
 from srbf.bake.folder import locked
 from srbf.bake.run import Reporter
 from srbf.errors import SrbfError
+from srbf.io import files
 
 LOCK = ".gallery.lock"
 EVERY = 20.0  # seconds between two lines about a bake's progress

@@ -14,9 +14,9 @@ from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit, Lantern, Sun
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.direct.choice import Added
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import linear_response
+from srbf.relighting.direct_light import Added
 
 MILLISECONDS = 80  # a frame
 MOST_BYTES = 1_200_000

@@ -12,9 +12,9 @@ from matplotlib import get_data_path
 from numpy import ndarray
 from PIL import Image, ImageDraw, ImageFont
 
-from srbf import files
-from srbf.image import encode_srgb
-from srbf.rebinning import disc_points
+from srbf.io import files
+from srbf.io.image import encode_srgb
+from srbf.report.abrdf import disc_points
 
 INK, SOFT, RULE, SUN, SUN_EDGE = "#262626", "#707070", "#c9c9c9", "#f0b429", "#a87512"
 QUALITY = 85

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from scripts.gallery.making import read_scores
 from scripts.gallery.places import Places
 from scripts.gallery.steps import Steps
-from srbf import files
 from srbf.asset import Asset
-from srbf.quality import ALL, NEAREST, texel_bytes
+from srbf.evaluation.rate_distortion import ALL, NEAREST, texel_bytes
+from srbf.io import files
 
 INK, SOFT, RULE = "#1f2328", "#63686e", "#dcdfe3"  # of a report's page
 COLORS = {

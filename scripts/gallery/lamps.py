@@ -8,13 +8,13 @@ from numpy import ndarray
 from scripts.gallery import drawing, strip
 from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
-from srbf.direct.choice import Added
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io import files
 from srbf.lights import PointLight
 from srbf.methods import linear_response
+from srbf.relighting.direct_light import Added
 
 SHOWN = 3  # lamps, evenly along the path
 WORST = 100  # one pixel in so many, those that err most, is left out of `rest`

@@ -15,19 +15,19 @@ from scripts.gallery import clip, drawing, lamps, photographs, strip
 from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit, Lantern
 from scripts.gallery.steps import Steps
-from srbf import files
 from srbf.asset import Asset
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings
 from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.demo import build_scene, scene_script
 from srbf.errors import OutputExistsError
-from srbf.evaluation import evaluate
-from srbf.fitting import encode, method_for
-from srbf.importing import LightListImport
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.evaluation.rate_distortion import METHODS, Score, contest
+from srbf.evaluation.temporal_stability import sampled_texels
+from srbf.fitting.options import encode, method_for
+from srbf.importing.photographs import LightListImport
+from srbf.io import files
 from srbf.methods.relighting_map import RelightingMap
-from srbf.motion import sampled_texels
-from srbf.quality import METHODS, Score, contest
 
 FITTING = (
     "methods/*",

@@ -15,10 +15,10 @@ from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit
 from scripts.gallery.steps import Steps
 from scripts.gallery.words import INTRODUCTION, TITLES, WORDS
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.quality import family_of, name_of, texel_bytes
+from srbf.evaluation.rate_distortion import family_of, name_of, texel_bytes
+from srbf.io import files
 
 FIGURE = "error-by-bytes.webp"
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")

@@ -9,10 +9,10 @@ from numpy import ndarray
 from PIL import Image
 
 from scripts.gallery.scenes import Dome
-from srbf import files
 from srbf.arrays import Float64
 from srbf.capture import Capture
-from srbf.image import encode_srgb
+from srbf.io import files
+from srbf.io.image import encode_srgb
 from srbf.sphere import point_set, random_directions
 
 LAMPS, DIRS, TEST = "lamps.lp", "dirs.lp", "test.lp"

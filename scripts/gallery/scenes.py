@@ -8,7 +8,7 @@ from typing import Any, Literal
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.capture import Transport
-from srbf.direct.choice import Direct
+from srbf.relighting.direct_light import Direct
 
 Place = tuple[float, float, float]
 

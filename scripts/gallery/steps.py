@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from srbf import files
+from srbf.io import files
 
 TIMES = "times.json"
 BEAT = 5.0  # seconds between two notes of how long the step at hand has taken so far

@@ -12,12 +12,12 @@ from PIL import Image, ImageDraw
 from scripts.gallery import drawing
 from scripts.gallery.drawing import INK, SOFT, font
 from scripts.gallery.places import Places
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.direct.choice import Added
-from srbf.evaluation import psnr
+from srbf.evaluation.errors_by_role import psnr
+from srbf.io import files
 from srbf.methods import directional_responses
+from srbf.relighting.direct_light import Added
 from srbf.sphere import normalize
 
 NARROWEST, WIDEST = 160, 384  # pixels of one picture

@@ -10,7 +10,7 @@ import numpy as np
 
 from srbf.bake.settings import BakeSettings
 from srbf.errors import BakeError
-from srbf.files import WriteError
+from srbf.io.files import WriteError
 
 FIRST_LIGHTS = 24  # of the order in which they are rendered: they cover the domain
 HALF_BYTES, FLOAT_BYTES = 2, 4

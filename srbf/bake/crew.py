@@ -15,10 +15,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.bake.settings import PlannedLight
 from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.errors import BakeError
+from srbf.io import files
 
 AHEAD = 2  # lights asked of a worker at once: it renders one while we write the other
 TRIES = 2  # of a light, before it is reported and the rest goes on

@@ -20,18 +20,18 @@ from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 import srbf
-from srbf import files
 from srbf.bake import folder
 from srbf.bake.crew import TRIES, Answer, Committed, Crew, CrewSettings, Take, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
+from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
-from srbf.bake.run import serving_job
 from srbf.bake.settings import BakeSettings
 from srbf.bake.sums import LATE, Sums
 from srbf.bake.worker import Worker
-from srbf.cluster import Cluster, ClusterError, scratch_root
+from srbf.compute.dask_client import Cluster, ClusterError, scratch_root
 from srbf.errors import BakeError
+from srbf.io import files
 
 if TYPE_CHECKING:
     from srbf.bake.run import Bake

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from srbf.bake.checks import bytes_needed
-from srbf.bake.run import Bake, base_job
+from srbf.bake.job import base_job
+from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
 from srbf.bake.worker import Worker
-from srbf.image import write_image
+from srbf.io.image import write_image
 
 PROBE_SAMPLES = 4  # more than that of the other probe: enough to tell a light's fixed cost from its cost a sample
 

@@ -11,13 +11,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.bake import sums
 from srbf.bake.images import GEOMETRY, PREPARED, SCENE_FILE
 from srbf.bake.part import Part
 from srbf.bake.sums import SUMS
 from srbf.capture import MANIFEST
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
+from srbf.io import files
 
 STATE = "bake.json"  # there while a bake is unfinished: what it was asked for
 LOG = "bake.log"

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.arrays import Float32, Int
 from srbf.bake.settings import PlannedLight
 from srbf.bake.sums import SUMS, load_array, save_array
-from srbf.dilation import dilate, nearest_covered
+from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
-from srbf.image import HALF_MAX, read_image, write_image
+from srbf.io import files
+from srbf.io.image import HALF_MAX, read_image, write_image
 
 GEOMETRY = ("position", "normal", "albedo", "coverage")
 SCENE_FILE = "scene.glb"

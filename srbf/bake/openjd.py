@@ -9,10 +9,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, plan_lights
 from srbf.errors import InputError
+from srbf.io import files
 
 TEMPLATE = "template.json"
 PARAMETERS = "parameters.json"

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from srbf import files, methods
+from srbf import methods
 from srbf.asset import Asset
-from srbf.bake.run import base_job
+from srbf.bake.job import base_job
 from srbf.bake.settings import BakeSettings, Receiver, noise_seed
 from srbf.bake.worker import Worker
 from srbf.errors import InputError
+from srbf.io import files
 from srbf.lights import Falloff, Light, PointLight
 
 FALLOFFS: tuple[Falloff, ...] = ("inverse-square", "linear")

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.bake import folder, stopping
 from srbf.bake.checks import FIRST_LIGHTS, FirstLights, bytes_needed, check_disk
 from srbf.bake.crew import Answer, Committed, Crew, CrewSettings, Renderer, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
+from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.part import Part
@@ -29,13 +29,11 @@ from srbf.bake.sums import LATE, SUMS, Sums
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError
+from srbf.io import files
 
 if TYPE_CHECKING:
     from srbf.bake.dask_crew import DaskCrew
 
-AMBIENT_SEED = -1  # the light index of the image without a light
-COVERAGE_SAMPLES = 64
-PROBES = 12  # about so many lights by which the tints of translucent materials are chosen
 CURVE = "curve.json"  # in the folder of sums: what --samples auto measured
 
 
@@ -194,7 +192,7 @@ class _Passes:
         if self._bake.dask is None:
             return crew
         from srbf.bake.dask_crew import DaskCrew
-        from srbf.cluster import checked
+        from srbf.compute.dask_client import checked
 
         return DaskCrew(checked(self._bake.dask), self._bake, self._identity, crew, self._say_once)
 
@@ -408,35 +406,3 @@ class _Passes:
     def _log(self, line: str) -> None:
         with open(self._folder / LOG, "a", encoding="utf-8") as log:
             log.write(f"srbf: {line}\n")
-
-
-def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | None, scratch: Path) -> dict[str, Any]:
-    """The job of a worker that is then asked for lights; with nothing `prepared` it hands over what the images of the receiver need."""
-    train = [light for light in plan_lights(settings) if light.role == "train"]
-    return {
-        **base_job(scene, settings, scratch),
-        "serve": True,
-        "geometry": prepared is None,
-        "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)} if prepared is None else None,
-        "lights": [],
-        "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
-        "tints": None if prepared is None else prepared["tints"],
-    }
-
-
-def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, Any]:
-    """What every job tells the worker of scene and receiver."""
-    return {
-        "scene": str(scene.resolve()),
-        "scene_name": settings.scene,
-        "receiver": settings.receiver.job(),
-        "width": settings.width,
-        "height": settings.height,
-        "quantity": settings.quantity,
-        "keep_lamps": settings.keep_lamps,
-        "sun_angle": settings.sun_angle,
-        "transport": settings.transport,
-        "no_shadow": list(settings.no_shadow),
-        "coverage_samples": COVERAGE_SAMPLES,
-        "scratch": str(scratch.resolve()),
-    }

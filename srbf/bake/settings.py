@@ -14,7 +14,7 @@ import numpy as np
 from srbf.bake.point_lights import PointGrid
 from srbf.capture import LightKind, Quantity, Role, Transport
 from srbf.errors import InputError
-from srbf.light_list import read_light_list
+from srbf.importing.light_list import read_light_list
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 Kind = Literal["lightmap", "vertices", "view"]

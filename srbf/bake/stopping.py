@@ -10,8 +10,8 @@ import numpy as np
 
 from srbf.bake.sums import Sum
 from srbf.capture import Capture
-from srbf.light_function_fit import choose_functions, dense_centers
-from srbf.model_selection import TexelSample
+from srbf.encode.light_function_fit import choose_functions, dense_centers
+from srbf.encode.model_selection import TexelSample
 from srbf.sphere import domain_of
 
 TEXELS = 4096

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.arrays import Float32
 from srbf.bake.settings import PlannedLight
 from srbf.errors import ImageError
+from srbf.io import files
 
 SUMS = "sums"
 LATE = 30.0  # seconds after which a shared folder shows what another machine wrote

@@ -10,13 +10,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.bake.folder import STATE
-from srbf.bake.run import Bake, base_job
+from srbf.bake.job import base_job
+from srbf.bake.run import Bake
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST
 from srbf.errors import BakeError, InputError, ManifestError
+from srbf.io import files
 
 MULTIPLE = 4  # of texels, that a side found by density is rounded up to: what block compression needs
 

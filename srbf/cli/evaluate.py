@@ -27,11 +27,11 @@ from srbf.cli.fit_parameters import (
 )
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
-from srbf.direct.choice import Added, chosen
 from srbf.errors import InputError
-from srbf.evaluation import evaluate as evaluate_capture
-from srbf.fitting import method_for, method_of, settings_of
-from srbf.leaving_out import leave_one_out as errors_left_out
+from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
+from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
+from srbf.fitting.options import method_for, method_of, settings_of
+from srbf.relighting.direct_light import Added, chosen
 
 
 def evaluate(

@@ -12,11 +12,11 @@ from srbf.asset import MANIFEST, Asset
 from srbf.cli.parameters import AssetFolder, Force, Json, Output, parse_levels
 from srbf.cli.terminal import note, print_json
 from srbf.errors import InputError
-from srbf.evaluation import MAX_PSNR
+from srbf.evaluation.errors_by_role import MAX_PSNR
 from srbf.export import TARGETS, Report, Settings, check_target
 from srbf.export import export as export_asset
-from srbf.files import check_replaceable
-from srbf.reprojection import keep as keep_fewer
+from srbf.fitting.fewer_maps import keep as keep_fewer
+from srbf.io.files import check_replaceable
 
 MIB = 1 << 20
 

@@ -27,12 +27,12 @@ from srbf.cli.fit_parameters import (
 )
 from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
-from srbf.cluster import Cluster, checked
+from srbf.compute.dask_client import Cluster, checked
+from srbf.encode.row_blocks import fit_tiles
 from srbf.errors import InputError
-from srbf.evaluation import TrainWatch, evaluate
-from srbf.files import check_replaceable
-from srbf.fitting import encode, method_for, method_of, more_maps_than_lights, settings_of
-from srbf.tiles import fit_tiles
+from srbf.evaluation.errors_by_role import TrainWatch, evaluate
+from srbf.fitting.options import encode, method_for, method_of, more_maps_than_lights, settings_of
+from srbf.io.files import check_replaceable
 
 
 def fit(

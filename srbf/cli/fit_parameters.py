@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from srbf.fitting import DEFAULT_BUDGET, DEFAULT_METHOD
+from srbf.fitting.options import DEFAULT_BUDGET, DEFAULT_METHOD
 
 Method = Annotated[
     Literal["relighting-map", "eigen-map", "clustered-eigen-map", "auto"] | None,

@@ -9,7 +9,7 @@ import typer
 
 from srbf.cli.parameters import Force, Output
 from srbf.cli.terminal import note, progress_bar
-from srbf.importing import LightListImport
+from srbf.importing.photographs import LightListImport
 
 
 def import_capture(

@@ -9,7 +9,7 @@ import typer
 
 from srbf.cli.parameters import Json
 from srbf.cli.terminal import print_json
-from srbf.facts import describe
+from srbf.info import describe
 
 
 def info(

@@ -10,18 +10,18 @@ import numpy as np
 import typer
 
 from srbf import methods
-from srbf.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.asset import Asset
+from srbf.cli.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
-from srbf.direct.choice import Added, chosen
 from srbf.errors import InputError
-from srbf.files import atomic_folder, check_replaceable
-from srbf.gl.relighter import Relighter
-from srbf.image import write_image
-from srbf.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
+from srbf.io.files import atomic_folder, check_replaceable
+from srbf.io.image import write_image
 from srbf.lights import Light
-from srbf.receivers import outside_domain
+from srbf.methods.receivers import outside_domain
+from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
+from srbf.relighting.direct_light import Added, chosen
+from srbf.relighting.relighter import Relighter
 
 FRAMES_MARKER = "0000.exr"
 

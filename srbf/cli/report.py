@@ -14,10 +14,10 @@ from srbf.capture import ROLES, Capture
 from srbf.cli.parameters import AssetFolder, CaptureFolder, Force
 from srbf.cli.relight import check_image_output
 from srbf.cli.terminal import note, progress_bar
-from srbf.direct.choice import Direct
 from srbf.errors import SrbfError
-from srbf.evaluation import evaluate
-from srbf.files import atomic_folder, check_replaceable, write_text
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io.files import atomic_folder, check_replaceable, write_text
+from srbf.relighting.direct_light import Direct
 from srbf.report import write_report
 
 PAGE = "index.html"

@@ -13,7 +13,7 @@ from srbf.capture import MANIFEST as CAPTURE_MANIFEST
 from srbf.cli.parameters import Force
 from srbf.cli.terminal import note
 from srbf.errors import InputError, OutputExistsError
-from srbf.files import write_text
+from srbf.io.files import write_text
 from srbf.viewer.contents import Content, contents_of
 from srbf.viewer.server import ViewerServer
 from srbf.viewer.single_file import single_file

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import dds, exr, gltf, godot, hlsl, ktx2, metal, uint8, unity, unreal, web, wgsl
 from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
-from srbf.facts import folder_bytes
-from srbf.files import atomic_folder, check_replaceable, checksums, write_json
+from srbf.info import folder_bytes
+from srbf.io.files import atomic_folder, check_replaceable, checksums, write_json
 
 __all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
 
-TARGETS: dict[str, Target] = {
-    "exr": exr.write,
-    "uint8": uint8.write,
-    "dds": dds.write,
-    "ktx2": ktx2.write,
-    "gltf": gltf.write,
-    "godot": godot.write,
-    "unity": unity.write,
-    "unreal": unreal.write,
-    "hlsl": hlsl.write,
-    "metal": metal.write,
-    "wgsl": wgsl.write,
-    "web": web.write,
+TARGETS: dict[str, str] = {  # by name: the module whose `write` fills a folder, imported when it is asked for
+    **{name: f"srbf.export.{name}" for name in ("exr", "uint8", "dds", "ktx2", "gltf")},
+    **{name: f"srbf.export.{name}" for name in ("godot", "unity", "unreal", "hlsl", "metal", "wgsl")},
+    "web": "srbf.viewer.site",
 }
 
 
@@ -68,7 +59,8 @@ def export(
     check_target(target)
     check_replaceable(folder, force, MANIFEST)
     with atomic_folder(folder, force, MANIFEST) as temporary:
-        written = TARGETS[target](asset, temporary, settings)
+        write: Target = import_module(TARGETS[target]).write
+        written = write(asset, temporary, settings)
         exported = Asset.open(temporary)
         psnr = relit_psnr(asset, exported)
         if min_psnr is not None and not psnr >= min_psnr:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.asset import GEOMETRY, LAYERS, MANIFEST, Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.settings import Settings, Target
+from srbf.io import files
 
 ENTRIES = ("r_table", "w_table", "light_coefficients", "cluster_index")  # keys of asset.json that hold a file among other things
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.errors import ManifestError
-from srbf.scene_file import BINARY_CHUNK, JSON_CHUNK, MAGIC
+from srbf.io.scene_glb import BINARY_CHUNK, JSON_CHUNK, MAGIC
 
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
 FLOAT, UNSIGNED_INT = 5126, 5125

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from srbf.alpha import alpha_of, write_png
 from srbf.arrays import Float32
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
@@ -16,9 +15,10 @@ from srbf.export import texture_array
 from srbf.export.glb import Document
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.texel_mesh import texel_mesh
-from srbf.files import atomic_path
+from srbf.io.files import atomic_path
 from srbf.lights import EnvironmentLight
 from srbf.methods import relight
+from srbf.relighting.alpha import alpha_of, write_png
 
 EXTENSION = "SRBF_relighting_map"
 UNLIT = "KHR_materials_unlit"

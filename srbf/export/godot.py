@@ -6,13 +6,13 @@ import re
 import shutil
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError, ShaderError
 from srbf.export import dds, exr, uint8
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
+from srbf.io import files
 
 DATA = "asset"  # the folder of the asset's images, which Godot's own importers are told to leave alone
 IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
@@ -33,6 +32,7 @@ from srbf.export.translation import (
     split,
     without,
 )
+from srbf.io import files
 
 TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "int"), ("u", "uint"), ("b", "bool")) for n in (2, 3, 4)}
 TYPES |= {f"mat{n}": f"float{n}x{n}" for n in (2, 3, 4)}  # the same rows and columns: a matrix times a vector is mul(matrix, vector)

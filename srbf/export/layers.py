@@ -7,9 +7,9 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
+from srbf.encode.quantization import quantize, quantize_together, ranges_together
 from srbf.errors import InputError
-from srbf.image import Encoding
-from srbf.quantization import quantize, quantize_together, ranges_together
+from srbf.io.image import Encoding
 from srbf.sphere import all_around
 
 

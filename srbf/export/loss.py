@@ -6,7 +6,7 @@ import numpy as np
 
 from srbf.asset import Asset
 from srbf.errors import InputError
-from srbf.evaluation import PEAK_QUANTILE, PeakHistogram, psnr, squared_errors
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, psnr, squared_errors
 from srbf.methods import directional_responses
 from srbf.sphere import point_set
 

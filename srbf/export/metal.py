@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.export import exr, spirv
 from srbf.export.asset_shader import counts
 from srbf.export.settings import PLAIN, Settings, Written
+from srbf.io import files
 
 LANGUAGE: spirv.Language = "metal"
 

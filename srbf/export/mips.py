@@ -8,9 +8,9 @@ from scipy import ndimage, sparse
 
 from srbf.arrays import Float32
 from srbf.asset import Asset
-from srbf.containers.texture_array import level_size
-from srbf.dilation import dilate, nearest_covered
-from srbf.parallel import each
+from srbf.compute.threads import each
+from srbf.encode.dilation import dilate, nearest_covered
+from srbf.io.containers.texture_array import level_size
 
 GUTTER = 2.5  # of a level's texels between two charts: half a texel into one a bilinear sample takes the next, whose nearest is its own
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.containers.blocks import BLOCK_BYTES, SIDE, BlockFormat, decode, encode
-from srbf.parallel import each
-from srbf.quantization import metric, round_alone
+from srbf.compute.threads import each
+from srbf.encode.quantization import metric, round_alone
+from srbf.io.containers.blocks import BLOCK_BYTES, SIDE, BlockFormat, decode, encode
 
 TEXELS_AT_A_TIME = 1 << 15
 PASSES = 1  # over all blocks after the first; a second gains 0.1 dB

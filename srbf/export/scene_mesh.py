@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf import files
 from srbf.arrays import Float32
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError, ManifestError, OutputExistsError
 from srbf.export.glb import Document
 from srbf.export.gltf_surface import mean_thickness, surface
-from srbf.image import write_picture
+from srbf.io import files
+from srbf.io.image import write_picture
 
 SUFFIX = ".glb"
 Z_UP_TO_Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion x, y, z, w: -90 degrees about x

@@ -11,16 +11,16 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.containers import write_texture_array
-from srbf.containers.blocks import BlockFormat
-from srbf.containers.texture_array import TexelFormat, TextureArray
+from srbf.encode.quantization import round_alone, round_together
 from srbf.errors import InputError
 from srbf.export.layers import byte_ranges, finite_layers, functions_of, in_encoding
 from srbf.export.manifest import stem, with_layers
 from srbf.export.mips import coverage_of, levels_without_bleeding, smaller_levels
 from srbf.export.rounding import blocks_alone, blocks_together
 from srbf.export.settings import PLAIN, Settings, Written
-from srbf.quantization import round_alone, round_together
+from srbf.io.containers import write_texture_array
+from srbf.io.containers.blocks import BlockFormat
+from srbf.io.containers.texture_array import TexelFormat, TextureArray
 
 MOST_LAYERS = 2048  # of a texture array in Vulkan, Direct3D and WebGL; WebGPU promises 256
 WEBGPU_LAYERS = 256

@@ -7,12 +7,12 @@ import math
 import shutil
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.export import dds, exr
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.settings import PLAIN, Settings, Written
+from srbf.io import files
 
 DATA = "images~"  # Unity passes by folders that end so: the importer reads the images itself
 INCLUDE = "SrbfAsset.hlsl"

@@ -8,12 +8,12 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.export.asset_shader import rows_of
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.settings import PLAIN, Settings, Written
+from srbf.io import files
 
 DATA = "images"
 SCRIPT = "import_srbf.py"

@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
@@ -34,6 +33,7 @@ from srbf.export.translation import (
     significant,
     split,
 )
+from srbf.io import files
 
 TYPES = {f"{kind}vec{n}": f"vec{n}{word}" for kind, word in (("", "f"), ("i", "i"), ("u", "u"), ("b", "<bool>")) for n in (2, 3, 4)}
 TYPES |= {f"mat{n}": f"mat{n}x{n}f" for n in (2, 3, 4)}

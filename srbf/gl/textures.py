@@ -11,9 +11,9 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 from srbf.asset import Asset
-from srbf.depth import DepthView
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
+from srbf.gl.depth_buffer import DepthView
 from srbf.gl.uniforms import camera_uniforms
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32
-from srbf.depth import DepthCamera
 from srbf.gl.context import Limits
+from srbf.gl.depth_buffer import DepthCamera
 from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE

@@ -10,7 +10,7 @@ import numpy as np
 from srbf.asset import Asset
 from srbf.lights import Light
 from srbf.methods import clustered_eigen_map, eigen_map, relighting_map
-from srbf.receivers import finish
+from srbf.methods.receivers import finish
 
 METHODS: dict[str, ModuleType] = {
     "relighting-map": relighting_map,

@@ -12,13 +12,13 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.capture import Capture, Look
+from srbf.encode.light_function_fit import functions_through
+from srbf.encode.model_selection import TexelSample
+from srbf.encode.uv_seams import Stitch
+from srbf.encode.weighted_rows import LightSpace
 from srbf.errors import InputError
-from srbf.image import Encoding
-from srbf.light_function_fit import functions_through
-from srbf.light_space import LightSpace
-from srbf.model_selection import TexelSample
-from srbf.receivers import covered_texels
-from srbf.scalar_planes import (
+from srbf.io.image import Encoding
+from srbf.methods.coefficient_maps import (
     SewnPlanes,
     check_plane_settings,
     directional_responses,
@@ -27,12 +27,12 @@ from srbf.scalar_planes import (
     planes_asset,
     relight,
 )
+from srbf.methods.receivers import covered_texels
 from srbf.solve.clustered_pca import Clusters, cluster
 from srbf.solve.grouped_product import GroupedProduct
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct, in_tasks
 from srbf.sphere import Domain, domain_of
-from srbf.stitch import Stitch
 
 __all__ = ["ClusteredEigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
 

@@ -8,16 +8,23 @@ from typing import Literal, get_args
 
 from srbf.asset import Asset
 from srbf.capture import Capture, Look
+from srbf.encode.light_function_fit import functions_through
+from srbf.encode.model_selection import TexelSample
+from srbf.encode.uv_seams import Stitch
+from srbf.encode.weighted_rows import LightSpace, Weighting
 from srbf.errors import InputError
-from srbf.image import Encoding
-from srbf.light_function_fit import functions_through
-from srbf.light_space import LightSpace, Weighting
-from srbf.model_selection import TexelSample
-from srbf.scalar_planes import check_plane_settings, directional_responses, folded_weights, linear_response, planes_asset, relight
+from srbf.io.image import Encoding
+from srbf.methods.coefficient_maps import (
+    check_plane_settings,
+    directional_responses,
+    folded_weights,
+    linear_response,
+    planes_asset,
+    relight,
+)
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct
 from srbf.sphere import Domain, domain_of
-from srbf.stitch import Stitch
 
 __all__ = ["EigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
 

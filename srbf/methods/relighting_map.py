@@ -10,18 +10,19 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset
+from srbf.asset import Asset, layer_entries
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of
 from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
 from srbf.capture import Capture, Look
-from srbf.dilation import dilate, nearest_covered
+from srbf.compute.threads import each
+from srbf.encode.dilation import dilate, nearest_covered
+from srbf.encode.model_selection import RIDGES, USUAL_RIDGE, USUAL_SPREAD, Choice, TexelSample, choose, spread_candidates
+from srbf.encode.quantization import metric, quantize, quantize_together, rounding_variance
+from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
-from srbf.image import Encoding
+from srbf.io.image import Encoding
 from srbf.lights import Light, PointLight
-from srbf.model_selection import RIDGES, USUAL_RIDGE, USUAL_SPREAD, Choice, TexelSample, choose, spread_candidates
-from srbf.parallel import each
-from srbf.quantization import layer_entries, metric, quantize, quantize_together, rounding_variance
-from srbf.receivers import (
+from srbf.methods.receivers import (
     CHUNK,
     carried_images,
     carried_scene,
@@ -35,9 +36,8 @@ from srbf.receivers import (
 )
 from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.sphere import Domain, PointSet, all_around, domain_of, point_set
-from srbf.stitch import Stitch
 
-# (capture, lights, matrix, ridge, progress) -> maps (K, P 3) and report: as `srbf.tiles.fit_tiles` with machines to do it
+# (capture, lights, matrix, ridge, progress) -> maps (K, P 3) and report: as `srbf.encode.row_blocks.fit_tiles` with machines to do it
 Tiles = Callable[[Capture, list[int], ndarray, float, Callable[[int, int], None]], tuple[ndarray, LeastSquaresReport]]
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
 NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold

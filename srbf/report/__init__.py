@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
+from srbf.evaluation.rate_distortion import METHODS, Method
+from srbf.io import files
 from srbf.lights import Light
-from srbf.quality import METHODS, Method
+from srbf.report.abrdf_mosaic import abrdf_tiles
 from srbf.report.contact_sheet import contact_sheet
 from srbf.report.findings import measure
 from srbf.report.maps import sum_of_maps
@@ -20,7 +21,6 @@ from srbf.report.point_light import point_light
 from srbf.report.sphere import centers, r_curve
 from srbf.report.strips import animation, point_strip, spot_strip
 from srbf.report.subject import Picture, Subject, gather
-from srbf.report.tiles import abrdf_tiles
 
 MAPS, POSITION = "maps", "position"  # what a picture needs of the asset
 Draw = Callable[[Subject, Path], Picture]
@@ -56,7 +56,7 @@ def write_report(
 ) -> Path:
     """Write pictures, report.md and index.html into `folder`, and return the path of index.html, which holds every figure in itself.
 
-    `evaluation` is what `srbf.evaluation.evaluate` gave for this asset and capture; `timings` are seconds by step;
+    `evaluation` is what `srbf.evaluation.errors_by_role.evaluate` gave for this asset and capture; `timings` are seconds by step;
     `demo_lights` the point and spot lights to show instead of derived ones (lights of other kinds are not drawn);
     `asset_folder` is where the asset was saved, for its size; `methods` are fitted to a sample of the
     capture and compared. Files of an earlier report in `folder` are replaced.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.quality import ALL, NEAREST, Score
+from srbf.evaluation.rate_distortion import ALL, NEAREST, Score
 from srbf.report.findings import Findings
 from srbf.report.inline import Table, figure
 from srbf.report.plot import Axis, Plot, spread_labels

@@ -11,9 +11,9 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 from srbf.errors import MissingLibraryError
-from srbf.files import atomic_path
-from srbf.image import encode_srgb
-from srbf.rebinning import disc_points
+from srbf.io.files import atomic_path
+from srbf.io.image import encode_srgb
+from srbf.report.abrdf import disc_points
 
 INK, SOFT, RULE = "#262626", "#707070", "#c9c9c9"
 ROLE_COLOR = {"train": "#8a99a8", "validation": "#2f7fa8", "holdout": "#c4502f"}

@@ -12,15 +12,15 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
-from srbf.evaluation import psnr
-from srbf.flip import Flip
+from srbf.evaluation.errors_by_role import psnr
+from srbf.evaluation.flip import Flip
+from srbf.evaluation.held_out import LIGHTS, Negative, UnseenError, negative, unseen_error
+from srbf.evaluation.light_spacing import ShadowSampling, shadow_sampling
+from srbf.evaluation.rate_distortion import Method, Score, contest, planes_bound, score_asset, spectrum
+from srbf.evaluation.temporal_stability import TEXELS, Motion, dense_reference, sampled_texels, sweep
 from srbf.methods import directional_responses
-from srbf.motion import TEXELS, Motion, dense_reference, sampled_texels, sweep
-from srbf.quality import Method, Score, contest, planes_bound, score_asset, spectrum
 from srbf.report.subject import Subject
-from srbf.shadow_sampling import ShadowSampling, shadow_sampling
 from srbf.sphere import farthest_points
-from srbf.unseen import LIGHTS, Negative, UnseenError, negative, unseen_error
 
 STEPS = 4  # of `measure`, for progress
 WORST = 4  # directions shown side by side

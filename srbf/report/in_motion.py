@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.motion import Motion
+from srbf.evaluation.temporal_stability import Motion
 from srbf.report.inline import Table, figure
 from srbf.report.plot import Axis, Plot, spread_labels
 

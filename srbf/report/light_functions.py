@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.rebinning import tile_directions
+from srbf.report.abrdf import tile_directions
 from srbf.report.canvas import shown_signed
 from srbf.report.inline import figure, image, pixels_uri
 from srbf.report.subject import Subject

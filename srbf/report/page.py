@@ -11,10 +11,10 @@ import numpy as np
 
 from srbf.asset import Asset
 from srbf.capture import ROLES
-from srbf.facts import folder_bytes
-from srbf.files import write_text
-from srbf.image import size_of
-from srbf.quality import family_of, name_of, scalars_of, texel_bytes
+from srbf.evaluation.rate_distortion import family_of, name_of, scalars_of, texel_bytes
+from srbf.info import folder_bytes
+from srbf.io.files import write_text
+from srbf.io.image import size_of
 from srbf.report.by_bytes import by_bytes
 from srbf.report.by_bytes import table as table_of_bytes
 from srbf.report.by_direction import by_direction

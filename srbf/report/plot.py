@@ -9,7 +9,7 @@ from html import escape
 import numpy as np
 from numpy import ndarray
 
-from srbf.rebinning import disc_points
+from srbf.report.abrdf import disc_points
 
 LETTER = 6.2  # width of a letter of a label, about, at 12 px
 DISC_RINGS = (0.0, 30.0, 60.0)  # degrees of elevation

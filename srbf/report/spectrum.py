@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.quality import scalars_of
+from srbf.evaluation.rate_distortion import scalars_of
 from srbf.report.findings import Findings, Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot

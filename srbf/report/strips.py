@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.errors import MissingLibraryError
-from srbf.files import atomic_path
+from srbf.io.files import atomic_path
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import relight
 from srbf.report.canvas import MARGIN, SOFT, Sheet, box_for, gain_text, place_text, shown

@@ -12,7 +12,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import ROLES, Capture, Role
-from srbf.evaluation import COVERED, psnr
+from srbf.evaluation.errors_by_role import COVERED, psnr
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import directional_responses
 from srbf.report.lamps import demonstration_lamps

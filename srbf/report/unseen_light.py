@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from srbf.evaluation.held_out import DIMMEST, EDGES
 from srbf.report.canvas import UNCOVERED, gain_text, shown
 from srbf.report.contact_sheet import difference_gain
 from srbf.report.findings import Unseen
 from srbf.report.inline import Table, colored, figure, image, paragraphs, pixels_uri
 from srbf.report.subject import Subject
-from srbf.unseen import DIMMEST, EDGES
 
 WITHOUT_FLIP = "FLIP is not shown: flip-evaluator is not installed (pip install flip-evaluator)."
 

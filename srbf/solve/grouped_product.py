@@ -6,8 +6,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Int
-from srbf.half import finite_to_float32
-from srbf.parallel import each, one_blas_thread
+from srbf.compute.threads import each, one_blas_thread
+from srbf.io.float16 import finite_to_float32
 
 COLUMNS_AT_A_TIME = 1 << 12
 

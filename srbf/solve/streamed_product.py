@@ -9,8 +9,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
-from srbf.half import finite_to_float32
-from srbf.parallel import cores, one_blas_thread
+from srbf.compute.threads import cores, one_blas_thread
+from srbf.io.float16 import finite_to_float32
 
 TILE_BYTES = 1 << 19  # of the converted rows and the product's part at a time: what a core's cache holds
 TASK_COLUMNS = 1 << 15  # of one thread's turn; fixed, so that sums are the same on any number of cores

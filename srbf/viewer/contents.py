@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from srbf import files
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.export.web import shown_mesh
-from srbf.viewer import facts
+from srbf.io import files
+from srbf.viewer import page_manifest
 from srbf.viewer.built_page import page_files
 from srbf.viewer.measures import Measures
 from srbf.viewer.references import References
+from srbf.viewer.site import shown_mesh
 
 CAPTURE = "capture/"
 
@@ -47,7 +47,7 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
     measures = Measures(assets, references.capture if references else None)
     contents: dict[str, Content] = {"": page["index.html"], **page}
     told = []
-    names = facts.names(assets, folders)
+    names = page_manifest.names(assets, folders)
     for i, (asset, folder, name) in enumerate(zip(assets, folders, names, strict=True)):
         place = "asset/" if i == 0 else f"asset-{i}/"
         contents |= _files(asset, folder, place)
@@ -56,21 +56,23 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
         if references is not None:
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
-        told.append(facts.described(asset, name, place, f"spectrum-{i}.json", errors))
+        told.append(page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors))
     if shown is not None:
-        contents[facts.MESH] = shown
+        contents[page_manifest.MESH] = shown
     if references is not None:
         contents[f"{CAPTURE}lights.json"] = json.dumps(references.lights()).encode()
         for index in range(len(references.capture.lights)):
             contents[f"{CAPTURE}{index}.exr"] = partial(references.image, index)
-    page_facts = facts.facts(assets[0], told, shown is not None, facts.title(folders), CAPTURE if references else None, tuple(notes))
-    contents[facts.NAME] = json.dumps(page_facts).encode()
+    page_facts = page_manifest.facts(
+        assets[0], told, shown is not None, page_manifest.title(folders), CAPTURE if references else None, tuple(notes)
+    )
+    contents[page_manifest.NAME] = json.dumps(page_facts).encode()
     return contents
 
 
 def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
     def kind(asset: Asset) -> str:
-        return f"{asset.width} x {asset.height} {facts.receiver_kind(asset)} of {asset.quantity}"
+        return f"{asset.width} x {asset.height} {page_manifest.receiver_kind(asset)} of {asset.quantity}"
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):

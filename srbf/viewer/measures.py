@@ -13,10 +13,10 @@ from numpy import ndarray
 from srbf.arrays import Float64, Int
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
-from srbf.evaluation import PEAK_QUANTILE, psnr, squared_errors
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, psnr, squared_errors
+from srbf.evaluation.rate_distortion import scalars_of, singular_values, spectrum
+from srbf.evaluation.temporal_stability import sampled_texels
 from srbf.methods import directional_responses
-from srbf.motion import sampled_texels
-from srbf.quality import scalars_of, singular_values, spectrum
 from srbf.sphere import point_set
 
 DIRECTIONS = 192  # that an asset is asked for where its own spectrum is taken: as many as it has light to tell apart

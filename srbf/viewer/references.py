@@ -11,7 +11,7 @@ from typing import Any
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.image import write_image
+from srbf.io.image import write_image
 
 KEPT = 32  # encoded images that are held
 

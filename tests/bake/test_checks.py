@@ -13,7 +13,7 @@ from srbf.bake.checks import FIRST_LIGHTS, FirstLights, bytes_needed, check_disk
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.errors import BakeError
-from srbf.files import WriteError
+from srbf.io.files import WriteError
 
 BLACK = np.zeros((4, 5, 3), np.float32)
 GREY = np.full((4, 5, 3), 0.5, np.float32)

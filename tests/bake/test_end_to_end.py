@@ -13,7 +13,7 @@ import pytest
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_lamps
 from srbf.capture import Capture
-from srbf.image import read_image
+from srbf.io.image import read_image
 from srbf.sphere import mean_spacing
 
 pytestmark = pytest.mark.blender

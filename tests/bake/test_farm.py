@@ -31,9 +31,9 @@ from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.sums import Sums
 from srbf.capture import Capture
 from srbf.cli.fit import fit
-from srbf.cluster import Cluster, ClusterError, checked
+from srbf.compute.dask_client import Cluster, ClusterError, checked
 from srbf.errors import BakeError, InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 
 pytest.importorskip("distributed")
 
@@ -226,7 +226,7 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
 
 
 def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.cluster.CONNECTING", 1.0)
+    monkeypatch.setattr("srbf.compute.dask_client.CONNECTING", 1.0)
     for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, seconds=60.0)):
         with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
             template(bake)

@@ -14,8 +14,8 @@ from scripts.gallery.scenes import SCENES
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 from srbf.demo import build_scene
-from srbf.direct.ray import RayTracer
-from srbf.direct.receivers import Receivers
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.receivers import Receivers
 
 pytestmark = pytest.mark.blender
 

@@ -16,13 +16,13 @@ from faults import contents
 from test_resume import command, wait_for_lights
 
 from srbf.capture import COVERED
-from srbf.direct.ray import RayTracer
-from srbf.direct.receivers import Receivers
-from srbf.evaluation import evaluate
-from srbf.gl.shadow_map import ShadowMapper
-from srbf.image import read_image
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io.image import read_image
+from srbf.io.scene_glb import read_triangles
 from srbf.methods.relighting_map import RelightingMap
-from srbf.scene_file import read_triangles
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.shadow_map import ShadowMapper
 
 pytestmark = pytest.mark.blender
 

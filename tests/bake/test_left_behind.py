@@ -13,7 +13,7 @@ from conftest import SCENES, Baked, built
 
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.errors import BakeError
-from srbf.image import read_image
+from srbf.io.image import read_image
 
 pytestmark = pytest.mark.blender
 

@@ -11,7 +11,7 @@ import pytest
 
 from srbf.bake.settings import plan_lights
 from srbf.errors import BakeError
-from srbf.image import write_image
+from srbf.io.image import write_image
 from srbf.lights import DirectionalLight, EnvironmentLight
 from srbf.methods.relighting_map import RelightingMap, relight
 

@@ -22,7 +22,7 @@ from srbf.errors import BakeError
 from srbf.export.glb import Document
 from srbf.export.gltf import EXTENSION, model
 from srbf.export.scene_mesh import SceneMesh, write_scene_mesh
-from srbf.image import decode_srgb, read_image
+from srbf.io.image import decode_srgb, read_image
 from srbf.methods.relighting_map import RelightingMap
 
 pytestmark = pytest.mark.blender

@@ -12,7 +12,7 @@ from surfaces import check_normals
 
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
-from srbf.image import write_image
+from srbf.io.image import write_image
 
 pytestmark = pytest.mark.blender
 

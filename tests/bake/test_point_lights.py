@@ -16,7 +16,7 @@ from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.survey import with_free_lamps
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.methods.relighting_map import RelightingMap
 
 HALF = 2.0**-11  # relative rounding of a stored half float

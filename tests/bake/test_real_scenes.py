@@ -18,13 +18,13 @@ from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.bake.survey import objects_of, with_size
 from srbf.capture import COVERED, Capture
 from srbf.cli import app
-from srbf.direct.ray import RayTracer
-from srbf.direct.receivers import Receivers
 from srbf.errors import BakeError, InputError
-from srbf.evaluation import evaluate
-from srbf.image import read_image
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io.image import read_image
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.receivers import Receivers
 
 pytestmark = pytest.mark.blender
 

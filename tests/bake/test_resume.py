@@ -20,7 +20,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 from srbf.errors import BakeError, OutputExistsError
-from srbf.image import write_image
+from srbf.io.image import write_image
 
 pytestmark = pytest.mark.blender
 

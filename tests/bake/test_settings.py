@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from srbf.bake.folder import STATE
+from srbf.bake.job import base_job
 from srbf.bake.openjd import arguments
-from srbf.bake.run import Bake, base_job
+from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.bake.survey import size_of_begun, with_frame
 from srbf.capture import MANIFEST

@@ -14,7 +14,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 from srbf.cli import app
-from srbf.image import decode_srgb, read_image
+from srbf.io.image import decode_srgb, read_image
 
 pytestmark = pytest.mark.blender
 

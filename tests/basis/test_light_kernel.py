@@ -7,7 +7,7 @@ import pytest
 
 from srbf.basis.gaussian import weight
 from srbf.basis.light_kernel import LightKernel, narrowest
-from srbf.light_function_fit import dense_centers
+from srbf.encode.light_function_fit import dense_centers
 from srbf.sphere import mean_spacing, point_set, random_directions
 
 REPLACED = 1e-2  # of the largest value, of functions as rough as noise: wide Gaussians by narrow ones at 0.7 of their spacing

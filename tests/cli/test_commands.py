@@ -15,8 +15,8 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
-from srbf.image import encode_srgb, read_image, write_image
-from srbf.light_arguments import read_frames
+from srbf.cli.light_arguments import read_frames
+from srbf.io.image import encode_srgb, read_image, write_image
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
 
 

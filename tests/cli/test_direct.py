@@ -11,10 +11,10 @@ import pytest
 from closed_forms import glb, quad
 from test_commands import ok, refused, srbf
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.image import read_image, write_image
+from srbf.io import files
+from srbf.io.image import read_image, write_image
 from srbf.lights import DirectionalLight
 from srbf.methods.relighting_map import relight
 

@@ -81,7 +81,7 @@ def test_bad_input(asset: Path, tmp_path: Path, flags: list, code: int, words: s
 
 
 def test_without_etcpak_the_extra_is_named(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from srbf.containers import blocks
+    from srbf.io.containers import blocks
 
     blocks._etcpak.cache_clear()
     monkeypatch.setitem(sys.modules, "etcpak", None)

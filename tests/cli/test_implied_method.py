@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
-from srbf.fitting import method_of
+from srbf.fitting.options import method_of
 from srbf.sphere import fibonacci
 
 

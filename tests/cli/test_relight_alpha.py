@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from srbf import files
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
-from srbf.image import decode_srgb, encode_srgb, read_image
+from srbf.io import files
+from srbf.io.image import decode_srgb, encode_srgb, read_image
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 

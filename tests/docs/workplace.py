@@ -27,7 +27,7 @@ from typer.testing import CliRunner
 
 import srbf.demo
 from srbf.cli import app
-from srbf.image import write_image
+from srbf.io.image import write_image
 from srbf.report import canvas, tiles
 from srbf.sphere import random_directions
 from srbf.viewer.server import ViewerServer

@@ -17,9 +17,9 @@ from srbf.gl.context import create_context
 from srbf.gl.textures import AssetTextures, Limits
 from srbf.gl.uniforms import lamp_uniforms, padded
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation
+from srbf.methods.coefficient_maps import first_function, planes_of
+from srbf.methods.receivers import light_vectors
 from srbf.methods.relighting_map import basis_weights
-from srbf.receivers import light_vectors
-from srbf.scalar_planes import first_function, planes_of
 
 FLOAT = 1e-5  # the contract, of the sum of the terms' magnitudes
 

@@ -17,8 +17,8 @@ from srbf.errors import InputError, ManifestError
 from srbf.export import Settings, export
 from srbf.export.glb import Document
 from srbf.export.gltf import EXTENSION, white_sky
-from srbf.image import decode_srgb, read_image
-from srbf.scene_file import read_triangles
+from srbf.io.image import decode_srgb, read_image
+from srbf.io.scene_glb import read_triangles
 
 FLOAT32 = 1e-6
 BYTE = 0.5 / 255

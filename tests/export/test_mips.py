@@ -11,9 +11,9 @@ import pytest
 from scipy import ndimage
 
 from srbf.asset import LAYERS, Asset
-from srbf.containers import read_texture_array
 from srbf.export import Settings, export
 from srbf.export.mips import chart_gap, levels_without_bleeding, smaller_levels
+from srbf.io.containers import read_texture_array
 from srbf.methods import directional_responses
 from srbf.sphere import random_directions
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from srbf.asset import Asset
-from srbf.containers import read_texture_array, write_texture_array
 from srbf.errors import ImageError, InputError, ManifestError, OutputExistsError
-from srbf.evaluation import MAX_PSNR
+from srbf.evaluation.errors_by_role import MAX_PSNR
 from srbf.export import TARGETS, Report, Settings, export
 from srbf.export.loss import relit_psnr
+from srbf.io.containers import read_texture_array, write_texture_array
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods import relight
 
@@ -66,9 +68,9 @@ def test_halves_and_bytes_that_are_there_stay_as_they_are(make_asset: Callable[.
 
 def test_overlapping_maps_make_up_for_what_blocks_lose(make_asset: Callable[..., Asset], tmp_path: Path) -> None:
     """Against blocks of the bytes themselves, as another tool would make them, in the same ranges."""
-    from srbf.containers.texture_array import TextureArray
     from srbf.export.layers import byte_ranges
     from srbf.export.rounding import blocks_alone
+    from srbf.io.containers.texture_array import TextureArray
 
     asset = smooth(make_asset, k=16)
     together = export(asset, "dds", tmp_path / "out", Settings(levels=1)).psnr
@@ -189,7 +191,8 @@ def test_code_beside_the_asset_is_the_exports_own(
         (folder / "Editor" / "deep" / "Importer.cs").write_text("class Importer {}")
         return Written(("code beside it",))
 
-    monkeypatch.setitem(TARGETS, "engine", with_code)
+    monkeypatch.setitem(sys.modules, "an_engine", SimpleNamespace(write=with_code))
+    monkeypatch.setitem(TARGETS, "engine", "an_engine")
     out = tmp_path / "out"
     assert export(make_asset(), "engine", out).notes == ("code beside it",)
     assert "Editor/deep/Importer.cs" in json.loads((out / "asset.json").read_text())["sha256"]

@@ -16,14 +16,14 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
-from srbf.containers import read_texture_array
-from srbf.containers.dds_header import DXGI
 from srbf.export import spirv, unity
 from srbf.export.asset_shader import MOST_LAMPS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
 from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import packed_lamps
+from srbf.io.containers import read_texture_array
+from srbf.io.containers.dds_header import DXGI
 from srbf.lights import DirectionalLight, PointLight, SpotLight
 
 needs_spirv = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")

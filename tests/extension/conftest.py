@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from srbf.asset import Asset
+from srbf.asset import Asset, layer_entries
 from srbf.basis.gaussian import r_table
-from srbf.quantization import layer_entries, quantize
+from srbf.encode.quantization import quantize
 from srbf.sphere import point_set
 
 SCRIPT = Path(__file__).parent / "in_blender.py"

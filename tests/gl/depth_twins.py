@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from twins import EPS, UNIT, Evaluate, N, twin, vec4
 
-from srbf import depth
-from srbf.depth import DepthCamera, depth_terms
+from srbf.gl import depth_buffer as depth
+from srbf.gl.depth_buffer import DepthCamera, depth_terms
 
 
 def projection(kind: str, near: float = 0.25, far: float = 64.0) -> tuple[np.ndarray, bool]:

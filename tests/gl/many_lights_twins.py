@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from twins import EPS, POINT, SPOT, SUM, UNIT, Evaluate, K, M, N, twin, units, vec4
 
-from srbf import scalar_planes
 from srbf.asset import Asset
 from srbf.basis import gaussian, octahedral_table
 from srbf.gl.scalar_planes import folded_rows
 from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import lamp_uniforms, packed_lamps, padded
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
+from srbf.methods import coefficient_maps as scalar_planes
+from srbf.methods.receivers import light_vectors
 from srbf.methods.relighting_map import basis_weights, folded_weights, linear_response
-from srbf.receivers import light_vectors
 from srbf.sphere import octahedral_encode
 
 SUNS: list[Light] = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]

@@ -9,7 +9,7 @@ import pytest
 
 from srbf.errors import MissingLibraryError, ShaderError
 from srbf.gl.context import EGL_LIBRARIES, Limits, create_context
-from srbf.gl.relighter import relight
+from srbf.relighting.relighter import relight
 
 
 def test_without_moderngl_it_is_named(monkeypatch: Any, make_asset: Any) -> None:

@@ -12,10 +12,10 @@ from depth_twins import PROJECTIONS, projection
 
 from srbf import methods
 from srbf.asset import Asset
-from srbf.depth import DepthCamera, DepthView
 from srbf.errors import InputError
-from srbf.gl.relighter import Relighter
+from srbf.gl.depth_buffer import DepthCamera, DepthView
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
+from srbf.relighting.relighter import Relighter
 
 HEIGHT, WIDTH = 9, 14
 LIGHTS: list[Light] = [

@@ -11,9 +11,9 @@ import pytest
 from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError
-from srbf.gl.relighter import Relighter
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight
 from srbf.methods import folded_weights
+from srbf.relighting.relighter import Relighter
 
 SUM = 1e-5  # the contract, of the sum of all terms' sizes
 TURN = [[0, 0, 2.0, 0.1], [2.0, 0, 0, 0.2], [0, 2.0, 0, -0.3], [0, 0, 0, 1]]  # lays the horizon on its side, twice as large

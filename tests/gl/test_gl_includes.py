@@ -156,5 +156,5 @@ def test_the_root_is_found_in_a_wheel_and_in_a_checkout(tmp_path: Path, monkeypa
 
 
 def test_the_gpu_modules_import_without_moderngl() -> None:
-    code = "import sys; sys.modules['moderngl'] = None; import srbf.gl.relighter, srbf.gl.includes"
+    code = "import sys; sys.modules['moderngl'] = None; import srbf.relighting.relighter, srbf.gl.includes"
     subprocess.run([sys.executable, "-c", code], check=True)

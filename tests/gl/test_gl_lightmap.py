@@ -17,7 +17,7 @@ from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_lamps, padded
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, moved
 from srbf.methods import folded_weights
-from srbf.scalar_planes import first_function
+from srbf.methods.coefficient_maps import first_function
 
 SIDE = 48  # pixels of the picture
 PLACES = 4  # of lamps, three of them used

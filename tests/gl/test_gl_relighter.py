@@ -13,10 +13,10 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.gl.relighter import Relighter, relight
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
+from srbf.methods.receivers import light_vectors
 from srbf.methods.relighting_map import folded_weights, receiver_weights
-from srbf.receivers import light_vectors
+from srbf.relighting.relighter import Relighter, relight
 
 FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times colour and attenuation)
 HALF = 2 * 2.0**-10  # the contract: two steps of a half float

@@ -14,11 +14,11 @@ from srbf.asset import Asset
 from srbf.basis.octahedral_table import lookup
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.gl.relighter import Relighter
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
 from srbf.methods import folded_weights, linear_response
-from srbf.receivers import light_vectors
-from srbf.scalar_planes import first_function, planes_of
+from srbf.methods.coefficient_maps import first_function, planes_of
+from srbf.methods.receivers import light_vectors
+from srbf.relighting.relighter import Relighter
 
 FLOAT = 1e-5  # the contract, of sum |a_j w_j| a texel (times colour and attenuation)
 HALF = 2 * 2.0**-10  # the contract: two steps of a half float

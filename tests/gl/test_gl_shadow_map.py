@@ -10,11 +10,11 @@ from closed_forms import ball, build_plane, quad
 from rounded import lightmap, sphere, torus
 from scipy import ndimage
 
-from srbf.direct.ray import RayTracer
 from srbf.errors import InputError
-from srbf.gl.shadow_map import ShadowMapper
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight
 from srbf.sphere import random_directions
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.shadow_map import ShadowMapper
 
 NEAR = 1e-5  # sums in single precision
 PSNR = 40.0  # dB of direct light, its peak 1, against closed forms and rays

@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, lamp_expression, twin, units, vec4
 
-from srbf import scalar_planes
 from srbf.asset import Asset
 from srbf.basis import octahedral_table
 from srbf.basis.gaussian import lookup, r_table
-from srbf.direct import shadow
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import padded
 from srbf.lights import DirectionalLight, PointLight, attenuation, spot_cone
+from srbf.methods import coefficient_maps as scalar_planes
+from srbf.methods.coefficient_maps import first_function
+from srbf.methods.receivers import light_vectors
 from srbf.methods.relighting_map import linear_response, receiver_weights, relight
-from srbf.receivers import light_vectors
-from srbf.scalar_planes import first_function
 from srbf.sphere import normalize, octahedral_encode
+from srbf.visibility import shadow
 
 ROOT = shader_root()
 FUNCTIONS = sorted(p.relative_to(ROOT).as_posix() for p in ROOT.rglob("*.glsl") if p.parent.name != "stages")

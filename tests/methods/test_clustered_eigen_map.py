@@ -7,7 +7,7 @@ import pytest
 
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap, directional_responses
 from srbf.methods.eigen_map import EigenMap
 

@@ -11,7 +11,7 @@ from srbf.asset import Asset
 from srbf.basis.octahedral_table import TABLE_ERROR
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods.eigen_map import EigenMap, directional_responses, relight
 from srbf.methods.relighting_map import RelightingMap

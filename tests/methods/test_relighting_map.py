@@ -10,12 +10,12 @@ import pytest
 from srbf.asset import Asset
 from srbf.basis.gaussian import GaussianBasis, lookup
 from srbf.capture import Capture
+from srbf.encode.quantization import quantize
 from srbf.errors import InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
+from srbf.methods.receivers import outside_domain
 from srbf.methods.relighting_map import RelightingMap, folded_weights, linear_response, relight
-from srbf.quantization import quantize
-from srbf.receivers import outside_domain
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from srbf import files
 from srbf.capture import Capture
-from srbf.image import write_image
-from srbf.report import canvas, tiles
+from srbf.io import files
+from srbf.io.image import write_image
+from srbf.report import abrdf_mosaic, canvas
 from srbf.sphere import point_set, random_directions
 
 SPHERES = np.array([[-0.75, 0.1, 0.38, 0.38], [0.35, 0.35, 0.26, 0.26], [0.75, -0.4, 0.45, 0.2]])  # x, y, z, radius; metres
@@ -63,7 +63,7 @@ MakeCapture = Callable[..., Capture]
 def coarse_sheets() -> Iterator[None]:
     """Sheets of fewer pixels: the layout is the same, and the PNGs are written sooner."""
     with pytest.MonkeyPatch.context() as patch:
-        for module in (canvas, tiles):
+        for module in (canvas, abrdf_mosaic):
             patch.setattr(module, "DPI", 60)
         yield
 

@@ -14,8 +14,8 @@ import pytest
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
-from srbf.evaluation import evaluate
-from srbf.image import encode_srgb, read_image, size_of
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.io.image import encode_srgb, read_image, size_of
 from srbf.lights import PointLight
 from srbf.methods import relight
 from srbf.methods.eigen_map import EigenMap

@@ -12,13 +12,13 @@ import pytest
 from made_assets import build_asset
 from web_assets import complete, on_a_plane
 
-from srbf import files
 from srbf.asset import Asset
-from srbf.export.web import write as write_site
-from srbf.image import decode_srgb, encode_srgb, read_image
-from srbf.light_arguments import read_frames
+from srbf.cli.light_arguments import read_frames
+from srbf.io import files
+from srbf.io.image import decode_srgb, encode_srgb, read_image
 from srbf.lights import DirectionalLight, Light
 from srbf.methods import linear_response, relight
+from srbf.viewer.site import write as write_site
 
 SIZE, ZOOM = 14, 16
 VIEW = f"#{{'zoom':{ZOOM},'middle':[7,7],'exposure':-1}}"

@@ -15,10 +15,10 @@ from view_assets import scene_glb
 from web_assets import complete
 
 from srbf.asset import Asset
-from srbf.direct.choice import Added
 from srbf.export import export
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
+from srbf.relighting.direct_light import Added
 
 SIDE, ZOOM = 24, 16
 TINT = np.linspace(0.2, 1.2, 24).reshape(8, 3)

@@ -16,8 +16,8 @@ from web_assets import complete, on_a_plane
 
 from srbf.asset import Asset
 from srbf.cli import app
-from srbf.image import encode_srgb, read_image, write_image
-from srbf.light_arguments import read_frames
+from srbf.cli.light_arguments import read_frames
+from srbf.io.image import encode_srgb, read_image, write_image
 from srbf.lights import DirectionalLight, EnvironmentLight, Light
 from srbf.methods import linear_response, relight
 

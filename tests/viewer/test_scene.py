@@ -16,7 +16,7 @@ from web_assets import complete, on_a_plane
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.export.gltf import model
-from srbf.image import read_image
+from srbf.io.image import read_image
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 

@@ -20,7 +20,7 @@ from web_assets import complete, on_a_plane
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import ImageError, InputError, ManifestError, MissingLibraryError
-from srbf.image import read_image
+from srbf.io.image import read_image
 from srbf.viewer import built_page
 from srbf.viewer.contents import contents_of
 from srbf.viewer.server import ViewerServer

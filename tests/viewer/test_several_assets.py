@@ -18,13 +18,13 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
 from srbf.errors import InputError
-from srbf.evaluation import evaluate
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.viewer.contents import contents_of
-from srbf.viewer.facts import title
+from srbf.viewer.page_manifest import title
 
 PICTURE = f"#{{'zoom':{ZOOM},'middle':[7,5]"
 SUN = [DirectionalLight((-0.45, -0.5, 0.74))]

@@ -15,7 +15,7 @@ from view_assets import scene_glb
 from web_assets import HALF_EXTENT, complete, on_a_plane
 
 from srbf.asset import Asset
-from srbf.image import read_image
+from srbf.io.image import read_image
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 

@@ -11,8 +11,8 @@ import pytest
 from web_assets import FOLLOWED, HALF_EXTENT, LIGHTS, complete, decoded, on_a_plane, tolerance
 
 from srbf.asset import Asset
-from srbf.containers import read_texture_array
 from srbf.export import Settings, export
+from srbf.io.containers import read_texture_array
 from srbf.methods import linear_response, relight
 
 ENCODINGS = ("float", "half", "uint8")

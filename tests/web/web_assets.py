@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from srbf import methods
-from srbf.asset import LAYERS, Asset
+from srbf.asset import LAYERS, Asset, layer_entries
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
-from srbf.quantization import layer_entries
 
 FLOAT = 1e-4  # of the sum of the magnitudes of all terms; a few 1e-6 are usual
 HALF = 2 * 2.0**-10  # two steps of a half float

@@ -52,7 +52,7 @@ export interface Manifest {
   source?: { receiver?: { kind?: string }; receivers?: { kind?: string }[] };
 }
 
-/** Whether the asset is a picture, a view or photographs, rather than a texture: `receiver_kind` of `srbf/alpha.py`. */
+/** Whether the asset is a picture, a view or photographs, rather than a texture: `receiver_kind` of `srbf/relighting/alpha.py`. */
 export function isPicture(manifest: Manifest): boolean {
   const { receiver, receivers } = manifest.source ?? {};
   return ((receiver ?? receivers?.[0])?.kind ?? "view") === "view";

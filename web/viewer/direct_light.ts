@@ -1,5 +1,5 @@
 /**
- * Direct light of suns on an indirect asset, by one orthographic shadow map each: the passes of `srbf/gl/shadow_map.py`, with the same shaders.
+ * Direct light of suns on an indirect asset, by one orthographic shadow map each: the passes of `srbf/visibility/shadow_map.py`, with the same shaders.
  * Translucent walls multiply a second map by their tint. Lamps and skies add none.
  */
 import {

@@ -1,4 +1,4 @@
-/** Where an asset's texels are lit: four points of each texel's footprint, with their normals. `srbf/direct/receivers.py` says the same in numpy. */
+/** Where an asset's texels are lit: four points of each texel's footprint, with their normals. `srbf/visibility/receivers.py` says the same in numpy. */
 import type { Asset, FloatImage } from "../src";
 
 const SAME_SURFACE_COS = 0.9; // of the normals of two neighbours that lie on one smooth surface

@@ -9,7 +9,7 @@ import type { DirectInputs } from "./direct_light";
 import type { FittedCamera } from "./frames";
 import { References } from "./reference";
 
-/** One asset, as `srbf/viewer/facts.py` describes it. */
+/** One asset, as `srbf/viewer/page_manifest.py` describes it. */
 export interface AssetFacts {
   name: string;
   folder: string;
@@ -19,7 +19,7 @@ export interface AssetFacts {
   errors: string | null;
 }
 
-/** viewer.json: `srbf/viewer/facts.py`. */
+/** viewer.json: `srbf/viewer/page_manifest.py`. */
 export interface Facts {
   title: string;
   assets: AssetFacts[];

@@ -1,0 +1,1 @@
+"""Where work runs: threads of this machine, and workers of a Dask cluster."""

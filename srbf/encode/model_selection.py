@@ -1,0 +1,136 @@
+"""One spread and one ridge for a capture, chosen by what they predict: its validation lights, or lights left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.capture import COVERED, STRIP, Capture
+from srbf.compute.threads import each, one_blas_thread
+from srbf.encode.cross_validation import HeldOut
+from srbf.errors import InputError
+from srbf.solve.kernel_ridge import KernelPath
+
+Rule = Literal["validation", "leave-one-light-out"]
+
+RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
+SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighbouring centers
+WIDEST = 1.0  # rad: past it the R table has a cusp
+USUAL_SPREAD, USUAL_RIDGE = 0.85, RIDGES[7]  # of the mean distance between neighboring centers; on the diagonal
+NARROWEST = 0.05  # rad
+SAMPLE_TEXELS = 1 << 13
+MARGIN = 2.0  # times the squared error of the best, geometric mean over lights, that the usual choice may have
+SURE = 2.0  # the margin is whole where there are fewer than so many lights to a function
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A spread (rad) and a ridge, the rule that chose them, and the mean squared error that it saw."""
+
+    spread: float
+    ridge: float
+    rule: Rule
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class TexelSample:
+    """Rows of T for some covered texels, the train lights first: what every choice is made on.
+
+    answers (n, L + V, 3) float32, of L train and V validation lights at `directions` (L + V, 3).
+    """
+
+    texels: Int[ndarray, " n"]
+    answers: Float32[ndarray, "n M 3"]
+    directions: Float64[ndarray, "M 3"]
+    train: int
+
+    @staticmethod
+    def of(capture: Capture, count: int = SAMPLE_TEXELS, share: float = 0.25, seed: int = 0) -> TexelSample:
+        """`count` covered texels, or all; from large images only `share` of the rows is read, in even strips."""
+        train, validation = capture.indices("train"), capture.indices("validation")
+        covered = capture.coverage() >= COVERED
+        if not covered.any():
+            raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
+        texels = np.flatnonzero(_in_strips(covered, count, share))
+        if len(texels) > count:
+            runs = np.arange(count + 1) * len(texels) // count
+            texels = texels[(runs[:-1] + np.random.default_rng(seed).random(count) * np.diff(runs)).astype(np.int64)]
+        lights = [*train, *validation]
+        return TexelSample(texels, capture.sample(lights, texels), capture.directions(lights), len(train))
+
+    @property
+    def validated(self) -> bool:
+        """Whether there are validation lights to choose by."""
+        return len(self.directions) > self.train
+
+    @property
+    def gram(self) -> Float64[ndarray, "M M"]:
+        """Inner products of the lights' images, mean over texels and colours: all that a linear fit's error depends on."""
+        images = self.answers.transpose(1, 0, 2).reshape(self.answers.shape[1], -1)
+        return (images @ images.T).astype(np.float64) / images.shape[1]
+
+
+def choose(
+    sample: TexelSample,
+    candidates: Iterable[tuple[float, Float64[ndarray, "M K"]]],
+    ridges: Sequence[float] = RIDGES,
+    noise: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    usual: tuple[float, float] | None = None,
+) -> Choice:
+    """The candidate, (spread, basis functions at the sample's lights), and the ridge > 0 that predict best what they did not see.
+
+    The `usual` (spread, ridge), if it is among them, stays unless another has less than 1 / MARGIN of its squared error. The more lights
+    there are to a function, the surer is what they show, and the smaller the margin.
+    Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation.HeldOut.score`).
+    `noise(operator, weights)` adds a variance a light: what the maps' encoding loses.
+    """
+    held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
+    middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
+    train = sample.train
+    rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
+    tried = list(candidates)
+    found: list[list[tuple[float, Choice]]] = [[] for _ in tried]
+
+    def work(i: int) -> None:
+        spread, weights = tried[i]
+        path = KernelPath(weights[:train] @ weights[:train].T)
+        for ridge in ridges:
+            single, banded = held_out.single(path, ridge), held_out.in_bands(path, ridge)
+            unseen = held_out.validation(path, ridge, weights[train:] @ weights[:train].T) if held_out.validated else None
+            if noise is not None:
+                lost = noise(path.solve(ridge, weights[:train]).T, weights)
+                single, banded = single + lost[:train], banded + lost[middles]
+                unseen = None if unseen is None else unseen + lost[train:]
+            error = float((single if unseen is None else unseen).mean())
+            found[i].append((held_out.score(single, banded, unseen), Choice(spread, ridge, rule, error)))
+
+    with one_blas_thread():
+        each(work, len(tried))
+    scored = [one for choices in found for one in choices]
+    assert scored, "no spread or no ridge to choose from"
+    best = min(scored, key=lambda one: one[0])
+    margin = np.log(MARGIN) * min(1.0, SURE * tried[0][1].shape[1] / train) ** 2
+    for score, choice in scored:
+        if (choice.spread, choice.ridge) == usual and score < best[0] + margin:
+            return choice
+    return best[1]
+
+
+def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:
+    """Spreads around `typical` (rad) within the R table's reach."""
+    return sorted({float(np.clip(typical * f, NARROWEST, WIDEST)) for f in factors})
+
+
+def _in_strips(covered: Bool[ndarray, "H W"], count: int, share: float) -> Bool[ndarray, "H W"]:
+    """`covered`, of large images in every few strips of rows alone, so that the rest need not be read."""
+    height = len(covered)
+    every = max(1, int(share and 1 / share))
+    chosen = covered.copy()
+    chosen[(np.arange(height) // STRIP) % every != every // 2] = False
+    return chosen if np.count_nonzero(chosen) >= 2 * count else covered

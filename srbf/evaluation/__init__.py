@@ -1,0 +1,1 @@
+"""Errors of an asset: by role and by light, leave-one-out, by bytes, in motion, across cluster borders."""

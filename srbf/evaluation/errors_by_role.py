@@ -1,0 +1,286 @@
+"""Error of an asset against the reference images of a capture, by role and by light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float, Float32, Float64, Int
+from srbf.asset import Asset
+from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.compute.threads import each, one_blas_thread
+from srbf.errors import InputError
+from srbf.io.float16 import finite_to_float32
+from srbf.lights import PointLight
+from srbf.methods import directional_responses, linear_response
+from srbf.relighting.direct_light import Added, Direct
+
+PEAK_QUANTILE = 0.999
+WATCHED_BYTES = 192 << 20  # half answers of all covered texels to all train lights, where they fit: 256² under 500 lights
+SAMPLE_TEXELS = 1 << 15  # watched where they do not, or fewer under very many lights
+PIECE = 1 << 14  # values whose squares are summed in float32
+LIGHTS_AT_A_TIME = 16  # relit on the watched texels by one thread
+
+
+@dataclass(frozen=True)
+class RoleError:
+    """Error over all lights of one role: texels of coverage >= 0.5, ambient excluded, both images clamped at 0.
+
+    `rmse` pools images, texels and channels; `relative_rmse` = rmse / rms of the reference; `psnr` is the mean over images of
+    20 log10(peak / rmse_image), `psnr_pooled` that of the pooled rmse.
+    """
+
+    rmse: float
+    relative_rmse: float
+    psnr: float
+    psnr_pooled: float
+    peak: float
+
+
+class PeakHistogram:
+    """Quantiles of non-negative values from a histogram over their float32 bits: exact on half floats, 2^-11 relative on others.
+
+    Told `total`, how many values will come, and the quantile `q` that will be asked for, it looks only at values that can still matter: not
+    at those below a bin that enough others have reached. The answer is the same, and soon most of an image is passed over.
+    """
+
+    SHIFT = 13  # mantissa bits dropped: ten are left, as many as a half float has
+
+    def __init__(self, total: int | None = None, q: float = 0.0) -> None:
+        self._counts: Int[ndarray, " bins"] = np.zeros(1 << (31 - self.SHIFT), np.int64)
+        self._wanted = None if total is None else total - int(np.floor(q * (total - 1)))  # the rank of the quantile from the top
+        self._floor = 0  # the first bin that can matter
+        self._lock = Lock()
+
+    def add(self, values: Float[ndarray, "*shape"], rows: Bool[ndarray, " P"] | None = None) -> None:
+        """Count finite `values`, float32 or float16, of `rows` if given, clamped at 0 and rounded to the nearest bin; from any thread."""
+        count = values.size if rows is None else int(np.count_nonzero(rows)) * (values.size // len(rows))
+        if self._floor:
+            chosen = self._may_matter(values)
+            values = values[chosen if rows is None else chosen & rows[:, None]]
+        elif rows is not None:
+            values = values[rows]
+        values = values.ravel()
+        if values.dtype == np.float16:
+            values = finite_to_float32(values, np.empty(values.shape, np.float32))
+        bits = np.maximum(values, 0).view(np.uint32)
+        bins = (bits + (1 << (self.SHIFT - 1))) >> self.SHIFT
+        first = int(bins.min()) if len(bins) else 0
+        counts = np.bincount(bins - np.uint32(first))
+        with self._lock:
+            self._counts[first : first + len(counts)] += counts
+            self._counts[0] += count - len(values)
+            if self._wanted is not None:
+                above = np.cumsum(self._counts[: self._floor : -1])  # from the last bin down to the floor's next
+                if above[-1] >= self._wanted:
+                    self._floor = len(self._counts) - 1 - int(np.searchsorted(above, self._wanted))
+
+    def _may_matter(self, values: ndarray) -> ndarray:
+        """Which values reach the floor's bin, or the half float below it."""
+        least = np.array([(self._floor - 1) << self.SHIFT], np.uint32).view(np.float32)
+        if values.dtype == np.float16:  # positive halves are in the order of their bits, negative ones below
+            return values.view(np.int16) >= least.astype(np.float16).view(np.int16)
+        return values >= least
+
+    def quantile(self, q: float) -> float:
+        """Linear interpolation between order statistics, as numpy.quantile has it."""
+        cumulative = np.cumsum(self._counts)
+        rank = q * (cumulative[-1] - 1)
+        bins = [int(np.searchsorted(cumulative, r, side="right")) for r in (np.floor(rank), np.ceil(rank))]
+        low, high = (np.array(bins, np.uint32) << self.SHIFT).view(np.float32).astype(np.float64)
+        return float(low + (high - low) * (rank - np.floor(rank)))
+
+
+class TrainWatch:
+    """What the error of the train lights needs, taken while a fit streams them, so that they are not read a second time.
+
+    `look`, given to a method's `encode`, counts every covered value for the peak (exact) and keeps the answers of every covered texel where
+    WATCHED_BYTES hold them, else of SAMPLE_TEXELS, one at random out of each of equal runs of them.
+    InputError where nothing is covered.
+    """
+
+    def __init__(self, capture: Capture) -> None:
+        self.lights = capture.indices("train")
+        covered = _covered(capture)
+        self._rows = None if covered.all() else covered
+        texels = np.flatnonzero(covered)
+        held = max(1, WATCHED_BYTES // (6 * max(1, len(self.lights))))
+        self.exact = len(texels) <= held
+        if not self.exact:
+            count = min(held, SAMPLE_TEXELS)
+            runs = np.arange(count + 1) * len(texels) // count
+            texels = texels[(runs[:-1] + np.random.default_rng(0).random(count) * np.diff(runs)).astype(np.int64)]
+        self.texels: Int[ndarray, " n"] = texels
+        self.peaks = PeakHistogram(int(covered.sum()) * 3 * len(self.lights), PEAK_QUANTILE)
+        self._answers: dict[int, ndarray] = {}
+        self._combined = capture.combined() if capture.transport == "indirect" and capture.has_direct else None
+
+    def look(self, row: int, image: Float[ndarray, "P 3"]) -> None:
+        """See the answer to train light `row`, as stored."""
+        self._answers[row] = image[self.texels]
+        whole = image if self._combined is None else self._combined.image(self.lights[row]).reshape(-1, 3)
+        self.peaks.add(whole, self._rows)
+
+    def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
+        """Sums of squared differences and of squared references, a light, over `texels`, both clamped at `floor`."""
+        picked = asset.at(self.texels)
+        directions = capture.directions(self.lights)
+        sums = np.empty((2, len(self.lights)))
+
+        def compare(task: int) -> None:
+            rows = range(task * LIGHTS_AT_A_TIME, min((task + 1) * LIGHTS_AT_A_TIME, len(self.lights)))
+            relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            for row, answer in zip(rows, relit, strict=True):
+                reference = self._answers[row]
+                if reference.dtype == np.float16:
+                    reference = finite_to_float32(reference, np.empty(reference.shape, np.float32))
+                sums[:, row] = squared_errors(answer, reference, floor)
+
+        with one_blas_thread():
+            each(compare, -(-len(self.lights) // LIGHTS_AT_A_TIME))
+        return sums[0], sums[1]
+
+
+def evaluate(
+    asset: Asset,
+    capture: Capture,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    direct: Direct = "none",
+    roles: Sequence[Role] = ROLES,
+    watch: TrainWatch | None = None,
+) -> dict[str, Any]:
+    """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
+
+    The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
+    and all but `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the clamp
+    comes after the direct light; with it, against the combined answer. A capture under point lights tells how far true lamps are from what
+    directional lights foretell, its train lights being as unseen as the rest. With a `watch` that has seen the train images they are
+    not read again: peak, validation and holdout are the same, and train's error is that of the watched texels, whose number stands beside
+    it as `texels` where they are not all. InputError where asset and capture cannot be compared.
+    """
+    reference, peak_source = _references(asset, capture, direct)
+    if (asset.width, asset.height) != (capture.width, capture.height):
+        raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
+    covered = _covered(capture)
+    samples = dict.fromkeys(ROLES, int(covered.sum()) * 3)
+    floor = -np.inf if reference.transport == "indirect" else 0.0
+    peaks = PeakHistogram() if watch is None else watch.peaks
+    if watch is None and (peak_source is not reference or "train" not in roles):
+        for _, block in peak_source.blocks(peak_source.indices("train")):
+            peaks.add(block[:, covered])
+    squares: dict[int, float] = {}  # sum of squared differences a light
+    powers: dict[int, float] = {}  # sum of squared references a light
+    if watch is not None:
+        samples["train"] = len(watch.texels) * 3
+        for light, square, power in zip(watch.lights, *watch.squares(asset, capture, floor), strict=True):
+            squares[light], powers[light] = float(square), float(power)
+    total = sum(len(capture.indices(role)) for role in roles)
+    with Added(asset, direct) as added:
+        for role in roles:
+            indices = capture.indices(role) if role != "train" or watch is None else []
+            for first, block in reference.blocks(indices):
+                chosen = indices[first : first + len(block)]
+                for index, answer, true in zip(chosen, _relit(asset, capture, chosen, added), block, strict=True):
+                    true = true[covered]
+                    if role == "train" and peak_source is reference:
+                        peaks.add(true)
+                    squares[index], powers[index] = squared_errors(answer[covered], true, floor)
+                    progress(len(squares), total)
+    has_train = bool(capture.indices("train"))
+    peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
+    result: dict[str, Any] = {}
+    for role in roles:
+        indices = capture.indices(role)
+        if indices:
+            error = role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
+            result[role] = asdict(error)
+    if watch is not None and not watch.exact:
+        result["train"]["texels"] = len(watch.texels)
+    result["lights"] = [
+        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples[light.role]))}
+        for i, light in enumerate(capture.lights)
+        if i in squares
+    ]
+    return result
+
+
+def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) -> Iterator[Float32[ndarray, "P 3"]]:
+    """The asset's answer to each of a capture's lights, before the clamp, with what direct light is to be added.
+
+    A point light is relit as such, inverse-square and of unit irradiance at 1 m, as it was captured.
+    """
+    if capture.kind == "point":
+        for position in capture.positions(lights):
+            lamp = [PointLight(tuple(position), falloff="inverse-square")]
+            answer, direct = linear_response(asset, lamp), added.answer(lamp)
+            yield (answer if direct is None else answer + direct).reshape(-1, 3)
+        return
+    directions = capture.directions(lights)
+    for direction, answer in zip(directions, directional_responses(asset, directions), strict=True):
+        lit = added.directional(direction[None])
+        yield (answer if isinstance(lit, float) else answer + lit[0]).reshape(-1, 3)
+
+
+def _covered(capture: Capture) -> Bool[ndarray, " P"]:
+    covered = capture.coverage().ravel() >= COVERED
+    if not covered.any():
+        raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
+    return covered
+
+
+def squared_errors(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
+    """Sums of squared differences and of squared references, both images clamped at `floor`."""
+    reference = np.maximum(reference, np.float32(floor))
+    difference = np.maximum(answer, np.float32(floor)) - reference
+    return _energy(difference), _energy(reference)
+
+
+def _energy(values: Float32[ndarray, "n 3"]) -> float:
+    """Sum of squares: float32 within a piece, float64 over pieces."""
+    flat = values.ravel()
+    return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + PIECE] for start in range(0, len(flat), PIECE)))
+
+
+def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture, Capture]:
+    """(what the relit images are compared with, what the peak is taken of)."""
+    if asset.transport == "combined":
+        if direct != "none":
+            raise InputError(f"expected an indirect asset for --direct {direct}, found a combined one: it holds the direct light already")
+        combined = capture.combined()
+        return combined, combined
+    whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
+    if direct == "none":
+        if capture.transport == "combined":
+            raise InputError(
+                f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
+                "add its direct light: --direct ray or shadow-map"
+            )
+        return capture, whole
+    return capture.combined(), whole
+
+
+def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], samples: int, peak: float) -> RoleError:
+    """RoleError from sums of squared differences and of squared references, a light, each over `samples` values."""
+    per_image = np.sqrt(squares / samples)
+    rmse = float(np.sqrt(squares.sum() / (samples * len(squares))))
+    reference = float(np.sqrt(powers.sum() / (samples * len(powers))))
+    return RoleError(
+        rmse=rmse,
+        relative_rmse=rmse / reference if reference > 0 else 0.0,
+        psnr=float(np.mean([psnr(peak, e) for e in per_image])),
+        psnr_pooled=psnr(peak, rmse),
+        peak=peak,
+    )
+
+
+MAX_PSNR = 200.0  # dB: stands for "no difference", where the formula has infinity and JSON has none
+
+
+def psnr(peak: float, rmse: float) -> float:
+    """20 log10(peak / rmse), at most MAX_PSNR."""
+    return float(min(MAX_PSNR, 20 * np.log10(max(peak, 1e-30) / max(rmse, 1e-30))))

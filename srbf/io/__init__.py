@@ -1,0 +1,1 @@
+"""Reading and writing: images (the only import of OpenImageIO), texture containers, scene.glb, atomic files, half floats."""

@@ -1,9 +1,0 @@
-"""Pictures as people have them, read with their meaning: turned, in linear Rec.709, of the image, part and layer that is meant.
-
-`read_picture` is for photographs, others' renders, masks and environment maps. What the project wrote itself is read by `srbf.image`.
-"""
-
-from srbf.pictures.found import RAW_SUFFIXES
-from srbf.pictures.reading import Picture, Transfer, read_picture, said_once
-
-__all__ = ["RAW_SUFFIXES", "Picture", "Transfer", "read_picture", "said_once"]

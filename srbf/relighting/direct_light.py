@@ -1,0 +1,92 @@
+"""Which way of adding direct light an asset takes, and making it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.errors import InputError
+from srbf.lights import EnvironmentLight, Light, moved
+from srbf.visibility.embree import has_embree
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.shadow_map import ShadowMapper
+
+Direct = Literal["none", "ray", "shadow-map"]
+NAMES = {"ray": "exact direct light by rays", "shadow-map": "direct light by a shadow map"}
+
+
+class DirectLight(Protocol):
+    """Adds what an indirect asset leaves out; lights are in the asset's frame."""
+
+    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        """The direct diffuse light of `lights`; environments add nothing."""
+
+    def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        """`answer` to a white light from each of many directions."""
+
+
+def chosen(asset: Asset, asked: Direct | None) -> Direct:
+    """`asked`, or the default: none for a combined asset, rays for an indirect one where embreex is there (else a shadow map).
+
+    InputError for direct light on a combined asset, which holds it already.
+    """
+    if asset.transport == "combined":
+        if asked not in (None, "none"):
+            raise InputError(f"expected an indirect asset for --direct {asked}, found a combined one: it holds the direct light already")
+        return "none"
+    if asked is not None:
+        return asked
+    if asset.scene is None:
+        return "none"
+    return "ray" if has_embree() else "shadow-map"
+
+
+class Added:
+    """The direct light of one asset or capture, made ready once; a context manager."""
+
+    def __init__(self, source: Asset | Capture, kind: Direct) -> None:
+        self._stack = ExitStack()
+        self._kind = kind
+        self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
+        self._light: DirectLight | None = None
+        if kind == "ray":
+            self._light = RayTracer(Receivers.of(source))
+        elif kind == "shadow-map":
+            self._light = self._stack.enter_context(ShadowMapper(Receivers.of(source)))
+
+    def __enter__(self) -> Added:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stack.close()
+
+    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
+        """The direct light of world-space `lights`, None where none is added."""
+        return None if self._light is None else self._light.answer([moved(light, self._frame) for light in lights])
+
+    def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
+        """The answers to white lights from world-space `directions`, 0 where none is added."""
+        return 0.0 if self._light is None else self._light.directional(directions @ _rotation(self._frame).T)
+
+    def notes(self, lights: Sequence[Light]) -> list[str]:
+        """What is to be said of `lights`: what was added, and what was not."""
+        if self._light is None:
+            return []
+        lines = [f"added {NAMES[self._kind]}"]
+        if any(isinstance(light, EnvironmentLight) for light in lights):
+            lines.append("an environment's direct light is not added: the picture holds only what it reflects on")
+        return lines
+
+
+def _rotation(matrix: Float64[ndarray, "4 4"]) -> Float64[ndarray, "3 3"]:
+    linear = matrix[:3, :3]
+    return linear / np.cbrt(abs(np.linalg.det(linear)))

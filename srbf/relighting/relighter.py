@@ -1,0 +1,195 @@
+"""Relighting an asset on the GPU: the same answer as `srbf.methods.relight`, by the shader pack."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32
+from srbf.asset import Asset
+from srbf.errors import InputError
+from srbf.gl.context import Limits, create_context
+from srbf.gl.depth_buffer import DepthView
+from srbf.gl.environment import Sky
+from srbf.gl.programs import Programs
+from srbf.gl.relighting_map import MapPasses
+from srbf.gl.scalar_planes import PlanePasses
+from srbf.gl.textures import AssetTextures
+from srbf.lights import EnvironmentLight, Light, PointLight, moved
+from srbf.methods import folded_weights
+
+if TYPE_CHECKING:
+    import moderngl
+
+Target = Literal["float", "half"]
+Functions = Literal["table", "formula"]
+Place = Literal["host", "gpu"]
+
+UNITS = 5  # maps, or images of four planes, a pass of the multi-pass variant
+MAX_UNITS = 8  # as many terms as stages/accumulate.frag spells out
+PASSES: dict[str, type[MapPasses | PlanePasses]] = {
+    "relighting-map": MapPasses,
+    "eigen-map": PlanePasses,
+    "clustered-eigen-map": PlanePasses,
+}
+
+
+def relight(
+    asset: Asset, lights: Sequence[Light], *, target: Target = "float", multipass: bool = False, units: int = UNITS
+) -> Float32[ndarray, "H W 3"]:
+    """max(0, sum over lights) + ambient, as `srbf.methods.relight` but by shaders; for many frames keep a `Relighter`.
+
+    Within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half` ones. Raises what `Relighter`
+    raises.
+    """
+    with Relighter(asset, target=target) as relighter:
+        return relighter.relight(lights, multipass=multipass, units=units)
+
+
+class Relighter:
+    """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
+
+    Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
+    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. `environments`: where their weights
+    are integrated; by shaders a sky may change from frame to frame. With a `view` receivers stand where its depth buffer says, not where
+    the position map does.
+    Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
+    """
+
+    def __init__(
+        self,
+        asset: Asset,
+        *,
+        target: Target = "float",
+        context: moderngl.Context | None = None,
+        functions: Functions = "table",
+        environments: Place = "host",
+        view: DepthView | None = None,
+    ) -> None:
+        if asset.method not in PASSES:
+            raise InputError(f"expected an asset of {', '.join(PASSES)}, found {asset.method}: no shader relights it")
+        if target not in get_args(Target):
+            raise InputError(f"expected a target of float, half, found {target!r}")
+        if functions not in get_args(Functions):
+            raise InputError(f"expected functions by table, formula, found {functions!r}")
+        if environments not in get_args(Place):
+            raise InputError(f"expected environments on host, gpu, found {environments!r}")
+        self._asset, self._located = asset, view is not None or "position" in asset.images
+        self._context = create_context() if context is None else context
+        self._resources = ExitStack()
+        self._owned, self._open = context is None, True
+        self._type = "f4" if target == "float" else "f2"
+        try:
+            with self._context:
+                self._limits = Limits.of(self._context)
+                self._textures = AssetTextures(self._context, asset, self._limits, self._resources, view)
+                self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
+                _, self._relit_buffer = self._target(self._type)
+                self._programs = Programs(self._context, self._resources)
+                self._sky = None
+                if environments == "gpu":
+                    self._sky = Sky(self._context, asset, self._programs, self._textures, self._resources)
+        except BaseException:
+            self.close()
+            raise
+        self._passes = PASSES[asset.method](asset, self._programs, self._textures, self._limits, functions == "formula")
+
+    def __enter__(self) -> Relighter:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release every GL object, and the context where it is our own."""
+        if self._open:
+            self._open = False
+            with self._context:
+                self._resources.close()
+            if self._owned:
+                self._context.release()
+
+    def relight(
+        self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
+    ) -> Float32[ndarray, "H W 3"]:
+        """One frame, read back: row 0 at the top.
+
+        `direct` light, of an indirect asset, is added before the clamp.
+        `multipass` is the article's way for GPUs of few texture units: `units` maps, or images of four planes, a pass, added up by
+        blending. Raises InputError on point or spot lights without a position map or, for harmonics, at all, or on units that are
+        not 1 to 8.
+        """
+        self.draw(lights, multipass=multipass, units=units, direct=direct)
+        return self.read()
+
+    def draw(
+        self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
+    ) -> None:
+        """Draw one frame and leave it on the GPU."""
+        most = min(MAX_UNITS, self._limits.texture_units)
+        if not 1 <= units <= most:
+            raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
+        inside = [moved(light, self._asset.asset_from_world) for light in lights]
+        lamps = [light for light in inside if isinstance(light, PointLight)]
+        if lamps and not self._located:
+            raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
+        if lamps:
+            self._passes.check_lamps()
+        skies = [light for light in lights if isinstance(light, EnvironmentLight)] if self._sky is not None else []
+        weights = folded_weights(self._asset, [light for light in lights if light not in skies])
+        with self._context:
+            by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
+            self._sum_buffer.use()
+            self._sum_buffer.clear()
+            self._blend(True)
+            at_once = units if multipass else None
+            if by_shader is not None:
+                self._passes.weighted(by_shader)
+                weights = 0 * weights
+            if weights.any() and (multipass or not lamps):
+                self._passes.far(weights, at_once)
+                weights = 0 * weights
+            if lamps:
+                self._passes.lamps(lamps, weights, at_once)
+            if direct is not None:
+                with self._textures.passing(direct) as texture:
+                    texture.use(0)
+                    self._programs.run("add.frag", {}, {"light": 0})
+            self._finish()
+
+    def read(self) -> Float32[ndarray, "H W 3"]:
+        """The frame last drawn."""
+        with self._context:
+            data = self._relit_buffer.read(components=4, dtype=self._type)
+        pixels = np.frombuffer(data, np.float32 if self._type == "f4" else np.float16)
+        return np.ascontiguousarray(pixels.reshape(self._asset.height, self._asset.width, 4)[..., :3], np.float32)
+
+    def _finish(self) -> None:
+        self._relit_buffer.use()
+        self._blend(False)
+        self._sum.use(0)
+        self._textures.ambient().use(1)
+        self._programs.run("finish.frag", {}, {"sum": 0, "ambient": 1})
+
+    def _blend(self, on: bool) -> None:
+        if on:
+            self._context.enable_only(self._context.BLEND)
+            self._context.blend_func = self._context.ONE, self._context.ONE
+        else:
+            self._context.enable_only(self._context.NOTHING)
+
+    def _target(self, dtype: str) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
+        size = (self._asset.width, self._asset.height)
+        texture = self._kept(self._context.texture(size, 4, dtype=dtype))
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        return texture, self._kept(self._context.framebuffer([texture]))
+
+    def _kept(self, resource: Any) -> Any:
+        """`resource`, to be released on close."""
+        self._resources.callback(resource.release)
+        return resource

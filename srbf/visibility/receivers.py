@@ -1,0 +1,134 @@
+"""Where the receivers of an asset or a capture are, as points within each texel's footprint, and what they answer to direct light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+from scipy.stats import qmc
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.capture import Capture, Quantity
+from srbf.errors import InputError
+from srbf.io.scene_glb import Triangles, read_triangles
+
+SAME_SURFACE_COS = 0.9  # of the normals of two neighbours that lie on one smooth surface
+OFF_PLANE = 0.2  # of their distance: how far a neighbour may lie off the tangent plane
+LONGER = 2.0  # a neighbour farther off than this many times the other side's lies across a seam
+
+
+@dataclass(frozen=True, eq=False)
+class Receivers:
+    """Receivers under direct light: geometry (H, W, 3), each optional but where needed, the scene, and how they were sampled.
+
+    `sampling` holds sun_angle (rad) and, for a lightmap, footprint (texels), for a view its camera.
+    """
+
+    width: int
+    height: int
+    quantity: Quantity
+    images: dict[str, ndarray]
+    triangles: Triangles
+    sampling: dict[str, Any]
+
+    @staticmethod
+    def of(source: Asset | Capture) -> Receivers:
+        """Of an asset, or of a capture itself; InputError, in one line, where it lacks what direct light needs."""
+        if isinstance(source, Asset):
+            images, data, what = dict(source.images), source.scene, "asset"
+        else:
+            data, what = source.scene(), "capture"
+            images = {name: image for name in ("position", "normal", "albedo") if (image := source.geometry(name)) is not None}
+            images["coverage"] = source.coverage()
+        if data is None:
+            raise InputError(f"expected the {what} to hold scene.glb, found none: direct light needs what casts shadows; bake it indirect")
+        needed = ["position", "normal"] + (["albedo"] if source.quantity == "radiance" else [])
+        if missing := [name for name in needed if name not in images]:
+            raise InputError(f"expected the {what} to hold {', '.join(missing)} for direct light, found none; bake it indirect")
+        sampling = source.manifest.get("direct", {"sun_angle": 0.0})
+        return Receivers(source.width, source.height, source.quantity, images, read_triangles(data), sampling)
+
+    @property
+    def sun_angle(self) -> float:
+        """Angular diameter of the sun, rad."""
+        return float(self.sampling.get("sun_angle", 0.0))
+
+    @property
+    def camera(self) -> dict[str, Any] | None:
+        """The camera that looked, where rays can look alike."""
+        return self.sampling.get("camera")
+
+    def reflectance(self) -> Float32[ndarray, "H W 3"] | float:
+        """What turns irradiance into the asset's quantity: 1, or albedo / pi."""
+        return 1.0 if self.quantity == "irradiance" else self.images["albedo"] / np.float32(np.pi)
+
+    def gradients(self, name: str) -> tuple[Float32[ndarray, "H W 3"], Float32[ndarray, "H W 3"]]:
+        """Change of position or normal a texel to the right, and a texel down; 0 where no neighbour lies on the same surface."""
+        along = []
+        for axis in (1, 0):
+            ahead, behind = self._step(name, axis, 1), self._step(name, axis, -1)
+            ok_ahead, ok_behind = self._same_surface(axis, 1), self._same_surface(axis, -1)
+            length_ahead, length_behind = (np.linalg.norm(self._step("position", axis, s), axis=2) for s in (1, -1))
+            ok_ahead &= ~(ok_behind & (length_ahead > LONGER * length_behind))
+            ok_behind &= ~(ok_ahead & (length_behind > LONGER * length_ahead))
+            weight = ok_ahead.astype(np.float32) + ok_behind
+            mean = (ahead * ok_ahead[..., None] + behind * ok_behind[..., None]) / np.maximum(weight, 1)[..., None]
+            along.append(mean.astype(np.float32))
+        return along[0], along[1]
+
+    def _step(self, name: str, axis: int, sign: int) -> np.ndarray:
+        image = self.images[name]
+        moved = np.roll(image, -sign, axis)
+        edge = [slice(None)] * 2
+        edge[axis] = slice(-1, None) if sign > 0 else slice(0, 1)
+        moved[tuple(edge)] = image[tuple(edge)]
+        return sign * (moved - image)
+
+    def _same_surface(self, axis: int, sign: int) -> np.ndarray:
+        normal, step = self.images["normal"], self._step("position", axis, sign)
+        turned = self._step("normal", axis, sign) * sign + normal
+        length = np.linalg.norm(step, axis=2)
+        flat = np.abs((step * normal).sum(axis=2)) <= OFF_PLANE * length
+        covered = self.images.get("coverage")
+        real = np.ones(length.shape, bool) if covered is None else (covered > 0)
+        neighbour = np.roll(real, -sign, axis)
+        return flat & ((turned * normal).sum(axis=2) >= SAME_SURFACE_COS) & (length > 0) & real & neighbour
+
+
+def spread_points(count: int) -> Float64[ndarray, "S 4"]:
+    """`count` points that fill the unit hypercube evenly, and best in powers of two of them [Sobol1967]."""
+    return qmc.Sobol(4, scramble=False).random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
+
+
+def disc_points(square: Float64[ndarray, "*s 2"]) -> Float64[ndarray, "*s 2"]:
+    """The unit square onto the unit disc, area kept."""
+    radius, turn = np.sqrt(square[..., 0]), 2 * np.pi * square[..., 1]
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
+
+
+def pixel_filter(kind: str, width: float, square: Float64[ndarray, "S 2"]) -> Float64[ndarray, "S 2"]:
+    """Offsets (pixels) spread as Cycles spreads its samples about a pixel: by the filter itself, so that all weigh alike.
+
+    Cycles' Blackman-Harris filter is twice as wide as its setting says, its Gaussian three times, its box always one pixel.
+    """
+    x = np.linspace(-0.5, 0.5, 1025)
+    if kind == "BLACKMAN_HARRIS":
+        a = 2 * np.pi * (x + 0.5)
+        width *= 2
+        density = 0.35875 - 0.48829 * np.cos(a) + 0.14128 * np.cos(2 * a) - 0.01168 * np.cos(3 * a)
+    elif kind == "GAUSSIAN":
+        width *= 3
+        density = np.exp(-2 * (6 * x) ** 2)
+    else:
+        density = np.ones_like(x)
+        width = 1.0
+    cumulative = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2)])
+    return np.interp(square, cumulative / cumulative[-1], x) * width
+
+
+def hashed(height: int, width: int, channels: int) -> Float64[ndarray, "H W c"]:
+    """A fixed random number in [0, 1) a texel and channel, to turn its points so that neighbours do not band."""
+    return np.random.default_rng(0).random((height, width, channels))

@@ -1,0 +1,84 @@
+"""Shadow maps in numpy: the twins of `glsl/shadow/`, and the square that a sun's map covers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float, Float64
+from srbf.io.scene_glb import KNOTS
+
+
+@dataclass(frozen=True)
+class SunFrame:
+    """An orthographic shadow map's frame: three orthonormal axes, and the square (low, extent; metres) that it covers."""
+
+    across: tuple[float, float, float]
+    up: tuple[float, float, float]
+    to_light: tuple[float, float, float]
+    low: tuple[float, float]
+    extent: float
+
+    @staticmethod
+    def around(points: Float[ndarray, "n 3"], direction: Float64[ndarray, " 3"], margin: float = 0.01) -> SunFrame:
+        """The frame of a sun at `direction` whose square holds all `points`, and a part `margin` more on every side."""
+        across = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0])
+        across /= np.linalg.norm(across)
+        up = np.cross(direction, across)
+        flat = np.stack([points @ across, points @ up], axis=1)
+        lowest, highest = flat.min(axis=0), flat.max(axis=0)
+        extent = max(float((highest - lowest).max()), 1e-6) * (1 + 2 * margin)
+        low = (lowest + highest - extent) / 2
+        return SunFrame(_triple(across), _triple(up), _triple(direction), (float(low[0]), float(low[1])), extent)
+
+
+def place(
+    point: Float[ndarray, "n 3"],
+    across: Float[ndarray, " 3"],
+    up: Float[ndarray, " 3"],
+    to_light: Float[ndarray, " 3"],
+    low: Float[ndarray, " 2"],
+    extent: float,
+) -> Float[ndarray, "n 3"]:
+    """Map coordinates (0 to 1) and height towards the light (m) of points [Williams1978]."""
+    flat = (np.stack([point @ across, point @ up], axis=-1) - low) / extent
+    return np.concatenate([flat, (point @ to_light)[..., None]], axis=-1)
+
+
+def fraction(
+    heights: Float[ndarray, "H W"], uv: Float[ndarray, "n 2"], height: Float[ndarray, " n"], slope: Float[ndarray, "n 2"], bias: float
+) -> Float[ndarray, " n"]:
+    """How much of 3 x 3 texels does not stand above a receiver whose plane rises by `slope` (m a texel) [Reeves1987]."""
+    size = np.array(heights.shape[::-1])
+    at = uv * size - 0.5
+    base = np.floor(at)
+    part = at - base
+    lit = np.zeros(len(uv))
+    for j in range(-1, 3):
+        for i in range(-1, 3):
+            weight = [1 - part[:, a] if k == -1 else part[:, a] if k == 2 else 1.0 for a, k in ((0, i), (1, j))]
+            tap = base + [i, j]
+            column, row = np.clip(tap, 0, size - 1).astype(int).T
+            plane = height + ((tap - at) * slope).sum(axis=1)
+            lit += (heights[row, column] <= plane + bias) * weight[0] * weight[1]
+    return lit / 9
+
+
+def wall_tint(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n"]) -> Float[ndarray, "n 3"]:
+    """What one wall lets through at the cosine at which light meets its normal, from either side."""
+    at = np.minimum(np.abs(cosine), 1) * (KNOTS - 1)
+    knot = np.minimum(at.astype(int), KNOTS - 2)
+    part = (at - knot).astype(curve.dtype)[:, None]
+    rows = np.arange(len(curve))
+    return curve[rows, knot] * (1 - part) + curve[rows, knot + 1] * part
+
+
+def direct(normal: Float[ndarray, "n 3"], to_light: Float[ndarray, " 3"], visibility: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
+    """N.L times visibility: the irradiance by a directional light of unit irradiance."""
+    return np.maximum(normal @ to_light, 0)[:, None] * visibility
+
+
+def _triple(vector: ndarray) -> tuple[float, float, float]:
+    return (float(vector[0]), float(vector[1]), float(vector[2]))

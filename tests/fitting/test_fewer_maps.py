@@ -1,0 +1,59 @@
+"""Fewer maps out of many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from srbf.errors import InputError
+from srbf.fitting.fewer_maps import keep
+from srbf.methods import directional_responses
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
+from srbf.methods.eigen_map import EigenMap
+from srbf.methods.relighting_map import RelightingMap
+from srbf.sphere import all_around
+
+
+def smooth(d: np.ndarray) -> np.ndarray:
+    y, x = np.mgrid[0:1:5j, 0:1:6j]
+    return np.stack([1 + d[0] * x + d[1] * y, d[2] * (1 + x), d[2] ** 2 + y], axis=2)
+
+
+def dropped(asset, count: int) -> np.ndarray:
+    return np.tensordot(asset.basis.evaluate(all_around("hemisphere", 300))[:, :count], asset.coefficients()[:count], 1)
+
+
+def test_projection_keeps_the_picture_where_dropping_does_not(make_capture) -> None:
+    asset = RelightingMap(k=25, encoding="float").encode(make_capture(smooth, lights=80))
+    kept = keep(asset, 12)
+    directions = all_around("hemisphere", 300)
+    before = directional_responses(asset, directions)
+    change = np.sqrt(((directional_responses(kept, directions) - before) ** 2).mean())
+    assert change < 0.05 * before.std()
+    assert change < 0.1 * np.sqrt(((dropped(asset, 12) - before) ** 2).mean())
+    assert kept.manifest["source"]["kept"]["relative_residual"] == pytest.approx(change / np.sqrt((before**2).mean()), rel=0.2)
+
+
+def test_keeping_fewer_loses_more(make_capture) -> None:
+    asset = RelightingMap(k=25).encode(make_capture(smooth, lights=80))
+    lost = [keep(asset, count).manifest["source"]["kept"]["relative_residual"] for count in (20, 9, 4, 1)]
+    assert lost == sorted(lost)
+
+
+def test_an_eigen_map_drops_its_last_planes(make_capture, tmp_path) -> None:
+    capture = make_capture(smooth, lights=80)
+    asset, fewer = EigenMap(scalars=6, encoding="float").encode(capture), EigenMap(scalars=3, encoding="float").encode(capture)
+    kept = keep(asset, 3)
+    kept.save(tmp_path / "kept")
+    directions = all_around("hemisphere", 50)
+    opened = type(kept).open(tmp_path / "kept")
+    np.testing.assert_allclose(directional_responses(opened, directions), directional_responses(fewer, directions), atol=1e-4)
+
+
+def test_what_cannot_be_kept_is_refused(make_capture) -> None:
+    capture = make_capture(smooth, lights=80)
+    asset = RelightingMap(k=4).encode(capture)
+    with pytest.raises(InputError, match="1 to 4"):
+        keep(asset, 5)
+    with pytest.raises(InputError, match="clustered"):
+        keep(ClusteredEigenMap(clusters=2, scalars=2).encode(capture), 1)
