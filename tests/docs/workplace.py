@@ -28,7 +28,7 @@ from typer.testing import CliRunner
 import srbf.demo
 from srbf.cli import app
 from srbf.io.image import write_image
-from srbf.report import canvas, tiles
+from srbf.report import abrdf_mosaic, canvas
 from srbf.sphere import random_directions
 from srbf.viewer.server import ViewerServer
 
@@ -152,7 +152,7 @@ class Workplace:
                 srbf.demo, "SCENES", {name: replace(scene, size=(24, 18), published=(28, 20)) for name, scene in srbf.demo.SCENES.items()}
             )
             patch.setattr(srbf.demo, "HOLDOUT_SAMPLES", 1)
-            for module in (canvas, tiles):
+            for module in (canvas, abrdf_mosaic):
                 patch.setattr(module, "DPI", 40)
             done = CliRunner().invoke(app, words)
         if done.exit_code:
