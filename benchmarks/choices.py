@@ -127,7 +127,7 @@ def light_functions(case: Case) -> tuple[float, float]:
     )
     space = LightSpace.of(sample, "plain")
     axes, _ = principal_axes(space.centered, min(COMPONENTS, 3 * case.fitted))
-    planes = np.einsum("slc,nlc->sn", space.weights(axes), sample.answers) - space.offsets(axes)[:, None]
+    planes = np.einsum("slc,nlc->sn", space.weights(axes), sample.responses) - space.offsets(axes)[:, None]
     ones = np.concatenate([np.ones((1, planes.shape[1])), planes])
     values = space.functions(axes)
 

@@ -107,7 +107,7 @@ def ways_to_blocks(asset: Asset) -> dict[str, float]:
     return found
 
 
-def scalars_a_layer(asset: Asset) -> dict[str, float]:
+def components_per_layer(asset: Asset) -> dict[str, float]:
     """dB of BC7 with four scalars to a layer, as assets have them, and with three and no alpha: a third more layers."""
     values = asset.coefficients()
     height, width = values.shape[1:3]
@@ -171,8 +171,8 @@ def at_the_edges(path: Path, folder: Path) -> None:
             seam = ""
             if stitch is not None:
                 mean = np.abs(directional_responses(asset.at(np.flatnonzero(asset.covered)), directions)).mean()
-                sewn = directional_responses(exported.at(stitch.texels), directions)[:, 0].transpose(1, 0, 2)
-                gap = stitch.difference(sewn.reshape(len(sewn), -1)) / mean
+                stitched = directional_responses(exported.at(stitch.texels), directions)[:, 0].transpose(1, 0, 2)
+                gap = stitch.difference(stitched.reshape(len(stitched), -1)) / mean
                 seam = f"seams {gap:.4f}, unstitched {asset.manifest['seams']['before']:.4f}; "
             print(f"  {encoding}: {seam}edge / inside by level, dB: {', '.join(seen)}", flush=True)
 
@@ -223,7 +223,7 @@ def run(path: Path, scratch: Path, timed: bool) -> list[str]:
                 f"| {row.gpu:.1f} | {row.table:.1f} |",
                 flush=True,
             )
-        for way, kept in (ways_to_blocks(asset) if asset.method == "relighting-map" else scalars_a_layer(asset)).items():
+        for way, kept in (ways_to_blocks(asset) if asset.method == "relighting-map" else components_per_layer(asset)).items():
             print(f"  {name}: {way}: {kept:.2f} dB", flush=True)
         if timed and asset.method == "relighting-map":
             began, cpu = time.perf_counter(), time.process_time()

@@ -35,7 +35,7 @@ class FakeBlender:
         for light in _requests():
             if self._kind == "slow":
                 time.sleep(SLOW)
-            self._answer(light, self._kind if light["index"] == self._light and self._strikes() else "")
+            self._response(light, self._kind if light["index"] == self._light and self._strikes() else "")
         self._emit("done")
 
     def _prepare(self) -> None:
@@ -60,7 +60,7 @@ class FakeBlender:
             self._emit("file", file="scene.glb", sampling={"footprint": 0.5}, tints={})
         self._emit("ready")
 
-    def _answer(self, light: dict[str, Any], fault: str) -> None:
+    def _response(self, light: dict[str, Any], fault: str) -> None:
         if fault == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if fault == "stop":

@@ -38,7 +38,7 @@ FLAGS: dict[str, list[str]] = {
 
 
 def make_capture(folder: Path, lights: int, side: int) -> Capture:
-    """A bumpy coloured floor under discs that cast sharp shadows, every light of the hemisphere its own noise; all of them train."""
+    """A bumpy colored floor under discs that cast sharp shadows, every light of the hemisphere its own noise; all of them train."""
     if (folder / MANIFEST).is_file():
         capture = Capture.open(folder)
         if (len(capture.lights), capture.width) != (lights, side):

@@ -30,7 +30,7 @@ from srbf.sphere import Domain, domain_of, mean_spacing, point_set
 SIDE = 48  # texels of our scenes
 LAMBERT_BAR = 0.02
 POLE_RADIUS, POLE_HEIGHT = 0.08, 1.0  # on the square [-1, 1]^2
-Answer = Callable[[np.ndarray], np.ndarray]  # (3,) -> (H, W) answers of a white surface
+Response = Callable[[np.ndarray], np.ndarray]  # (3,) -> (H, W) answers of a white surface
 
 
 def lambert(direction: np.ndarray) -> np.ndarray:
@@ -62,27 +62,27 @@ class Pole:
         return np.where(distance > POLE_RADIUS, max(0.0, direction[2]) * (1 - hidden), 0.0)
 
     def _beyond(self, angle: np.ndarray) -> np.ndarray:
-        """The part of the disc on the far side of a great circle that is `angle` from its centre."""
+        """The part of the disc on the far side of a great circle that is `angle` from its center."""
         t = np.clip(angle / max(self.sun_angle / 2, 1e-9), -1, 1)
         return 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
 
 
-def make_capture(folder: Path, answer: Answer, lights: int, domain: Domain) -> Capture:
+def make_capture(folder: Path, response: Response, lights: int, domain: Domain) -> Capture:
     """The answers to the Hammersley directions that a bake takes, as half floats."""
     (folder / "lights").mkdir(parents=True)
     entries = []
     for i, direction in enumerate(point_set("hammersley", lights, domain)):
         file = f"lights/{i:04d}.exr"
-        write_image(folder / file, np.repeat(answer(direction)[:, :, None], 3, axis=2), "half")
+        write_image(folder / file, np.repeat(response(direction)[:, :, None], 3, axis=2), "half")
         entries.append({"kind": "directional", "direction": direction.tolist(), "role": "train", "file": file})
     manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": SIDE, "height": SIDE, "lights": entries}
     files.write_json(folder / "capture.json", manifest)
     return Capture.open(folder)
 
 
-def truth(answer: Answer, texels: np.ndarray) -> Reference:
+def truth(response: Response, texels: np.ndarray) -> Reference:
     """The closed form as a sweep's reference."""
-    return lambda directions: np.stack([np.repeat(answer(d).reshape(-1, 1)[texels], 3, axis=1) for d in directions]).astype(np.float32)
+    return lambda directions: np.stack([np.repeat(response(d).reshape(-1, 1)[texels], 3, axis=1) for d in directions]).astype(np.float32)
 
 
 def fitted(capture: Capture, flags: str, folder: Path) -> Asset | str:
@@ -102,11 +102,11 @@ def nearest_image(capture: Capture, texels: np.ndarray) -> Reference:
     return lambda directions: images[(directions @ towards).argmax(axis=1)]
 
 
-def baselines(capture: Capture, answer: Answer | None, texels: np.ndarray, reference: Reference) -> Iterator[tuple[str, Motion]]:
+def baselines(capture: Capture, response: Response | None, texels: np.ndarray, reference: Reference) -> Iterator[tuple[str, Motion]]:
     """What all train images show without any compression: the nearest one, and, where the truth is known, all of them interpolated."""
     path = great_circles(domain_of(capture.directions(capture.indices("train"))))
     relighters = {"(nearest image)": nearest_image}
-    if answer is not None:
+    if response is not None:
         relighters["(all images interpolated)"] = dense_reference
     for name, relighter in relighters.items():
         pictures = (f(path.reshape(-1, 3)).reshape(*path.shape[:2], -1, 3) for f in (relighter(capture, texels), reference))
@@ -132,21 +132,21 @@ def main() -> int:
     missed = False
     with tempfile.TemporaryDirectory() as name:
         temporary = Path(name)
-        scenes: list[tuple[str, Capture, Answer | None]] = [(str(path), Capture.open(path), None) for path in arguments.captures]
+        scenes: list[tuple[str, Capture, Response | None]] = [(str(path), Capture.open(path), None) for path in arguments.captures]
         if not scenes:
             spacing = mean_spacing(point_set("hammersley", arguments.lights, arguments.domain))
             angle = spacing if arguments.sun_angle == "auto" else float(arguments.sun_angle)
             pole = f"pole, a sun of {np.degrees(angle):.1f} degrees"
-            for title, answer in (("Lambert plane", lambert), (pole, Pole(angle))):
+            for title, response in (("Lambert plane", lambert), (pole, Pole(angle))):
                 scenes.append(
-                    (title, make_capture(temporary / f"capture{len(scenes)}", answer, arguments.lights, arguments.domain), answer)
+                    (title, make_capture(temporary / f"capture{len(scenes)}", response, arguments.lights, arguments.domain), response)
                 )
-        for number, (title, capture, answer) in enumerate(scenes):
+        for number, (title, capture, response) in enumerate(scenes):
             print(f"\n{title}: {shadow_sampling(capture).sentence()}")
             print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}{'kept':>7}")
             texels = sampled_texels(capture.coverage() >= COVERED)
-            reference = dense_reference(capture, texels) if answer is None else truth(answer, texels)
-            for baseline, motion in baselines(capture, answer, texels, reference):
+            reference = dense_reference(capture, texels) if response is None else truth(response, texels)
+            for baseline, motion in baselines(capture, response, texels, reference):
                 row(baseline, motion)
             for index, flags in enumerate(methods):
                 asset = fitted(capture, flags, temporary / f"asset{number}-{index}")
@@ -155,7 +155,7 @@ def main() -> int:
                     continue
                 motion = sweep(asset, reference, texels, great_circles(asset.domain))
                 bar = ""
-                if answer is lambert:
+                if response is lambert:
                     within = motion.brightness_error <= LAMBERT_BAR
                     bar = f"{'within' if within else 'misses'} {LAMBERT_BAR:.0%} of its cosine"
                     missed |= not within

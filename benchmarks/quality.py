@@ -29,7 +29,7 @@ from srbf.evaluation.rate_distortion import ALL, NEAREST, Score, baselines, plan
 from srbf.importing.photographs import LightListImport
 from srbf.io import files
 from srbf.io.image import Encoding, write_image
-from srbf.methods.clustered_eigen_map import TEXELS_A_CLUSTER, ClusteredEigenMap
+from srbf.methods.clustered_eigen_map import TEXELS_PER_CLUSTER, ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import domain_of, normalize, point_set
@@ -120,7 +120,7 @@ def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, r
     return scores
 
 
-def scalars_of(method: Method) -> int:
+def components_of(method: Method) -> int:
     """Numbers a texel."""
     return 3 * method.k if isinstance(method, RelightingMap) else method.scalars
 
@@ -163,7 +163,7 @@ def peak_of(capture: Capture) -> float:
 
 def methods_for(capture: Capture, texels: int) -> dict[str, Method]:
     """The methods of a capture's table: clusters where they have texels enough, what lives on the hemisphere where all lights are above."""
-    clustered = {name: method for name, method in CLUSTERED.items() if method.clusters * TEXELS_A_CLUSTER <= texels}
+    clustered = {name: method for name, method in CLUSTERED.items() if method.clusters * TEXELS_PER_CLUSTER <= texels}
     above = {**HSH, **PTM} if domain_of(capture.directions(capture.indices("train"))) == "hemisphere" else {}
     return {**PAPER, **eigen(9, 16, 28, 48), **clustered, **SH, **above}
 
@@ -194,7 +194,7 @@ def capture_table(capture: Capture, title: str, bars: Bars, smooth: bool = False
         bar = bars.at_least(half.psnr, HARD_SUN_MAPS) if hard and name == "relighting map, k = 25" else ""
         figures = (f"{half.bytes_per_texel:.0f}", f"{half.psnr:.2f}", f"{byte.bytes_per_texel:.0f}", f"{byte.psnr:.2f}")
         loss = bars.loss(exact.psnr - byte.psnr)
-        row(name, scalars_of(method), f"{exact.psnr:.2f}", *figures, loss, f"{half.seconds:.1f}", bar)
+        row(name, components_of(method), f"{exact.psnr:.2f}", *figures, loss, f"{half.seconds:.1f}", bar)
     for name in (NEAREST, ALL):
         size = f"{images[name].bytes_per_texel:.0f}"
         row(name, 3 * train, f"{images[name].psnr:.2f}", size, "", "", "", "", "", "")
@@ -251,7 +251,7 @@ def dome_table(root: Path, domes: Sequence[Path], bars: Bars) -> None:
             mean, rounded = groups[group].of(name, "float"), groups[group].of(name, "uint8")
             bar = bars.at_least(mean, wanted[name][place]) if name in wanted else ""
             cells += [f"{mean:.2f}", f"{rounded:.2f}", bars.loss(mean - rounded), bar]
-        row(name, scalars_of(method), *cells)
+        row(name, components_of(method), *cells)
     for name in (NEAREST, ALL):
         cells = [text for group in order for text in (f"{groups[group].of(name, 'float'):.2f}", "", "", "")]
         row(name, "/".join(str(3 * a) for a, _ in sorted(lights)), *cells)
@@ -283,7 +283,7 @@ def left_out_table(items: Sequence[tuple[str, Capture | Path]], most: int | None
         exact, byte = means.of(name, "float"), means.of(name, "uint8")
         bar = bars.at_least(exact, LEFT_OUT_MAPS) if whole and name == "relighting map, k = 25" else ""
         each = (f"{value:.2f}" for value in means.values[name, "float"])
-        row(name, scalars_of(method), *each, f"{exact:.2f}", f"{byte:.2f}", bars.loss(exact - byte), bar)
+        row(name, components_of(method), *each, f"{exact:.2f}", f"{byte:.2f}", bars.loss(exact - byte), bar)
     if whole:
         print(f"\nBest: {bars.at_least(max(means.of(name, 'float') for name in LEFT_OUT_METHODS), LEFT_OUT_BEST)}")
     for names in (list(eigen(9, 27, 48)), list(PAPER)):
@@ -314,7 +314,7 @@ class imported:
 def smooth_capture(folder: Path, quantity: Quantity, lights: int = 300, unseen: int = 60, side: int = 96) -> Capture:
     """A bumpy floor under three balls whose shadows have penumbrae of half a radian; unseen lights uniform on the hemisphere.
 
-    Its colours vary from texel to texel: they are in its radiance, of which joint-colour planes need the more, not in its irradiance.
+    Its colors vary from texel to texel: they are in its radiance, of which joint-color planes need the more, not in its irradiance.
     """
     (folder / "lights").mkdir(parents=True)
     rng = np.random.default_rng(0)
@@ -345,9 +345,9 @@ def smooth_capture(folder: Path, quantity: Quantity, lights: int = 300, unseen: 
 _BALLS = (((0.3, 0.2, 0.5), 0.2), ((-0.4, 0.3, 0.4), 0.15), ((0.0, -0.5, 0.6), 0.25))
 
 
-def _seen_ball(x: np.ndarray, y: np.ndarray, z: np.ndarray, centre: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+def _seen_ball(x: np.ndarray, y: np.ndarray, z: np.ndarray, center: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors from points to a ball, and its angular radius (rad) as they see it."""
-    towards = np.stack([centre[0] - x, centre[1] - y, centre[2] - z], axis=2)
+    towards = np.stack([center[0] - x, center[1] - y, center[2] - z], axis=2)
     distance = np.linalg.norm(towards, axis=2)
     return towards / distance[:, :, None], np.arcsin(np.clip(radius / distance, 0, 1))
 

@@ -26,9 +26,9 @@ from srbf.gl.context import Limits, compile_program, create_context
 from srbf.gl.includes import resolve, resolve_text
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
-from srbf.gl.uniforms import packed_lamps, padded
+from srbf.gl.uniforms import packed_point_lights, padded
 from srbf.lights import DirectionalLight, Light, PointLight
-from srbf.methods import folded_weights
+from srbf.methods import projected_weights
 from srbf.relighting.relighter import PASSES
 from srbf.sphere import point_set
 
@@ -43,7 +43,7 @@ METHODS: dict[str, dict[str, int]] = {
 }
 BARE = "bare sum of 25 layers"
 SUN: list[Light] = [DirectionalLight((0.3, 0.2, 0.9), (1.0, 0.9, 0.7))]
-LAMPS = [PointLight((0.2 + 0.05 * i, 0.1 - 0.07 * i, 0.7), (0.9, 1.0, 0.8)) for i in range(16)]
+POINT_LIGHTS = [PointLight((0.2 + 0.05 * i, 0.1 - 0.07 * i, 0.7), (0.9, 1.0, 0.8)) for i in range(16)]
 Clock = Callable[[], float]
 PATCH = 16  # texels a side of a patch that is all one cluster
 SCREEN = (1920, 1080)
@@ -110,15 +110,15 @@ class Bench:
             textures.layers()
             if context.error == "GL_OUT_OF_MEMORY":
                 raise SystemExit(f"expected room for the layers of {name} at {side} x {side}, found none on this device; use fewer --sides")
-            weights = folded_weights(asset, SUN)
+            weights = projected_weights(asset, SUN)
             for by_formula in (False, True) if formula and name == MAPS else (False,):
                 passes = PASSES[asset.method](asset, programs, textures, limits, by_formula)
                 shown = f"{name}, formula" if by_formula else name
                 if not by_formula:
                     self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.far(weights, None)
                 for count in counts:
-                    self.draws[shown, f"{count} lamps"] = lambda passes=passes, none=0 * weights, count=count: passes.lamps(
-                        LAMPS[:count], none, None
+                    self.draws[shown, f"{count} lamps"] = lambda passes=passes, none=0 * weights, count=count: passes.point_lights(
+                        POINT_LIGHTS[:count], none, None
                     )
             if name == MAPS:
                 self.draws[BARE, "directional"] = self._bare(textures)
@@ -187,7 +187,7 @@ def host_times(assets: dict[str, Asset], runs: int) -> dict[str, float]:
 
     def fold(asset: Asset) -> float:
         started = time.perf_counter()
-        folded_weights(asset, SUN)
+        projected_weights(asset, SUN)
         return time.perf_counter() - started
 
     return medians({name: lambda asset=asset: fold(asset) for name, asset in assets.items()}, runs)
@@ -250,13 +250,15 @@ def _surface(context: Any, asset: Asset, textures: AssetTextures, corners: Any, 
     maps = asset.method == "relighting-map"
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
     places = max(count, 1)
-    defines = {"SRBF_LAMPS": places, "SRBF_PLAIN": 1} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_SCALARS": asset.scalars})
+    defines = {"SRBF_POINT_LIGHTS": places, "SRBF_PLAIN": 1} | (
+        {"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars}
+    )
     program = compile_program(context, resolve("stages/lightmap.vert"), resolve(f"stages/{stage}", defines=defines))
     drawn = context.vertex_array(program, [(corners, "3f 2f", "position", "lightmapUv")])
-    weights = folded_weights(asset, SUN)
+    weights = projected_weights(asset, SUN)
     layers = textures.layers()
     used = {"maps" if maps else "planes": layers, "ambient": textures.ambient()}
-    arrays = {"lamps": packed_lamps(LAMPS[:count], places)}
+    arrays = {"pointLights": packed_point_lights(POINT_LIGHTS[:count], places)}
     if maps:
         layers.filter = (context.LINEAR, context.LINEAR)
         used["rTable"] = textures.r_pairs()
@@ -274,7 +276,7 @@ def _surface(context: Any, asset: Asset, textures: AssetTextures, corners: Any, 
     for name, array in arrays.items():
         if name in program:
             program[name].write(np.ascontiguousarray(array, np.float32))
-    program["lampCount"].value = count
+    program["pointLightCount"].value = count
 
     def draw() -> None:
         for unit, (name, texture) in enumerate(used.items()):
@@ -290,7 +292,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sides", type=int, nargs="+", default=[1024])
     parser.add_argument("--runs", type=int, default=15)
-    parser.add_argument("--lamps", type=int, nargs="*", default=[1, 4, 16], help="how many at once, 16 at most")
+    parser.add_argument("--point-lights", type=int, nargs="*", default=[1, 4, 16], help="how many at once, 16 at most")
     parser.add_argument("--formula", action="store_true", help="lamps by formula too: which is faster is for a GPU to say")
     parser.add_argument("--screen", action="store_true", help="frames a second at 1920 x 1080 too")
     parser.add_argument("--busy", action="store_true", help="a software renderer's processor time, where others use the machine too")
@@ -300,9 +302,9 @@ def main() -> None:
     copied = copy_rate(context, arguments.runs)
     print(f"{context.info['GL_RENDERER']}; ms and times the bare shader, medians of {arguments.runs}; copying moves {copied:.1f} GB/s")
     for side in arguments.sides:
-        table(context, side, arguments.runs, arguments.lamps, arguments.formula, clock, copied)
+        table(context, side, arguments.runs, arguments.point_lights, arguments.formula, clock, copied)
     if arguments.screen:
-        screen(context, arguments.runs, arguments.lamps)
+        screen(context, arguments.runs, arguments.point_lights)
     context.release()
 
 

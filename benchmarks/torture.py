@@ -28,7 +28,7 @@ from faults import Lab, LostError, Strike, contents, fake_lab, wait_for_orphans
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "data" / "scenes"
-HANG_AFTER = "2"  # seconds; an answer of the fake takes a thousandth
+WORKER_TIMEOUT = "2"  # seconds; an answer of the fake takes a thousandth
 Trials = Iterator[Callable[[], object]]
 KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-sums"), ("--samples", "auto"))
 DAMAGES = ("cut", "emptied", "flipped", "zeroed", "removed")
@@ -53,7 +53,7 @@ class Labs:
             folder = self._folder / "real"
             folder.mkdir()
             scene = folder / "scene.blend"
-            line = [sys.executable, str(SCENES / "known_answers.py"), "occluder", str(scene)]
+            line = [sys.executable, str(SCENES / "closed_form_scenes.py"), "occluder", str(scene)]
             subprocess.run(line, check=True, capture_output=True, timeout=120)
             lab = self._made["bpy",] = Lab(folder, scene)
             lab.measure()
@@ -309,7 +309,7 @@ def _once(labs: Labs, rng: np.random.Generator, kind: str) -> Trials:
         state.unlink(missing_ok=True)
         folder = lab.fresh()
         fault = {"SRBF_FAULT": f"{kind}:{light}", "SRBF_FAULT_STATE": str(state), "SRBF_UNCONFINED": "1"}
-        lab.succeed(lab.run(folder, "--hang-after", HANG_AFTER, **fault))
+        lab.succeed(lab.run(folder, "--worker-timeout", WORKER_TIMEOUT, **fault))
         if not state.exists():
             raise LostError("the fault never struck")
         compare_again(lab, folder)
@@ -324,7 +324,7 @@ def deadly_lights(labs: Labs, rng: np.random.Generator) -> Trials:
     def trial(kind: str, light: int) -> None:
         lab = labs.fake()
         folder = lab.fresh()
-        ended = lab.run(folder, "--hang-after", HANG_AFTER, SRBF_FAULT=f"{kind}:{light}")
+        ended = lab.run(folder, "--worker-timeout", WORKER_TIMEOUT, SRBF_FAULT=f"{kind}:{light}")
         lab.refuse(ended, f"light {light}")
         kept = {name: data for name, data in contents(folder).items() if name.startswith("lights/")}
         whole = {name: data for name, data in lab.whole.items() if name.startswith("lights/") and name != f"lights/{light:04d}.exr"}
@@ -342,7 +342,7 @@ def lying_workers(labs: Labs, rng: np.random.Generator) -> Trials:
     def trial(kind: str, light: int) -> None:
         lab = labs.fake()
         folder = lab.fresh()
-        ended = lab.run(folder, "--hang-after", HANG_AFTER, SRBF_FAULT=f"{kind}:{light}")
+        ended = lab.run(folder, "--worker-timeout", WORKER_TIMEOUT, SRBF_FAULT=f"{kind}:{light}")
         if kind == "garbage":
             lab.succeed(ended)
         else:

@@ -45,7 +45,8 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     """Open the scene, prepare the receiver, hand over what `job` asks for, say that it is ready, then answer `lights` as they come.
 
     job: scene, scene_name (null: the active one), receiver {kind, object | objects, uv_layer, unwrap | camera}, no_shadow (names of
-    objects), width, height, quantity, keep_lamps, sun_angle, scratch, geometry (bool), ambient {samples, seed} or null; `serve` where
+    objects), width, height, quantity, keep_scene_lights, sun_angle, scratch, geometry (bool), ambient {samples, seed} or
+    null; `serve` where
     lights are asked for on stdin, after those in the job. A light: index, kind, direction | position, samples, seed, denoise (bool).
     Where `transport` is indirect, also the scene's triangles, and the direct diffuse light beside every answer; `probes` are the lights
     by which the tints of translucent materials are chosen, unless `tints` has them already. A job with `survey` gets what that asks for,
@@ -64,10 +65,10 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     frame = Frame.of(scene)
     scenes.configure(scene)
     if "survey" in job:
-        channel.emit("survey", **survey.answer(scene, job, channel, frame))
+        channel.emit("survey", **survey.response(scene, job, channel, frame))
         return
     if "mesh" in job:
-        channel.emit("mesh", **scene_mesh.answer(scene, job))
+        channel.emit("mesh", **scene_mesh.response(scene, job))
         return
     is_view = job["receiver"]["kind"] == "view"
     left_out = [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if is_view else ())]
@@ -88,17 +89,17 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
     if job["geometry"]:
         for name, array in receiver.geometry().items():
             image(name, array, time.perf_counter())
-    ambient = job["ambient"] if job["keep_lamps"] or emission.may_shine() else None
+    ambient = job["ambient"] if job["keep_scene_lights"] or emission.may_shine() else None
     started = time.perf_counter()
     if ambient:
-        if job["keep_lamps"]:
+        if job["keep_scene_lights"]:
             own_light.restore()
-        image("ambient", receiver.answer(ambient["samples"], ambient["seed"]), started)
+        image("ambient", receiver.response(ambient["samples"], ambient["seed"]), started)
         own_light.off()
     emission.switch_off()
     if ambient:
         started = time.perf_counter()
-        image("left", receiver.answer(ambient["samples"], ambient["seed"]), started)
+        image("left", receiver.response(ambient["samples"], ambient["seed"]), started)
     illuminant = Illuminant(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
     switch = None
     if apart:
@@ -126,10 +127,10 @@ def run(job: dict[str, Any], lights: Iterable[dict[str, Any]], channel: Channel)
         illuminant.aim(light)
         name = f"light_{light['index']}"
         if switch is None:
-            answer = receiver.answer(light["samples"], light["seed"])
-            image(name, receiver.denoised(answer) if light.get("denoise") else answer, started, light=light["index"])
+            response = receiver.response(light["samples"], light["seed"])
+            image(name, receiver.denoised(response) if light.get("denoise") else response, started, light=light["index"])
             continue
-        whole, direct = receiver.answers(light["samples"], light["seed"], switch)
+        whole, direct = receiver.responses(light["samples"], light["seed"], switch)
         image(name, whole, started, light=light["index"], direct=hand_over(scratch, f"direct_{light['index']}", direct))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sole illuminant of a light image: a sun of unit irradiance, or a point lamp of unit irradiance at one metre."""
+"""The sole illuminant of a light image: a sun of unit irradiance, or a point lamp of unit irradiance at one meter."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
-POINT_WATTS = 4 * math.pi  # a lamp of P watts gives the irradiance P / (4 pi d^2) at d metres
+POINT_WATTS = 4 * math.pi  # a lamp of P watts gives the irradiance P / (4 pi d^2) at d meters
 
 
 class Illuminant:
     """A sun and a point lamp of ours, one of them lit at a time."""
 
     def __init__(self, scene: bpy.types.Scene, sun_angle: float, by_shadow_rays_alone: bool = False) -> None:
-        self._sun = _lamp(scene, "SUN")
+        self._sun = _point_light(scene, "SUN")
         self._sun.data.angle = sun_angle
         if by_shadow_rays_alone:  # bounced rays may not reach it, and must then not be counted on
             self._sun.data.cycles.use_multiple_importance_sampling = False
-        self._point = _lamp(scene, "POINT")
+        self._point = _point_light(scene, "POINT")
         self._point.data.shadow_soft_size = 0.0
 
     def aim(self, light: dict[str, Any]) -> None:
@@ -35,10 +35,10 @@ class Illuminant:
             self._point.location = light["position"]
 
 
-def _lamp(scene: bpy.types.Scene, kind: str) -> bpy.types.Object:
+def _point_light(scene: bpy.types.Scene, kind: str) -> bpy.types.Object:
     data = bpy.data.lights.new(f"srbf {kind.lower()}", kind)
     data.energy = 0.0
-    lamp = bpy.data.objects.new(data.name, data)
-    lamp.rotation_mode = "QUATERNION"
-    scene.collection.objects.link(lamp)
-    return lamp
+    point_light = bpy.data.objects.new(data.name, data)
+    point_light.rotation_mode = "QUATERNION"
+    scene.collection.objects.link(point_light)
+    return point_light

@@ -77,7 +77,7 @@ class LightmapReceiver:
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
     def geometry(self) -> dict[str, np.ndarray]:
-        """World position at texel centres, world normal, albedo and coverage; (1, E, 8) `seams` where the layers have any."""
+        """World position at texel centers, world normal, albedo and coverage; (1, E, 8) `seams` where the layers have any."""
         position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample lies at the texel's center
         encoded = self._bake("NORMAL", self._objects, 1, 0, normal_space="OBJECT")[:, :, :3]
         of_object = 2 * (encoded - NORMAL_OFFSET) - 1
@@ -98,16 +98,16 @@ class LightmapReceiver:
             **({"seams": seams[None]} if len(seams) else {}),
         }
 
-    def answer(self, samples: int, seed: int) -> np.ndarray:
-        """Irradiance E = pi x Cycles' DIFFUSE without colour, or radiance seen from straight above each texel."""
+    def response(self, samples: int, seed: int) -> np.ndarray:
+        """Irradiance E = pi x Cycles' DIFFUSE without color, or radiance seen from straight above each texel."""
         if self._irradiance:
             return self._light("DIFFUSE", samples, seed, {"DIRECT", "INDIRECT"}) * np.float32(math.pi)
         every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
         return self._light("COMBINED", samples, seed, every)
 
-    def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
+    def responses(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
         """(`answer`, the direct diffuse light in it with `translucent` on): same seed, so that one is exactly part of the other."""
-        whole = self.answer(samples, seed)
+        whole = self.response(samples, seed)
         translucent.on()
         part = self.direct(samples, seed)
         translucent.off()

@@ -11,7 +11,7 @@ import numpy as np
 
 from blender_bake.node_values import Place, color, number, source, value
 
-GREY = (0.8, 0.8, 0.8)  # what Cycles shows where there is no material, and Blender's own base colour
+GRAY = (0.8, 0.8, 0.8)  # what Cycles shows where there is no material, and Blender's own base color
 IOR = 1.5
 GLOSSY = {"BSDF_GLOSSY", "BSDF_ANISOTROPIC", "BSDF_METALLIC"}
 GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
@@ -19,15 +19,15 @@ GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
 
 @dataclass(frozen=True)
 class Look:
-    """One surface: colours linear Rec.709, roughness as Blender and glTF have it (the square root of the microfacets' width).
+    """One surface: colors linear Rec.709, roughness as Blender and glTF have it (the square root of the microfacets' width).
 
     `specular` scales the reflection of what is no metal, 0 to 1. `inside` is what light takes on on its way through a solid body, beside
-    the base colour: a Glass BSDF tints it at both walls. `emission` is radiance. `varies`: the base colour is but a guess at a network of
+    the base color: a Glass BSDF tints it at both walls. `emission` is radiance. `varies`: the base color is but a guess at a network of
     textures, which only a bake of the diffuse albedo tells at each point.
     """
 
     name: str
-    base_color: tuple[float, ...] = GREY
+    base_color: tuple[float, ...] = GRAY
     metallic: float = 0.0
     roughness: float = 1.0
     specular: float = 1.0
@@ -118,7 +118,7 @@ def _of_shader(name: str, shader: Place) -> Look:
         return next((place for place in map(shader.input, names) if place is not None), None)
 
     base = socket("Base Color", "Color")
-    look = Look(name, _triple(color(base, GREY)), specular=0.0, varies=base is not None and value(base) is None)
+    look = Look(name, _triple(color(base, GRAY)), specular=0.0, varies=base is not None and value(base) is None)
     roughness = number(socket("Roughness"), 1.0)
     if kind == "BSDF_PRINCIPLED":
         shines = color(socket("Emission Color", "Emission"), (0, 0, 0)) * number(socket("Emission Strength"), 0.0)
@@ -140,7 +140,7 @@ def _of_shader(name: str, shader: Place) -> Look:
     if kind == "BSDF_TRANSPARENT":
         return replace(look, roughness=0.0, ior=1.0, transmission=1.0)
     if kind == "EMISSION":
-        shines = color(base, GREY) * number(socket("Strength"), 1.0)
+        shines = color(base, GRAY) * number(socket("Strength"), 1.0)
         return replace(look, base_color=(0.0, 0.0, 0.0), emission=tuple(float(max(c, 0.0)) for c in shines), varies=False)
     return look
 

@@ -9,7 +9,7 @@ import bpy
 def bakeable_slots(obj: bpy.types.Object, image: bpy.types.Image) -> None:
     """Give every slot of `obj` a material of its own with `image` as the active node, which is where a bake goes.
 
-    Copies leave other objects that share a material alone. An empty slot becomes what Cycles shows for it: 80 % grey.
+    Copies leave other objects that share a material alone. An empty slot becomes what Cycles shows for it: 80 % gray.
     """
     if not obj.material_slots:
         obj.data.materials.append(None)

@@ -75,19 +75,19 @@ def value(place: Place | None) -> np.ndarray | None:
 
 
 def number(place: Place | None, otherwise: float) -> float:
-    """The value as a number; of what varies the mean of its colour ramp, else what the socket holds itself, else `otherwise`."""
+    """The value as a number; of what varies the mean of its color ramp, else what the socket holds itself, else `otherwise`."""
     found = guess(place)
     return otherwise if found is None else float(found.mean())
 
 
 def color(place: Place | None, otherwise: tuple[float, float, float]) -> np.ndarray:
-    """(3,) the value as a linear colour, guessed as a `number` is."""
+    """(3,) the value as a linear color, guessed as a `number` is."""
     found = guess(place)
     return np.array(otherwise if found is None else np.broadcast_to(found, 3), np.float64)
 
 
 def guess(place: Place | None) -> np.ndarray | None:
-    """`value`, or for what varies the mean of the colour ramp behind it, or what the socket would hold unlinked."""
+    """`value`, or for what varies the mean of the color ramp behind it, or what the socket would hold unlinked."""
     found = value(place)
     if found is not None or place is None:
         return found
@@ -131,7 +131,7 @@ def _calculated(output: Place) -> np.ndarray | None:
 
 
 def _mixed(output: Place) -> np.ndarray | None:
-    """Of a plain mix of known colours or numbers."""
+    """Of a plain mix of known colors or numbers."""
     if output.node.blend_type != "MIX" and getattr(output.node, "data_type", "RGBA") == "RGBA":
         return None
     inputs = [Place(socket, output.groups) for socket in output.node.inputs if socket.enabled]
@@ -145,7 +145,7 @@ def _mixed(output: Place) -> np.ndarray | None:
 
 
 def _ramp_behind(place: Place) -> bpy.types.ColorRamp | None:
-    """The nearest colour ramp that feeds a socket, through whatever changes its colours."""
+    """The nearest color ramp that feeds a socket, through whatever changes its colors."""
     seen: set[tuple[bpy.types.Node, ...]] = set()
     waiting = [place]
     while waiting:

@@ -41,7 +41,7 @@ class Solid:
 
 
 def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
-    """{box, grid, random, skipped}: free points `asked["spacing"]` metres apart in `asked["box"]`, and `asked["random"]` free random ones.
+    """{box, grid, random, skipped}: free points `asked["spacing"]` meters apart in `asked["box"]`, and `asked["random"]` free random ones.
 
     The box is by default that of all that is rendered. The grid stands in its middle, half a spacing or more from its sides. WorkerError
     where no point is free.

@@ -47,8 +47,8 @@ def _reach(obj: bpy.types.Object) -> float:
     return float(np.abs(points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]).max())
 
 
-def _length(metres: float) -> str:
+def _length(meters: float) -> str:
     for size, unit in ((1e3, "km"), (1, "m"), (1e-3, "mm")):
-        if metres >= size:
-            return f"{metres / size:,.0f} {unit}" if metres >= 100 * size else f"{metres / size:.3g} {unit}"
-    return f"{metres:.2g} m"
+        if meters >= size:
+            return f"{meters / size:,.0f} {unit}" if meters >= 100 * size else f"{meters / size:.3g} {unit}"
+    return f"{meters:.2g} m"

@@ -186,7 +186,7 @@ def select(objects: list[bpy.types.Object]) -> None:
 
 
 def world_area(obj: bpy.types.Object) -> float:
-    """Area of the object's triangles in the world, square metres."""
+    """Area of the object's triangles in the world, square meters."""
     mesh = obj.data
     mesh.calc_loop_triangles()
     vertices = np.empty(len(mesh.loop_triangles) * 3, np.int32)

@@ -52,7 +52,7 @@ def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.type
         channel.warn(missing)
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
     if space != WORKING_SPACE:
-        raise WorkerError(f"expected the working colour space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")
+        raise WorkerError(f"expected the working color space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")
     leave_modes()
     return _chosen(name)
 
@@ -164,15 +164,15 @@ def configure(scene: bpy.types.Scene) -> None:
 
 
 class OwnLight:
-    """The scene's own lamps and world, switched off when this is made, and on again for `--keep-lamps`."""
+    """The scene's own lamps and world, switched off when this is made, and on again for `--keep-scene-lights`."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene
         self._world = scene.world
         self._black = black_world()
         self._overrides = [(layer, layer.world_override) for layer in scene.view_layers if hasattr(layer, "world_override")]
-        self._lamps = [(data, data.energy) for data in bpy.data.lights]
-        for data, _ in self._lamps:
+        self._point_lights = [(data, data.energy) for data in bpy.data.lights]
+        for data, _ in self._point_lights:
             data.animation_data_clear()
         self.off()
 
@@ -181,7 +181,7 @@ class OwnLight:
         self._scene.world = self._black
         for layer, _ in self._overrides:
             layer.world_override = None
-        for data, _ in self._lamps:
+        for data, _ in self._point_lights:
             data.energy = 0.0
 
     def restore(self) -> None:
@@ -189,7 +189,7 @@ class OwnLight:
         self._scene.world = self._world
         for layer, world in self._overrides:
             layer.world_override = world
-        for data, energy in self._lamps:
+        for data, energy in self._point_lights:
             data.energy = energy
 
 

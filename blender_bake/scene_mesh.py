@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene as it is rendered, for a glTF of it: triangles with their UVs and colours by object and material, looks, the camera."""
+"""The scene as it is rendered, for a glTF of it: triangles with their UVs and colors by object and material, looks, the camera."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from blender_bake.vertex_albedo import AlbedoBakes
 SHORTEST = 1e-12
 
 
-def answer(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
+def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
     """What `job["mesh"]` asks for: `parts`, `looks` and `camera`.
 
     mesh.receivers: those of a capture, {object, uv_layer, per_loop: a file of (loops, 2) coordinates where the bake made the layer}
@@ -60,7 +60,7 @@ def answer(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """An object's triangles of one look: values at the corners by column, the loops of these, and which bake has their colours."""
+    """An object's triangles of one look: values at the corners by column, the loops of these, and which bake has their colors."""
 
     object: str
     look: Look

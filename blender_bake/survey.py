@@ -16,12 +16,12 @@ from blender_bake.receiver_objects import meshes_of, prepare, world_area
 ROUNDS = 4  # a layer's gutter shrinks as its size grows: so often is one laid out for the size that the one before it asked for
 
 
-def answer(scene: bpy.types.Scene, job: dict[str, Any], channel: Channel, frame: Frame) -> dict[str, Any]:
+def response(scene: bpy.types.Scene, job: dict[str, Any], channel: Channel, frame: Frame) -> dict[str, Any]:
     """The facts that `job["survey"]` asks for.
 
     collections: names            -> `objects`: the receivers in them, in order of name
     vertices: true                -> `width`, `height`: of the image that lists the receiver's vertices
-    texels_per_metre: density D   -> `side`: texels a side, D sqrt(area in the world / area of the UV layer), not rounded; and both areas
+    texels_per_meter: density D   -> `side`: texels a side, D sqrt(area in the world / area of the UV layer), not rounded; and both areas
     frame: true                   -> `frame`: the aspect of the camera's picture in the scene's own render settings, see `Frame.record`
     points: {spacing, box, random, seed} -> `points`: where lamps may stand, see `point_grid.survey`
     """
@@ -32,8 +32,8 @@ def answer(scene: bpy.types.Scene, job: dict[str, Any], channel: Channel, frame:
     if asked.get("vertices"):
         counts = [len(obj.data.vertices) for obj in prepare(scene, [job["receiver"]["object"]])]
         facts["width"], facts["height"] = vertices.image_size(sum(counts))
-    if asked.get("texels_per_metre"):
-        facts |= _size_by_density(scene, job, asked["texels_per_metre"], channel)
+    if asked.get("texels_per_meter"):
+        facts |= _size_by_density(scene, job, asked["texels_per_meter"], channel)
     if asked.get("frame"):
         facts["frame"] = frame.record()
     if asked.get("points"):

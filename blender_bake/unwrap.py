@@ -278,7 +278,7 @@ def slot_maximum(obj: bpy.types.Object, layer: str, image: np.ndarray) -> dict[i
 
 
 def _cells(triangle: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """(rows from the bottom, columns) of the grid cells whose centres lie in a (3, 2) UV triangle."""
+    """(rows from the bottom, columns) of the grid cells whose centers lie in a (3, 2) UV triangle."""
     scaled = triangle * np.array([width, height]) - 0.5
     low = np.maximum(np.ceil(scaled.min(axis=0)), 0).astype(int)
     high = np.minimum(np.floor(scaled.max(axis=0)), [width - 1, height - 1]).astype(int)

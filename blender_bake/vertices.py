@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A vertex receiver: the vertices of a mesh object, baked by Cycles into a colour attribute, as a list of points."""
+"""A vertex receiver: the vertices of a mesh object, baked by Cycles into a color attribute, as a list of points."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ class VertexReceiver:
             "hit": coverage,
         }
 
-    def answer(self, samples: int, seed: int) -> np.ndarray:
-        """Irradiance E = pi x Cycles' DIFFUSE without colour, or radiance seen from straight above each face."""
+    def response(self, samples: int, seed: int) -> np.ndarray:
+        """Irradiance E = pi x Cycles' DIFFUSE without color, or radiance seen from straight above each face."""
         if self._irradiance:
             corners = self._bake("DIFFUSE", samples, seed, pass_filter={"DIRECT", "INDIRECT"}) * np.float32(math.pi)
         else:
@@ -121,7 +121,7 @@ class VertexReceiver:
         return image.reshape(self._height, self._width, -1)
 
     def _bake(self, kind: str, samples: int, seed: int, **options: Any) -> np.ndarray:
-        """(C, 3) colours of the corners."""
+        """(C, 3) colors of the corners."""
         self._scene.cycles.samples = samples
         self._scene.cycles.seed = seed
         try:

@@ -16,7 +16,7 @@ from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
 from blender_bake.translucency import Switch
 
-GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the centre that its position reprojects onto it
+GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the center that its position reprojects onto it
 NOT_DIFFUSE = 1e-3
 LIGHT_PASSES = ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
 
@@ -78,23 +78,23 @@ class ViewReceiver:
         }
 
     def geometry(self) -> dict[str, np.ndarray]:
-        """World position and normal at pixel centres, with `hit` where there is one; albedo and coverage over the whole pixel."""
+        """World position and normal at pixel centers, with `hit` where there is one; albedo and coverage over the whole pixel."""
         cycles = self._scene.cycles
         filter_type, filter_width = cycles.pixel_filter_type, cycles.filter_width
         lens = self._camera.data.dof
         blurred = lens.use_dof
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
-        centre = self._render(1, 0, ("Combined", "Position", "Normal"), spread=False)
+        center = self._render(1, 0, ("Combined", "Position", "Normal"), spread=False)
         cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
         self._measure_coverage()
-        hit = (centre["Combined"][:, :, 3:] > 0).astype(np.float32)
+        hit = (center["Combined"][:, :, 3:] > 0).astype(np.float32)
         coverage = self._coverage
-        normal = centre["Normal"] / np.maximum(np.linalg.norm(centre["Normal"], axis=2, keepdims=True), 1e-20)
+        normal = center["Normal"] / np.maximum(np.linalg.norm(center["Normal"], axis=2, keepdims=True), 1e-20)
         albedo = self._diffuse / np.where(coverage > 0, coverage, 1)
         self._guides = (albedo, normal * hit)
-        precision.warn_of_pixels(centre["Position"], hit, self._channel)
+        precision.warn_of_pixels(center["Position"], hit, self._channel)
         return {
-            "position": centre["Position"] * hit,
+            "position": center["Position"] * hit,
             "normal": normal * hit,
             "albedo": albedo,
             "coverage": coverage,
@@ -102,8 +102,8 @@ class ViewReceiver:
             "hit": hit,
         }
 
-    def answer(self, samples: int, seed: int) -> np.ndarray:
-        """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without colour).
+    def response(self, samples: int, seed: int) -> np.ndarray:
+        """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without color).
 
         Coverage and color are of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
         """
@@ -123,9 +123,9 @@ class ViewReceiver:
             self._denoiser = Denoiser(self._scratch, *self._guides)
         return self._denoiser.denoise(image) * (self._coverage > 0)
 
-    def answers(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
+    def responses(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
         """(`answer`, the direct diffuse light in it with `translucent` on): of one render where nothing is translucent, else of two."""
-        whole = self.answer(samples, seed)
+        whole = self.response(samples, seed)
         if not translucent:
             return whole, self._direct_of(self._last)
         translucent.on()

@@ -19,19 +19,21 @@ class Sun:
 
 
 @dataclass(frozen=True)
-class Lamp:
+class PointLight:
     """A point lamp; `color` is its irradiance at the distance a0."""
 
     position: tuple[float, float, float]
     color: tuple[float, float, float]
 
 
-def lights_of(scene: bpy.types.Scene, a0: float, depsgraph: bpy.types.Depsgraph | None = None) -> tuple[list[Sun], list[Lamp], list[str]]:
+def lights_of(
+    scene: bpy.types.Scene, a0: float, depsgraph: bpy.types.Depsgraph | None = None
+) -> tuple[list[Sun], list[PointLight], list[str]]:
     """(suns, points, names of lamps of other kinds, which are not shown) of what a render of the scene would light by.
 
-    A sun of strength 1 has unit irradiance; a point of P watts has P / (4 pi a0^2) at a0 metres.
+    A sun of strength 1 has unit irradiance; a point of P watts has P / (4 pi a0^2) at a0 meters.
     """
-    suns, lamps, others = [], [], []
+    suns, point_lights, others = [], [], []
     for obj in sorted((o for o in scene.objects if o.type == "LIGHT" and not o.hide_render), key=lambda o: o.name):
         evaluated = obj if depsgraph is None else obj.evaluated_get(depsgraph)
         light, matrix = evaluated.data, np.array(evaluated.matrix_world)
@@ -39,14 +41,14 @@ def lights_of(scene: bpy.types.Scene, a0: float, depsgraph: bpy.types.Depsgraph 
             axis = matrix[:3, 2]
             suns.append(Sun(_triple(axis / np.linalg.norm(axis)), _color(light, 1.0)))
         elif light.type == "POINT":
-            lamps.append(Lamp(_triple(matrix[:3, 3]), _color(light, 1 / (4 * math.pi * a0**2))))
+            point_lights.append(PointLight(_triple(matrix[:3, 3]), _color(light, 1 / (4 * math.pi * a0**2))))
         else:
             others.append(obj.name)
-    return suns, lamps, others
+    return suns, point_lights, others
 
 
 def _color(light: bpy.types.Light, scale: float) -> tuple[float, float, float]:
-    """Colour times power, and what later Blenders multiply by: exposure (stops) and the colour of a temperature."""
+    """Color times power, and what later Blenders multiply by: exposure (stops) and the color of a temperature."""
     color = np.array(light.color) * light.energy * 2.0 ** getattr(light, "exposure", 0.0) * scale
     if getattr(light, "use_temperature", False):
         color *= np.array(light.temperature_color)

@@ -13,13 +13,13 @@ import bpy
 import numpy as np
 
 from .asset import AssetError, RelightingMaps
-from .lights import Lamp, Sun
+from .lights import PointLight, Sun
 
 Layout = Literal["IMAGES", "ATLAS"]
 Falloff = Literal["LINEAR", "INVERSE_SQUARE"]
 
-RADIUS = 1e-4  # metres: a receiver no nearer to a lamp than this, as the library has it
-LAMP_SOCKETS = {"Position": "NodeSocketVector", "Color": "NodeSocketVector", "a0": "NodeSocketFloat", "Power": "NodeSocketFloat"}
+RADIUS = 1e-4  # meters: a receiver no nearer to a lamp than this, as the library has it
+POINT_LIGHT_SOCKETS = {"Position": "NodeSocketVector", "Color": "NodeSocketVector", "a0": "NodeSocketFloat", "Power": "NodeSocketFloat"}
 WIDTH, HEIGHT = 180, 160  # of a node's place on the sheet
 
 
@@ -62,16 +62,19 @@ class Sheet:
             socket.default_value = value
 
 
-def build(maps: RelightingMaps, name: str, lamps: int, uv_layer: str, layout: Layout) -> bpy.types.NodeTree:
+def build(maps: RelightingMaps, name: str, point_lights: int, uv_layer: str, layout: Layout) -> bpy.types.NodeTree:
     """A group `name` with one output, Color: the asset under far lights, whose weights `set_lights` writes, and `lamps` point lamps."""
     tree = _empty_tree(name)
     tree.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketVector")
     sheet = Sheet(tree)
     coordinates = sheet.node("ShaderNodeUVMap", 0, 0, uv_map=uv_layer).outputs["UV"]
     groups = []
-    if lamps:
-        lamp_tree = _lamp_tree(maps, f"{name} lamp")
-        groups = [sheet.node("ShaderNodeGroup", 0, 2 + lamp, f"lamp {lamp}", node_tree=lamp_tree) for lamp in range(lamps)]
+    if point_lights:
+        point_light_tree = _point_light_tree(maps, f"{name} lamp")
+        groups = [
+            sheet.node("ShaderNodeGroup", 0, 2 + point_light, f"lamp {point_light}", node_tree=point_light_tree)
+            for point_light in range(point_lights)
+        ]
     textures = _images(sheet, maps, coordinates) if layout == "IMAGES" else _atlas(sheet, maps, coordinates, name)
     total: Any = (0.0, 0.0, 0.0)
     for i, texture in enumerate(textures):
@@ -89,22 +92,24 @@ def build(maps: RelightingMaps, name: str, lamps: int, uv_layer: str, layout: La
     return tree
 
 
-def set_lights(tree: bpy.types.NodeTree, maps: RelightingMaps, suns: list[Sun], lamps: list[Lamp], a0: float, falloff: Falloff) -> None:
-    """Write the k weights of all suns together, and each lamp's place and colour, where they have changed."""
+def set_lights(
+    tree: bpy.types.NodeTree, maps: RelightingMaps, suns: list[Sun], point_lights: list[PointLight], a0: float, falloff: Falloff
+) -> None:
+    """Write the k weights of all suns together, and each lamp's place and color, where they have changed."""
     weights = np.zeros((maps.k, 3))
     for sun in suns:
         weights += np.outer(maps.weights(np.array(sun.direction)), sun.color)
     for i, weight in enumerate(weights):
         _set(tree.nodes[_far(i)].inputs[1], weight)
-    for index, lamp in enumerate(lamps):
+    for index, point_light in enumerate(point_lights):
         inputs = tree.nodes[f"lamp {index}"].inputs
-        _set(inputs["Position"], lamp.position)
-        _set(inputs["Color"], lamp.color)
+        _set(inputs["Position"], point_light.position)
+        _set(inputs["Color"], point_light.color)
         _set(inputs["a0"], a0)
         _set(inputs["Power"], 1.0 if falloff == "LINEAR" else 2.0)
 
 
-def lamps_in(tree: bpy.types.NodeTree) -> int:
+def point_lights_in(tree: bpy.types.NodeTree) -> int:
     """For how many lamps a group was built."""
     return sum(node.bl_idname == "ShaderNodeGroup" for node in tree.nodes)
 
@@ -120,10 +125,10 @@ def remove(tree: bpy.types.NodeTree) -> None:
         bpy.data.images.remove(atlas)
 
 
-def _lamp_tree(maps: RelightingMaps, name: str) -> bpy.types.NodeTree:
+def _point_light_tree(maps: RelightingMaps, name: str) -> bpy.types.NodeTree:
     """Of a lamp at Position: w_i = Color (a0 / |L|)^Power R_i(L / |L|), L = Position - the point shaded [Wong2005, fig. 8-10]."""
     tree = _empty_tree(name)
-    for socket, kind in LAMP_SOCKETS.items():
+    for socket, kind in POINT_LIGHT_SOCKETS.items():
         tree.interface.new_socket(socket, in_out="INPUT", socket_type=kind)
     for i in range(maps.k):
         tree.interface.new_socket(f"Weight {i}", in_out="OUTPUT", socket_type="NodeSocketVector")

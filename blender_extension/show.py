@@ -32,19 +32,19 @@ ALBEDO_SOCKETS = {
 def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Path | None, layout: nodes.Layout, albedo: bool) -> list[str]:
     """Put the asset on `obj`; lines for the user. AssetError where it cannot be.
 
-    Irradiance comes out times albedo / pi where `albedo` is asked for and a slot's material has one to find (the colour of a Principled,
+    Irradiance comes out times albedo / pi where `albedo` is asked for and a slot's material has one to find (the color of a Principled,
     Diffuse or Subsurface BSDF), else as it is; radiance always as it is.
     """
     maps = read(asset)
     uv_layer = _uv_layer(obj, maps, capture)
     hide(obj)
     notes = []
-    _, lamps, others = lights_of(scene, scene.srbf.a0)
+    _, point_lights, others = lights_of(scene, scene.srbf.a0)
     if others:
         notes.append(f"not shown: light of {', '.join(others)} (suns and points are)")
     if scene.render.engine.startswith("BLENDER_EEVEE") and layout == "IMAGES" and maps.k > EEVEE_TEXTURES:
         notes.append(f"EEVEE may have too few texture slots for {maps.k} maps, and show pink: choose Atlas")
-    tree = nodes.build(maps, f"srbf {obj.name}", len(lamps), uv_layer, layout)
+    tree = nodes.build(maps, f"srbf {obj.name}", len(point_lights), uv_layer, layout)
     links = []  # of each slot, to which of object and mesh its material belonged
     if not len(obj.data.materials):
         obj.data.materials.append(None)
@@ -102,7 +102,7 @@ def update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None)
     if not shown:
         return
     settings = scene.srbf
-    suns, lamps, _ = lights_of(scene, settings.a0, depsgraph)
+    suns, point_lights, _ = lights_of(scene, settings.a0, depsgraph)
     for obj in shown:
         tree = obj[SHOWN].get("group")
         try:
@@ -111,9 +111,9 @@ def update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None)
             continue
         if tree is None or len(tree.nodes) == 0:
             continue
-        if nodes.lamps_in(tree) != len(lamps):
-            tree = _rebuilt(obj, tree, maps, len(lamps))
-        nodes.set_lights(tree, maps, suns, lamps, settings.a0, settings.falloff)
+        if nodes.point_lights_in(tree) != len(point_lights):
+            tree = _rebuilt(obj, tree, maps, len(point_lights))
+        nodes.set_lights(tree, maps, suns, point_lights, settings.a0, settings.falloff)
 
 
 @contextmanager
@@ -148,7 +148,7 @@ def _cached(asset: str) -> RelightingMaps:
     return _maps_read[asset][1]
 
 
-def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMaps, lamps: int) -> bpy.types.NodeTree:
+def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMaps, point_lights: int) -> bpy.types.NodeTree:
     """The group for another number of lamps, in the place of the one before."""
     name, layout = tree.name, obj[SHOWN]["layout"]
     uv_layer = next(node.uv_map for node in tree.nodes if node.bl_idname == "ShaderNodeUVMap")
@@ -160,7 +160,7 @@ def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMa
         if node.bl_idname == "ShaderNodeGroup" and node.node_tree == tree
     ]
     links = [(material, node, [link.to_socket for link in material.node_tree.nodes[node].outputs[0].links]) for material, node in users]
-    rebuilt = nodes.build(maps, name, lamps, uv_layer, layout)
+    rebuilt = nodes.build(maps, name, point_lights, uv_layer, layout)
     for material, node, targets in links:
         material.node_tree.nodes[node].node_tree = rebuilt
         for target in targets:
@@ -171,7 +171,7 @@ def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMa
 
 
 def _material(original: bpy.types.Material | None, tree: bpy.types.NodeTree, name: str, albedo: bool) -> tuple[bpy.types.Material, bool]:
-    """(a copy of a material that emits the group's colour, whether an albedo was found to multiply it by)."""
+    """(a copy of a material that emits the group's color, whether an albedo was found to multiply it by)."""
     if original is None:
         material = bpy.data.materials.new(f"srbf {name}")
         material.use_nodes = True
@@ -204,7 +204,7 @@ def _material(original: bpy.types.Material | None, tree: bpy.types.NodeTree, nam
 
 
 def _albedo(material: bpy.types.Material) -> Any:
-    """What the surface's one diffuse colour is: a socket or an RGB triple; None where the surface is not one BSDF that has it."""
+    """What the surface's one diffuse color is: a socket or an RGB triple; None where the surface is not one BSDF that has it."""
     output = material.node_tree.get_output_node("ALL")
     if output is None or not output.inputs["Surface"].links:
         return None

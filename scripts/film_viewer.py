@@ -84,10 +84,10 @@ def browser(asset: Path, mesh: Path) -> Iterator[tuple[Any, str]]:
         def ask(what: str, **job: Any) -> Any:
             process.stdin.write(json.dumps({"do": what, **job}) + "\n")
             process.stdin.flush()
-            answer = json.loads(process.stdout.readline())
-            if "error" in answer:
-                raise RuntimeError(answer["error"])
-            return answer.get("value")
+            response = json.loads(process.stdout.readline())
+            if "error" in response:
+                raise RuntimeError(response["error"])
+            return response.get("value")
 
         yield ask, server.url
     server.shutdown()

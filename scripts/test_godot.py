@@ -41,8 +41,8 @@ HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may 
 STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's
 FLOAT_ERROR = 1e-4  # single precision, of sums whose terms reach 10
 BYTE_STEP = 1.5 / 255
-RANGE = 20.0  # metres: where Godot's own omni and spot lights end
-FAR = 1e6  # metres
+RANGE = 20.0  # meters: where Godot's own omni and spot lights end
+FAR = 1e6  # meters
 SECONDS = 300  # of one Godot
 
 Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)  # Godot's (x, y, z) to (x, -z, y)
@@ -181,7 +181,7 @@ def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
     lights: list[Light] = [lit.light() for lit in LIGHTS[job["name"]]]
     if job["name"] == "sky":
         lights.append(EnvironmentLight(np.roll(SKY, 4, axis=1), (SKY_ENERGY,) * 3))  # ours begins a quarter turn further
-    picture = far_lamp(instance, SUN) if job.get("by_table") else relight(instance, lights)
+    picture = far_point_light(instance, SUN) if job.get("by_table") else relight(instance, lights)
     if asset.quantity == "irradiance":
         picture = picture / np.pi
     if asset.transport == "indirect" and job["mode"] == "spatial":
@@ -189,7 +189,7 @@ def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
     return picture
 
 
-def far_lamp(asset: Asset, sun: Lit) -> ndarray:
+def far_point_light(asset: Asset, sun: Lit) -> ndarray:
     """A directional light read from the table: a lamp so far away that all receivers see it from one direction."""
     far = sun.light()
     assert isinstance(far, DirectionalLight)

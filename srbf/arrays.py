@@ -1,4 +1,4 @@
-"""Array annotations with shapes in letters: P receivers, L lights, K basis functions, N directions, H W image, 3 colour or axis.
+"""Array annotations with shapes in letters: P receivers, L lights, K basis functions, N directions, H W image, 3 color or axis.
 
 The names are jaxtyping's. Without jaxtyping installed they are inert, so that `import srbf` asks for numpy and scipy alone;
 the tests check them at run time.

@@ -124,7 +124,7 @@ class Asset:
 
     @property
     def basis(self) -> GaussianBasis:
-        """The Gaussians that relighting maps weigh, centers normalised here; InputError on an asset of other functions."""
+        """The Gaussians that relighting maps weigh, centers normalized here; InputError on an asset of other functions."""
         basis = self.manifest.get("basis", {"kind": self.method})
         if basis["kind"] != "gaussian":
             raise InputError(f"expected relighting maps of Gaussians, found {basis['kind']}")

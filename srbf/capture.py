@@ -40,7 +40,7 @@ class CapturedLight:
     """One illuminant of a capture, and the image that answers it.
 
     `place` of a directional light, of unit irradiance, is the unit direction towards it; of a point light, of unit irradiance at 1 m and
-    inverse-square fall-off, its position in metres. `direct`, of an indirect capture, is the image of the direct diffuse light
+    inverse-square fall-off, its position in meters. `direct`, of an indirect capture, is the image of the direct diffuse light
     that `file` lacks.
     """
 
@@ -59,7 +59,7 @@ class CapturedLight:
 
     @property
     def position(self) -> tuple[float, float, float]:
-        """Of a point light, metres; InputError of a directional one."""
+        """Of a point light, meters; InputError of a directional one."""
         if self.kind != "point":
             raise InputError(f"expected a point light, found a directional one ({self.file}): it has no position")
         return self.place
@@ -92,7 +92,7 @@ class Capture:
             if kind == "directional":
                 length = float(np.linalg.norm(place))
                 if not abs(length - 1) <= UNIT_TOLERANCE:
-                    raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalise it")
+                    raise ManifestError(f"expected a unit direction of light {i} in {path}, found length {length:.4g}; normalize it")
                 place = place / length
             files.inside(folder, light["file"], path)
             if "direct" in light:
@@ -168,7 +168,7 @@ class Capture:
         return np.array([light.direction for light in chosen], np.float64).reshape(-1, 3)
 
     def positions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
-        """Positions of point lights, metres; InputError where they are directional."""
+        """Positions of point lights, meters; InputError where they are directional."""
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.position for light in chosen], np.float64).reshape(-1, 3)
 
@@ -201,17 +201,17 @@ class Capture:
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
         """Rows of T: what receivers `texels` (flat) answer to each of `indices`. Only an image's strips with such texels are undone."""
-        answers = np.empty((len(texels), len(indices), 3), np.float32)
+        responses = np.empty((len(texels), len(indices), 3), np.float32)
         strips, place = np.unique(texels // self.width // STRIP, return_inverse=True)
         rows = [(int(strip) * STRIP, min((int(strip) + 1) * STRIP, self.height)) for strip in strips]
         picked = place * STRIP * self.width + texels - strips[place] * STRIP * self.width
         whole = len(rows) * STRIP >= self.height
 
         def read(row: int) -> None:
-            answers[:, row] = self._stored(indices[row])[texels] if whole else self._stored(indices[row], rows)[picked]
+            responses[:, row] = self._stored(indices[row])[texels] if whole else self._stored(indices[row], rows)[picked]
 
         each(read, len(indices))
-        return answers
+        return responses
 
     def kept(self, texels: Int[ndarray, " n"] | None = None) -> Capture:
         """The capture with all answers in memory, of some flat `texels` alone, (1, n) of them and without geometry, or of all.
@@ -219,14 +219,14 @@ class Capture:
         12 bytes a texel and light. What is fitted or asked many times over is read once.
         """
         whole = np.arange(self.width * self.height) if texels is None else texels
-        answers = self.sample(range(len(self.lights)), whole)
+        responses = self.sample(range(len(self.lights)), whole)
         manifest, lights = self.manifest, self.lights
         if texels is not None:
             lights = tuple(replace(light, direct=None) for light in lights)  # whole images, which no longer fit
             manifest = {key: value for key, value in manifest.items() if key not in ("position", "normal", "albedo", "ambient", "seams")}
             manifest |= {"width": len(texels), "height": 1}
         coverage = self.coverage() if texels is None else self.coverage().reshape(1, -1)[:, texels]
-        return _KeptCapture(self.folder, manifest, lights, answers, coverage)
+        return InMemoryCapture(self.folder, manifest, lights, responses, coverage)
 
     def with_roles(self, roles: Sequence[Role | None]) -> Capture:
         """The same images under other roles, one a light; lights of role None are left out."""
@@ -322,10 +322,10 @@ class Capture:
 
 
 @dataclass(frozen=True, eq=False)
-class _KeptCapture(Capture):
+class InMemoryCapture(Capture):
     """A capture whose answers (P, L, 3) are in memory."""
 
-    answers: Float32[ndarray, "P L 3"]
+    responses: Float32[ndarray, "P L 3"]
     covered: Float32[ndarray, "H W"]
 
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
@@ -334,21 +334,21 @@ class _KeptCapture(Capture):
     def stream(
         self, indices: Sequence[int], look: Look = lambda row, image: None, rows: Rows = None
     ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
-        return self._blocks(indices, max(1, STREAM_BYTES // (len(self.answers) * 12)), np.dtype(np.float32), 2, look, rows)
+        return self._blocks(indices, max(1, STREAM_BYTES // (len(self.responses) * 12)), np.dtype(np.float32), 2, look, rows)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
-        return self.answers[np.ix_(texels, np.asarray(indices, np.int64))]
+        return self.responses[np.ix_(texels, np.asarray(indices, np.int64))]
 
     def coverage(self) -> Float32[ndarray, "H W"]:
         return self.covered
 
     def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "n 3"]:
         if rows is None:
-            return self.answers[:, index]
-        return np.concatenate([self.answers[begin * self.width : end * self.width, index] for begin, end in rows])
+            return self.responses[:, index]
+        return np.concatenate([self.responses[begin * self.width : end * self.width, index] for begin, end in rows])
 
     def _of(self, lights: tuple[CapturedLight, ...], chosen: Sequence[int]) -> Capture:
-        return replace(self, lights=lights, answers=self.answers[:, list(chosen)])
+        return replace(self, lights=lights, responses=self.responses[:, list(chosen)])
 
 
 class CombinedCapture(Capture):

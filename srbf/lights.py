@@ -1,4 +1,4 @@
-"""Lights to relight by: directional, point, spot, environment. World frame, metres, radians, scene-linear Rec.709."""
+"""Lights to relight by: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from srbf.sphere import Domain, normalize
 Falloff = Literal["linear", "inverse-square"]
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
-DEFAULT_RADIUS = 1e-4  # metres: a receiver no nearer than this, so that a lamp in a surface stays finite
+DEFAULT_RADIUS = 1e-4  # meters: a receiver no nearer than this, so that a lamp in a surface stays finite
 
 
 @dataclass(frozen=True)
@@ -128,10 +128,10 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
 def environment_samples(
     image: Float32[ndarray, "H W 3"], domain: Domain, rotation: Float64[ndarray, "3 3"]
 ) -> tuple[Float64[ndarray, "H W 3"], Float64[ndarray, "H W"]]:
-    """Directions of an equirectangular map's texel centres turned by `rotation`, and the solid angle (sr) of each texel.
+    """Directions of an equirectangular map's texel centers turned by `rotation`, and the solid angle (sr) of each texel.
 
     On the hemisphere only what is above the (turned) horizon counts. Unturned, this is exact: a row that straddles the horizon
-    is cut there and its centre moved to the middle of what is left.
+    is cut there and its center moved to the middle of what is left.
     """
     height, width = image.shape[:2]
     elevation = np.pi / 2 - np.arange(height + 1) * (np.pi / height)
@@ -139,9 +139,9 @@ def environment_samples(
     if domain == "hemisphere" and upright:
         elevation = np.maximum(elevation, 0)
     sine = np.sin(elevation)
-    centre = (elevation[:-1] + elevation[1:]) / 2
+    center = (elevation[:-1] + elevation[1:]) / 2
     azimuth = (0.5 - (np.arange(width) + 0.5) / width) * (2 * np.pi)
-    horizontal, vertical = np.cos(centre), np.sin(centre)
+    horizontal, vertical = np.cos(center), np.sin(center)
     directions = np.empty((height, width, 3))
     directions[..., 0] = horizontal[:, None] * np.cos(azimuth)
     directions[..., 1] = horizontal[:, None] * np.sin(azimuth)

@@ -118,7 +118,7 @@ def domain_of(directions: Float[ndarray, "n 3"]) -> Domain:
     return "hemisphere" if bool((np.asarray(directions)[:, 2] > 0).all()) else "sphere"
 
 
-def nearest_neighbour_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
+def nearest_neighbor_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
     """Geodesic distance (rad) of every point to its nearest other point; pi for a lone point. n x n work."""
     points = np.asarray(points, np.float64)
     if len(points) < 2:
@@ -152,8 +152,8 @@ def octahedral_decode(u: Float[ndarray, "*shape"], v: Float[ndarray, "*shape"]) 
     """Unit direction of octahedral coordinates in [-1, 1]: z > 0 inside the diamond |u| + |v| < 1 [Cigolle2014]."""
     x, y = np.asarray(u, np.float64), np.asarray(v, np.float64)
     z = 1 - np.abs(x) - np.abs(y)
-    folded_x, folded_y = (1 - np.abs(y)) * _sign(x), (1 - np.abs(x)) * _sign(y)
-    return normalize(np.stack([np.where(z < 0, folded_x, x), np.where(z < 0, folded_y, y), z], axis=-1))
+    projected_x, projected_y = (1 - np.abs(y)) * _sign(x), (1 - np.abs(x)) * _sign(y)
+    return normalize(np.stack([np.where(z < 0, projected_x, x), np.where(z < 0, projected_y, y), z], axis=-1))
 
 
 def octahedral_encode(directions: Float[ndarray, "*shape 3"]) -> tuple[Float64[ndarray, "*shape"], Float64[ndarray, "*shape"]]:

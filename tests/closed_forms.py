@@ -19,10 +19,10 @@ def quad(a: list, b: list, c: list, d: list) -> np.ndarray:
     return np.array([[a, b, c], [a, c, d]], np.float32)
 
 
-def ball(radius: float, centre: list, steps: int = 64) -> np.ndarray:
+def ball(radius: float, center: list, steps: int = 64) -> np.ndarray:
     """A sphere of 2 steps^2 triangles."""
     polar, turn = np.meshgrid(np.linspace(0, np.pi, steps + 1), np.linspace(0, 2 * np.pi, steps + 1), indexing="ij")
-    points = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=2) * radius + centre
+    points = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], axis=2) * radius + center
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     return np.concatenate([np.stack([a, b, c], axis=2).reshape(-1, 3, 3), np.stack([a, c, d], axis=2).reshape(-1, 3, 3)]).astype(np.float32)
 

@@ -34,7 +34,7 @@ from srbf.io.image import write_image  # noqa: E402
 from srbf.sphere import point_set, random_directions  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
-Answer = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
+Response = Callable[[np.ndarray], np.ndarray]  # (3,) direction -> (H, W, 3) image
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -63,7 +63,7 @@ def make_capture(tmp_path: Path) -> Callable[..., Capture]:
     """Write a capture whose images are given by a function of the light direction."""
 
     def make(
-        answer: Answer,
+        response: Response,
         lights: int = 60,
         holdout: int = 8,
         domain: str = "hemisphere",
@@ -85,7 +85,7 @@ def make_capture(tmp_path: Path) -> Callable[..., Capture]:
         for role, chosen in groups:
             for direction in chosen:
                 file = f"lights/{len(entries):04d}.exr"
-                pixels = answer(direction).astype(np.float32)
+                pixels = response(direction).astype(np.float32)
                 write_image(folder / file, pixels, encoding)
                 entries.append({"kind": "directional", "direction": direction.tolist(), "role": role, "file": file})
         for image, values in images.items():

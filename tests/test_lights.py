@@ -70,7 +70,7 @@ def test_environment_axes() -> None:
 def test_moved_carries_lights_along() -> None:
     matrix = np.array([[0, -2, 0, 1], [2, 0, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1.0]])  # quarter turn, twice as large, 1 m along x
     assert moved(DirectionalLight((1, 0, 0)), matrix).direction == pytest.approx((0, 1, 0))
-    lamp = moved(PointLight((1, 0, 3), a0=2), matrix)
-    assert lamp.position == pytest.approx((1, 2, 6)) and lamp.a0 == pytest.approx(4)
+    point_light = moved(PointLight((1, 0, 3), a0=2), matrix)
+    assert point_light.position == pytest.approx((1, 2, 6)) and point_light.a0 == pytest.approx(4)
     spot = moved(SpotLight((0, 0, 0), direction=(1, 0, 0), inner=0.1, outer=0.2), matrix)
     assert spot.direction == pytest.approx((0, 1, 0)) and spot.inner == 0.1

@@ -22,7 +22,11 @@ from srbf.io import files
 from srbf.io.image import write_image
 from srbf.methods.relighting_map import RelightingMap
 
-LAMPS = {"train": [(0.3, 0.1, 0.8), (-0.4, 0.2, 0.6), (0.0, 0.0, 1.5)], "validation": [(0.5, -0.5, 0.9)], "holdout": [(-0.2, -0.6, 1.1)]}
+POINT_LIGHTS = {
+    "train": [(0.3, 0.1, 0.8), (-0.4, 0.2, 0.6), (0.0, 0.0, 1.5)],
+    "validation": [(0.5, -0.5, 0.9)],
+    "holdout": [(-0.2, -0.6, 1.1)],
+}
 FIT = 0.03  # of 40 Gaussians to the cosine, relative
 
 
@@ -33,19 +37,19 @@ def suns(make_capture, plane_positions) -> Capture:
 
 
 @pytest.fixture
-def lamps(plane_positions: np.ndarray, tmp_path: Path) -> Callable[..., Capture]:
+def point_lights(plane_positions: np.ndarray, tmp_path: Path) -> Callable[..., Capture]:
     """The same square under point lights: cos / d^2, times `shade` (H, W, 1)."""
 
     def make(shade: float | np.ndarray = 1.0, **changes: object) -> Capture:
-        folder = tmp_path / "lamps"
+        folder = tmp_path / "point_lights"
         (folder / "lights").mkdir(parents=True, exist_ok=True)
         entries: list[dict[str, object]] = []
-        for role, places in LAMPS.items():
+        for role, places in POINT_LIGHTS.items():
             for place in places:
                 vectors = np.array(place) - plane_positions
-                answer = vectors[..., 2:] / np.linalg.norm(vectors, axis=2, keepdims=True) ** 3 * shade
+                response = vectors[..., 2:] / np.linalg.norm(vectors, axis=2, keepdims=True) ** 3 * shade
                 file = f"lights/{len(entries):04d}.exr"
-                write_image(folder / file, np.repeat(answer, 3, axis=2).astype(np.float32), "float")
+                write_image(folder / file, np.repeat(response, 3, axis=2).astype(np.float32), "float")
                 entries.append({"kind": "point", "position": list(place), "role": role, "file": file, **changes})
         manifest = {"format": "srbf-capture", "version": 1, "quantity": "irradiance", "width": 14, "height": 10, "lights": entries}
         files.write_json(folder / "capture.json", manifest)
@@ -54,11 +58,11 @@ def lamps(plane_positions: np.ndarray, tmp_path: Path) -> Callable[..., Capture]
     return make
 
 
-def test_a_point_capture_is_read(lamps) -> None:
-    capture = lamps()
+def test_a_point_capture_is_read(point_lights) -> None:
+    capture = point_lights()
     assert capture.kind == "point" and capture.indices("holdout") == [4]
-    np.testing.assert_array_equal(capture.positions([4, 0]), [LAMPS["holdout"][0], LAMPS["train"][0]])
-    assert capture.lights[0].position == LAMPS["train"][0]
+    np.testing.assert_array_equal(capture.positions([4, 0]), [POINT_LIGHTS["holdout"][0], POINT_LIGHTS["train"][0]])
+    assert capture.lights[0].position == POINT_LIGHTS["train"][0]
     for ask in (capture.directions, lambda: capture.lights[0].direction):
         with pytest.raises(InputError, match="directional"):
             ask()
@@ -71,8 +75,8 @@ def test_a_directional_capture_has_no_positions(suns: Capture) -> None:
         suns.positions()
 
 
-def test_mixed_and_half_said_lights_are_refused(lamps) -> None:
-    folder = lamps().folder
+def test_mixed_and_half_said_lights_are_refused(point_lights) -> None:
+    folder = point_lights().folder
     manifest = files.read_json(folder / "capture.json")
     one, *rest = manifest["lights"]
     for light, words in [
@@ -87,31 +91,31 @@ def test_mixed_and_half_said_lights_are_refused(lamps) -> None:
         assert "\n" not in str(caught.value)
 
 
-def test_the_approximation_is_measured_by_role(suns: Capture, lamps) -> None:
+def test_the_approximation_is_measured_by_role(suns: Capture, point_lights) -> None:
     """Without occluders a directional asset foretells lamps exactly but for its fit; lamps twice as strong are missed by half."""
     asset = RelightingMap(k=40).encode(suns)
-    errors = evaluate(asset, lamps())
+    errors = evaluate(asset, point_lights())
     assert [light["role"] for light in errors["lights"]] == ["train"] * 3 + ["validation", "holdout"]
-    assert all(errors[role]["relative_rmse"] < FIT for role in LAMPS)
+    assert all(errors[role]["relative_rmse"] < FIT for role in POINT_LIGHTS)
     shade = np.linspace(0, 1, 14)[:, None]  # what an occluder near the lamp would take away, and directional lights know nothing of
-    shaded = evaluate(asset, lamps(shade))
-    assert all(shaded[role]["relative_rmse"] > 0.3 for role in LAMPS)
-    doubled = evaluate(asset, lamps(2.0))
+    shaded = evaluate(asset, point_lights(shade))
+    assert all(shaded[role]["relative_rmse"] > 0.3 for role in POINT_LIGHTS)
+    doubled = evaluate(asset, point_lights(2.0))
     assert doubled["holdout"]["relative_rmse"] == pytest.approx(0.5, abs=FIT)
 
 
-def test_an_asset_without_positions_cannot_be_compared(make_capture, lamps) -> None:
+def test_an_asset_without_positions_cannot_be_compared(make_capture, point_lights) -> None:
     asset = RelightingMap(k=9).encode(make_capture(lambda d: np.full((10, 14, 3), max(0, d[2]))))
     with pytest.raises(InputError, match="position map"):
-        evaluate(asset, lamps())
+        evaluate(asset, point_lights())
 
 
-def test_commands_say_which_captures_they_take(suns: Capture, lamps, tmp_path: Path) -> None:
+def test_commands_say_which_captures_they_take(suns: Capture, point_lights, tmp_path: Path) -> None:
     def run(*arguments: object) -> tuple[int, str, str]:
         done = CliRunner().invoke(app, list(map(str, arguments)))
         return done.exit_code, done.stdout, done.stderr
 
-    folder = lamps().folder
+    folder = point_lights().folder
     RelightingMap(k=9).encode(suns).save(tmp_path / "asset")
     flags = [["--method", name] for name in ("relighting-map", "eigen-map", "clustered-eigen-map", "auto")]
     for command in [

@@ -12,7 +12,7 @@ from srbf.sphere import (
     fibonacci,
     hammersley,
     mean_spacing,
-    nearest_neighbour_angles,
+    nearest_neighbor_angles,
     normalize,
     octahedral_decode,
     octahedral_encode,
@@ -65,12 +65,12 @@ def test_random_directions_are_uniform_and_above() -> None:
     assert abs(random_directions(20000, "sphere", np.random.default_rng(0))[:, 2].mean()) < 0.02
 
 
-def test_nearest_neighbour_angles_of_an_octahedron() -> None:
+def test_nearest_neighbor_angles_of_an_octahedron() -> None:
     corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
-    np.testing.assert_allclose(nearest_neighbour_angles(corners), np.pi / 2, atol=ROUNDING)
-    assert nearest_neighbour_angles(corners[:1]).tolist() == [np.pi]
+    np.testing.assert_allclose(nearest_neighbor_angles(corners), np.pi / 2, atol=ROUNDING)
+    assert nearest_neighbor_angles(corners[:1]).tolist() == [np.pi]
     close = normalize(np.array([[0, 0, 1], [1e-6, 0, 1]]))
-    np.testing.assert_allclose(nearest_neighbour_angles(close), 1e-6, rtol=1e-6)
+    np.testing.assert_allclose(nearest_neighbor_angles(close), 1e-6, rtol=1e-6)
 
 
 def test_domain_of() -> None:

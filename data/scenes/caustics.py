@@ -2,7 +2,7 @@
 """A table with glass on it: two rings, a ball and an angel of tinted glass, beside one opaque pawn.
 
 The lightmap of the object `Table` (one quad, top at z = 0, UV layer = [0, 1]², u along +x, v along +y) answers a sun
-with caustics, coloured shadows and one crisp shadow, after the scene "caustics" of [Wong2005, fig. 7].
+with caustics, colored shadows and one crisp shadow, after the scene "caustics" of [Wong2005, fig. 7].
 
 By default the caustics are a stand-in, not traced: shadow rays pass straight through the glass, tinted by the angle at
 which they meet it, see `glass`. That costs no noise but that of the edges, so two samples a texel will do. With --traced
@@ -33,7 +33,7 @@ def circle(radius, z, segments, fold=0.0, folds=0):
 
 
 def outline(text):
-    """Points (radius, height) in metres from "radius height, ..." in centimetres."""
+    """Points (radius, height) in meters from "radius height, ..." in centimetres."""
     return [tuple(float(n) / 100 for n in pair.split()) for pair in text.split(",")]
 
 
@@ -135,7 +135,7 @@ def glass(name, color, ior, rim, core, power):
 
     A wall met at the cosine c passes color · (rim + (core - rim) · c^power), two walls its square, so that the middle of
     the shadow gains above 1 and its rim loses. Far behind the glass the pattern fades to EVEN, as light spreads past its
-    focus. No shadow gains light as a whole: before the colour, under a sun overhead, the ball passes 0.83 of what meets
+    focus. No shadow gains light as a whole: before the color, under a sun overhead, the ball passes 0.83 of what meets
     it, the flat ring 0.94, the leaning one 0.50, the angel's body 0.71, its wings 0.44, its foot 0.93, and the brightest
     foci are 2.4 (ball) and 2.1 (rings) times the lit table.
     """

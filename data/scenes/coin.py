@@ -5,7 +5,7 @@ What it shows is relief: a sun with a face and sixteen rays, a legend on either 
 worn since. From overhead it is nearly flat; under a raking light every letter, scratch and pit throws its shadow. The
 legend SOL OMNIBVS LVCET, the sun shines for all, is Petronius's.
 
-The coin is a field of heights on a raster, sampled by a mesh of quads that fill a disc. It is modelled with a radius of
+The coin is a field of heights on a raster, sampled by a mesh of quads that fill a disc. It is modeled with a radius of
 1 m, as if seen through a glass of fifty times. The bronze is bright where hands have rubbed it and brown, dull and green in its recesses.
 
     python data/scenes/coin.py OUT.blend
@@ -24,7 +24,7 @@ EDGE = 0.13  # m from the field down to the felt
 FACE = 0.315  # m, radius of the sun's face
 LEGEND = 0.735  # m, radius of the letters' feet
 
-# ---- heights: every array is (RASTER, RASTER), row 0 at y = -1, in metres above the field -------------------------
+# ---- heights: every array is (RASTER, RASTER), row 0 at y = -1, in meters above the field -------------------------
 
 
 def raster():
@@ -34,7 +34,7 @@ def raster():
 
 
 def blurred(image, sigma):
-    """Convolved with a Gaussian of `sigma` metres, through its Fourier transform."""
+    """Convolved with a Gaussian of `sigma` meters, through its Fourier transform."""
     frequency = np.fft.fftfreq(RASTER, 2 / RASTER)
     line = np.exp(-2 * (pi * sigma * frequency) ** 2)
     return np.fft.irfft2(np.fft.rfft2(image) * line[:, None] * line[None, : RASTER // 2 + 1], image.shape)
@@ -180,7 +180,7 @@ def _window(middle, reach):
 
 
 def relief(seed):
-    """The coin's heights (R, R) in metres, and where it has kept its patina (R, R) in [0, 1]."""
+    """The coin's heights (R, R) in meters, and where it has kept its patina (R, R) in [0, 1]."""
     rng = np.random.default_rng(seed)
     x, y = raster()
     r = np.hypot(x, y)
@@ -283,7 +283,7 @@ def new_material(name):
 
 
 def ramp(tree, value, *stops):
-    """Colours at positions along a value in [0, 1]."""
+    """Colors at positions along a value in [0, 1]."""
     made = node(tree, "ValToRGB", Fac=value)
     for i, (position, color) in enumerate(stops):
         stop = made.color_ramp.elements[i] if i < 2 else made.color_ramp.elements.new(position)

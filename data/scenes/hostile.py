@@ -17,7 +17,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from known_answers import SQUARE, camera, lamp, quad  # noqa: E402
+from closed_form_scenes import SQUARE, camera, point_light, quad  # noqa: E402
 
 FRAME = 2  # physics write their first cache at the second frame
 
@@ -58,7 +58,7 @@ def object_driver(canaries):
 
 
 def shader_driver(canaries):
-    """A scripted driver inside a material: the wall's colour."""
+    """A scripted driver inside a material: the wall's color."""
     tree = bpy.data.objects["Wall"].data.materials[0].node_tree
     path = 'nodes["Diffuse BSDF"].inputs[0].default_value'
     scripted(tree.driver_add(path, 0), f"{touch(canaries, 'shader_driver')} + 0.5")
@@ -333,14 +333,14 @@ def scripted(curve, expression):
 
 
 def build(path, canaries, chosen):
-    """The square, a grey wall on it that drivers move, a camera; saved at FRAME, armed after its values were set."""
+    """The square, a gray wall on it that drivers move, a camera; saved at FRAME, armed after its values were set."""
     path.parent.mkdir(parents=True, exist_ok=True)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
     quad("Plane")
     wall = quad("Wall", corners=[(0, 0, 0), (0, 1, 0), (0, 1, 0.5), (0, 0, 0.5)], color=(0.5, 0.2, 0.1))
     wall.location.z = 0.25
-    lamp()
+    point_light()
     camera()
     bpy.context.scene.camera.data.dof.use_dof = False
     bpy.context.scene.frame_set(FRAME)

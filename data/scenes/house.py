@@ -54,7 +54,7 @@ def circle(radius, z, segments):
 
 
 def profile(text):
-    """Points (radius, height) in metres from "radius height, ..." in centimetres."""
+    """Points (radius, height) in meters from "radius height, ..." in centimetres."""
     return [tuple(float(n) / 100 for n in pair.split()) for pair in text.split(",")]
 
 
@@ -101,7 +101,7 @@ def node(tree, kind, **inputs):
 
 
 def surface(name, color, roughness, metallic=0.0):
-    """A Principled surface, diffuse from roughness 0.7 on. `color`: RGB, or a function from tree to colour socket."""
+    """A Principled surface, diffuse from roughness 0.7 on. `color`: RGB, or a function from tree to color socket."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # always there from Blender 5.0 on
         material.use_nodes = True
@@ -117,7 +117,7 @@ def surface(name, color, roughness, metallic=0.0):
 
 
 def ramp(tree, value, *stops):
-    """Colours at positions along a value in [0, 1]."""
+    """Colors at positions along a value in [0, 1]."""
     made = node(tree, "ValToRGB", Fac=value)
     for i, (position, color) in enumerate(stops):
         stop = made.color_ramp.elements[i] if i < 2 else made.color_ramp.elements.new(position)
@@ -322,10 +322,10 @@ def add_table_and_chairs(dark, brass, shade):
     at = Matrix.Translation((-0.75, 0.55, 0))
     table = profile("24 0, 24 3, 6 8, 4.5 25, 7.5 45, 5 60, 10 69, 50 71, 52 72.5, 50 74")
     mesh_object("RoundTable", [moved(lathe(table, 40), at)], dark)
-    lamp = profile("8.5 74, 8.5 75.5, 3 77.5, 2.5 81, 7.5 85, 8 89, 3 92.5, 4 94, 3 96, 1 105")
+    point_light = profile("8.5 74, 8.5 75.5, 3 77.5, 2.5 81, 7.5 85, 8 89, 3 92.5, 4 94, 3 96, 1 105")
     at = at @ Matrix.Translation((0.08, -0.05, 0))
-    mesh_object("Lamp", [moved(lathe(lamp, 28), at)], brass, smooth=True)
-    mesh_object("LampShade", [moved(lathe(profile("15 100, 14 103, 7.5 114, 5 115"), 28), at)], shade, smooth=True)
+    mesh_object("PointLight", [moved(lathe(point_light, 28), at)], brass, smooth=True)
+    mesh_object("PointLightShade", [moved(lathe(profile("15 100, 14 103, 7.5 114, 5 115"), 28), at)], shade, smooth=True)
     standing = Matrix.Translation((-1.35, -0.15, 0)) @ Matrix.Rotation(radians(-62), 4, "Z")
     fallen = Matrix.LocRotScale((0.50, -0.25, 0.215), Euler((0, radians(90), radians(35))), None)
     mesh_object("Chairs", [moved(p, m) for m in (standing, fallen) for p in chair()], dark)
@@ -422,7 +422,7 @@ def build(seed=13):
     add_floor(rng, planks)
     add_roof(rng, timber, timber)
     add_stairs(planks, panel, dark)
-    add_table_and_chairs(dark, brass, surface("LampShade", (0.45, 0.38, 0.22), 0.5))
+    add_table_and_chairs(dark, brass, surface("PointLightShade", (0.45, 0.38, 0.22), 0.5))
     add_bookshelf(rng, dark, (-2.3, 2.62, 0), (-1.52, BACK - 0.06, 2.1))
     add_clock(dark, brass)
     add_portrait(surface("Gilt", (0.55, 0.36, 0.12), 0.35, metallic=0.7))

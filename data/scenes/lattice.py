@@ -101,7 +101,7 @@ def node(tree, kind, **inputs):
 
 
 def surface(name, color, passes=0.0):
-    """A diffuse material that lets the part `passes` of its light through. `color`: RGB, or a function from tree to colour socket."""
+    """A diffuse material that lets the part `passes` of its light through. `color`: RGB, or a function from tree to color socket."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:  # always there from Blender 5.0 on
         material.use_nodes = True
@@ -119,7 +119,7 @@ def surface(name, color, passes=0.0):
 
 
 def ramp(tree, value, *stops):
-    """Colours at positions along a value in [0, 1]."""
+    """Colors at positions along a value in [0, 1]."""
     made = node(tree, "ValToRGB", Fac=value)
     for i, (position, color) in enumerate(stops):
         stop = made.color_ramp.elements[i] if i < 2 else made.color_ramp.elements.new(position)
@@ -133,12 +133,12 @@ def noise(tree, scale, detail=3.0, stretch=(1, 1, 1)):
 
 
 def mottled(dark, light, scale, stretch=(1, 1, 1)):
-    """Noise between two colours."""
+    """Noise between two colors."""
     return lambda tree: ramp(tree, noise(tree, scale, 3.0, stretch), (0.32, dark), (0.68, light))
 
 
 def each(*stops):
-    """A colour for each separate piece of a mesh."""
+    """A color for each separate piece of a mesh."""
     return lambda tree: ramp(tree, node(tree, "NewGeometry").outputs["Random Per Island"], *stops)
 
 
@@ -282,7 +282,7 @@ class Vine:
         return fine
 
     def grow(self, path, density, facing=(0, 0, 1), spread=0.1, thick=0.012, blooms=0.0):
-        """A stem along `path` with `density` leaves a metre within `spread`; in places, flowers among them."""
+        """A stem along `path` with `density` leaves a meter within `spread`; in places, flowers among them."""
         self.stems.append(tube(path, thick, thick * 0.4))
         length = sum((b - a).length for a, b in zip(path, path[1:], strict=False))
         for _ in range(int(density * length)):

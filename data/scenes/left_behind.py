@@ -17,7 +17,7 @@ from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from known_answers import SQUARE, camera, material, quad  # noqa: E402
+from closed_form_scenes import SQUARE, camera, material, quad  # noqa: E402
 
 SIDE = 32
 SAMPLES = 64
@@ -605,8 +605,8 @@ def own_bake(blend, name, out, directions):
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.use_light_tree = SAMPLES, False, False
     scene.cycles.sample_clamp_indirect = 0
-    for lamp in [one for one in scene.objects if one.type == "LIGHT"]:
-        bpy.data.objects.remove(lamp)
+    for point_light in [one for one in scene.objects if one.type == "LIGHT"]:
+        bpy.data.objects.remove(point_light)
     if scene.world is not None:
         scene.world = None
     sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))

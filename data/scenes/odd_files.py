@@ -16,7 +16,7 @@ from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from known_answers import SQUARE, camera, quad  # noqa: E402
+from closed_form_scenes import SQUARE, camera, quad  # noqa: E402
 
 LID = [(x * 0.5, y * 0.5, 0.5) for x, y, _ in SQUARE]  # under a sun at the zenith it shades the middle quarter of the square
 
@@ -118,7 +118,7 @@ def displaced():
 
 
 def far(distance):
-    """The lidded square, and a camera over it, so many metres along x."""
+    """The lidded square, and a camera over it, so many meters along x."""
     lidded()
     camera()
     for obj in bpy.context.scene.objects:

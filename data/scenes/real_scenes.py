@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Receivers of every kind, small and with known answers: `python real_scenes.py NAME OUT.blend`.
 
-Objects that must not shade each other stand FAR metres apart.
+Objects that must not shade each other stand FAR meters apart.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from known_answers import SQUARE, UNIT_UV, add_uv, camera, material, quad
+from closed_form_scenes import SQUARE, UNIT_UV, add_uv, camera, material, quad
 
 FAR = 100.0
 HALF = [(0, 0), (0.45, 0), (0.45, 1), (0, 1)]

@@ -11,7 +11,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-from known_answers import SQUARE, UNIT_UV, add_uv, camera, material, quad
+from closed_form_scenes import SQUARE, UNIT_UV, add_uv, camera, material, quad
 
 CUBE = [(x, y, z) for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)]
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]  # outwards
@@ -47,7 +47,7 @@ def graded():
 
 
 def ramped_metal():
-    """Metal of a colour ramp from (1, 0.5, 0) to (0.5, 0.5, 0.5) over a noise."""
+    """Metal of a color ramp from (1, 0.5, 0) to (0.5, 0.5, 0.5) over a noise."""
     made, nodes, link, surface = nodes_of("ramped metal")
     ramp, shader = nodes.new("ShaderNodeValToRGB"), nodes.new("ShaderNodeBsdfPrincipled")
     ramp.color_ramp.elements[0].color, ramp.color_ramp.elements[1].color = (1, 0.5, 0, 1), (0.5, 0.5, 0.5, 1)
@@ -59,7 +59,7 @@ def ramped_metal():
 
 
 def water():
-    """A Principled BSDF in a group that is given its colour, muted nodes and reroutes on the way."""
+    """A Principled BSDF in a group that is given its color, muted nodes and reroutes on the way."""
     group = bpy.data.node_groups.new("liquid", "ShaderNodeTree")
     group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketShader")

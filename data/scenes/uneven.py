@@ -13,7 +13,7 @@ from mathutils import Euler, Matrix
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from known_answers import camera, material  # noqa: E402
+from closed_form_scenes import camera, material  # noqa: E402
 
 TURN = Euler((0.4, 0.7, 1.1)).to_matrix().to_4x4()
 UNEVEN = Matrix.Diagonal((1, 2, 0.5, 1))

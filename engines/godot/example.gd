@@ -25,15 +25,15 @@ func _ready() -> void:
 		_middle = box.get_center()
 		_size = maxf(box.get_longest_axis_size(), 1e-3)
 	else:
-		$Lamp.visible = false
+		$PointLight.visible = false
 	$Camera.look_at_from_position(_middle + Vector3(0.0, 0.65, 0.8) * _size, _middle)
 	$Camera.far = maxf(1000.0, 10.0 * _size)
-	$Lamp.position = _middle + Vector3(-0.2, 0.3, 0.1) * _size
-	$Lamp.light_energy *= 0.4 * _size  # its answer falls with the distance
+	$PointLight.position = _middle + Vector3(-0.2, 0.3, 0.1) * _size
+	$PointLight.light_energy *= 0.4 * _size  # its answer falls with the distance
 	if _asset.is_view:
 		$Sun.light_energy = 1.0
 		$Relight.exposure = 0.5
-	$Lamp/Bulb.scale = Vector3.ONE * 0.03 * _size
+	$PointLight/Bulb.scale = Vector3.ONE * 0.03 * _size
 	get_viewport().size_changed.connect(_fit_picture)
 	_fit_picture()
 	_show_picture(_asset.is_view or not _asset.position)
@@ -44,11 +44,11 @@ func _unhandled_input(event: InputEvent) -> void:
 		if event.button_index == MOUSE_BUTTON_LEFT:
 			_dragged = event.pressed
 		elif event.pressed and event.button_index == MOUSE_BUTTON_WHEEL_UP:
-			$Lamp.position.y += 0.02 * _size
+			$PointLight.position.y += 0.02 * _size
 		elif event.pressed and event.button_index == MOUSE_BUTTON_WHEEL_DOWN:
-			$Lamp.position.y -= 0.02 * _size
+			$PointLight.position.y -= 0.02 * _size
 	if _dragged and event is InputEventMouse:
-		move_lamp(event.position)
+		move_point_light(event.position)
 	if event is InputEventKey and event.pressed:
 		match event.keycode:
 			KEY_TAB:
@@ -70,19 +70,19 @@ func _unhandled_input(event: InputEvent) -> void:
 
 
 ## Put the lamp under the mouse, its height kept: over the surface's plane, or over the picture's texel.
-func move_lamp(mouse: Vector2) -> void:
+func move_point_light(mouse: Vector2) -> void:
 	if not _asset.position:
 		return
 	if _picture.visible:
 		var place := (mouse - _picture.position) / _picture.size
 		var texel := Vector2i(place * Vector2(_asset.width, _asset.height)).clamp(Vector2i.ZERO, Vector2i(_asset.width - 1, _asset.height - 1))
 		var point := _asset.point(texel)
-		$Lamp.position = Vector3(point.x, $Lamp.position.y, point.z)
+		$PointLight.position = Vector3(point.x, $PointLight.position.y, point.z)
 		return
-	var plane := Plane(Vector3.UP, $Lamp.position)
+	var plane := Plane(Vector3.UP, $PointLight.position)
 	var hit = plane.intersects_ray($Camera.project_ray_origin(mouse), $Camera.project_ray_normal(mouse))
 	if hit != null:
-		$Lamp.position = hit
+		$PointLight.position = hit
 
 
 func _show_model() -> void:

@@ -89,7 +89,7 @@ def make_collection(node, folder):
 
 
 def make_material(node, folder, textures, collection):
-    """A material whose emissive colour is what the asset answers to the collection's lights."""
+    """A material whose emissive color is what the asset answers to the collection's lights."""
     editing = unreal.MaterialEditingLibrary
     material = make("Relit", folder, unreal.Material, unreal.MaterialFactoryNew())
     material.set_editor_property("shading_model", unreal.MaterialShadingModel.MSM_UNLIT)
@@ -125,7 +125,7 @@ def make_material(node, folder, textures, collection):
             four.set_editor_property("collection", collection)
             four.set_editor_property("parameter_name", name)
             source = four
-            if name != "LampShape":
+            if name != "PointLightShape":
                 source = editing.create_material_expression(material, unreal.MaterialExpressionComponentMask, -1000, y)
                 for channel in "rgba":
                     source.set_editor_property(channel, channel != "a")
@@ -145,20 +145,22 @@ def follow_lights():
     values = dict(node["lights"])
     actors = unreal.get_editor_subsystem(unreal.EditorActorSubsystem).get_all_level_actors()
     suns = [actor for actor in actors if isinstance(actor, unreal.DirectionalLight)]
-    lamps = [actor for actor in actors if isinstance(actor, (unreal.PointLight, unreal.SpotLight))]
+    point_lights = [actor for actor in actors if isinstance(actor, (unreal.PointLight, unreal.SpotLight))]
     for actor in suns[:1]:
         forward = actor.get_actor_forward_vector()  # where it shines
         values["SunDirection"] = [-forward.x, -forward.y, -forward.z, 0.0]
         values["SunColor"] = color_of(actor)
-    for actor in lamps[:1]:
+    for actor in point_lights[:1]:
         place, forward = actor.get_actor_location(), actor.get_actor_forward_vector()
-        values["LampPosition"] = [place.x, place.y, place.z, 0.0]
-        values["LampAxis"] = [forward.x, forward.y, forward.z, 0.0]
-        values["LampColor"] = color_of(actor)
+        values["PointLightPosition"] = [place.x, place.y, place.z, 0.0]
+        values["PointLightAxis"] = [forward.x, forward.y, forward.z, 0.0]
+        values["PointLightColor"] = color_of(actor)
         if isinstance(actor, unreal.SpotLight):
             component = actor.get_component_by_class(unreal.SpotLightComponent)
             angles = [component.get_editor_property(name) for name in ("inner_cone_angle", "outer_cone_angle")]
-            values["LampShape"] = node["lights"]["LampShape"][:2] + [2.0 * math.sin(math.radians(angle) / 2.0) ** 2 for angle in angles]
+            values["PointLightShape"] = node["lights"]["PointLightShape"][:2] + [
+                2.0 * math.sin(math.radians(angle) / 2.0) ** 2 for angle in angles
+            ]
     vectors = collection.get_editor_property("vector_parameters")
     for vector in vectors:
         vector.set_editor_property("default_value", unreal.LinearColor(*values[str(vector.get_editor_property("parameter_name"))]))
@@ -166,7 +168,7 @@ def follow_lights():
 
 
 def color_of(actor):
-    """Linear colour times intensity: lux of a directional light; set lamps to candelas."""
+    """Linear color times intensity: lux of a directional light; set lamps to candelas."""
     component = actor.get_component_by_class(unreal.LightComponent)
     color, strength = component.get_light_color(), component.get_editor_property("intensity")
     return [color.r * strength, color.g * strength, color.b * strength, 0.0]
@@ -178,10 +180,10 @@ def main():
     copy_shaders()
     hdr = unreal.TextureCompressionSettings.TC_HDR  # RGBA of half floats
     exact = getattr(unreal.TextureCompressionSettings, "TC_HDR_F32", hdr)  # 5.1 and later: the R table's own precision
-    grey = unreal.TextureCompressionSettings.TC_GRAYSCALE
+    gray = unreal.TextureCompressionSettings.TC_GRAYSCALE
     textures = {"Layers": make_layers(node, folder, hdr)}
     for name, file in node["textures"].items():
-        textures[name] = import_texture(file, folder, name == "Ambient", {"Table": exact, "Clusters": grey}.get(name, hdr))
+        textures[name] = import_texture(file, folder, name == "Ambient", {"Table": exact, "Clusters": gray}.get(name, hdr))
     make_material(node, folder, textures, make_collection(node, folder))
     unreal.log(f"srbf: {folder}/Relit is made; give it to a mesh, then run this script again with the word follow")
 

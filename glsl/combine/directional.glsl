@@ -2,7 +2,7 @@
 /* srbfCombineDirectional: sum over SRBF_K maps of weight times coefficient, the weights equal for all receivers.
    use:    vec3 srbfCombineDirectional(sampler2DArray maps, vec2 uv, int firstMap,
                                        vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
-   domain: layers firstMap ... firstMap + SRBF_K - 1 of maps; weights.rgb the lights' colours times R_i(L), summed over all
+   domain: layers firstMap ... firstMap + SRBF_K - 1 of maps; weights.rgb the lights' colors times R_i(L), summed over all
            directional and environment lights; result signed, before the clamp
    twin:   srbf.methods.relighting_map.linear_response
    cite:   Wong2005, fig. 6 */

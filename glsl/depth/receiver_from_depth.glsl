@@ -9,9 +9,9 @@
 #include "depth/ray_length.glsl"
 
 struct SrbfCamera {
-    vec3 eye;            // metres, in the asset's frame
+    vec3 eye;            // meters, in the asset's frame
     vec3 forward;        // the view axis, unit
-    vec3 centre;         // from the eye to the picture's middle: 1 m ahead, or, orthographic, sideways alone
+    vec3 center;         // from the eye to the picture's middle: 1 m ahead, or, orthographic, sideways alone
     vec3 across;         // from there to the middle of the picture's right edge
     vec3 up;             // and of its upper edge
     vec4 depthTerms;     // of srbfEyeDepth
@@ -19,7 +19,7 @@ struct SrbfCamera {
 };
 
 vec3 srbfReceiverFromDepth(float stored, vec2 place, SrbfCamera camera) {
-    vec3 sideways = camera.centre + place.x * camera.across + place.y * camera.up;
+    vec3 sideways = camera.center + place.x * camera.across + place.y * camera.up;
     vec3 eye = camera.eye + camera.orthographic * sideways;
     vec3 toEye = camera.orthographic > 0.5 ? -camera.forward : -sideways;
     return srbfPointOnRay(eye, toEye, srbfRayLength(srbfEyeDepth(stored, camera.depthTerms), toEye, camera.forward));

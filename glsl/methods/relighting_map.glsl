@@ -4,15 +4,15 @@
    use:    vec3 srbfRelightDirectional(sampler2DArray maps, vec2 uv, int firstMap,
                                        vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
            vec3 srbfRelightPoint(sampler2DArray maps, vec2 uv, int firstMap, sampler2D rTable,
-                                 vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfLamp lamp)
-   domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, metres, and the lamp in the
+                                 vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfPointLight lamp)
+   domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, meters, and the lamp in the
            asset's frame; weights summed on the host over all directional and environment lights
    twin:   srbf.methods.relighting_map.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
 #include "combine/directional.glsl"
 #include "combine/finish.glsl"
 #include "combine/point.glsl"
-#include "lights/lamp_strength.glsl"
+#include "lights/point_light_strength.glsl"
 #include "lights/light_direction.glsl"
 #include "lights/light_vector.glsl"
 
@@ -22,12 +22,12 @@ vec3 srbfRelightDirectional(highp sampler2DArray maps, vec2 uv, int firstMap,
 }
 
 vec3 srbfRelightPoint(highp sampler2DArray maps, vec2 uv, int firstMap, highp sampler2D rTable,
-                      vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfLamp lamp) {
-    vec3 lightVector = srbfLightVector(lamp.position, lamp.positionLow, receiver);
-    float strength = srbfLampStrength(lamp, lightVector);
+                      vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfPointLight pointLight) {
+    vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, receiver);
+    float strength = srbfPointLightStrength(pointLight, lightVector);
     if (strength == 0.0) {
         return vec3(0.0);  // outside a spot's cone
     }
     vec3 lightDirection = srbfLightDirection(lightVector);
-    return lamp.color * strength * srbfCombinePoint(maps, uv, firstMap, rTable, lightDirection, centers, scale, bias);
+    return pointLight.color * strength * srbfCombinePoint(maps, uv, firstMap, rTable, lightDirection, centers, scale, bias);
 }

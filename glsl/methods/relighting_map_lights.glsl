@@ -2,21 +2,21 @@
 /* srbfRelightLights: what a receiver answers to all lights at once, by relighting maps: directional, environments, points and spots.
    use:    vec3 srbfRelightLights(sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], sampler2D rTable,
                                   vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver,
-                                  vec4 lamps[4 * SRBF_LAMPS], int lampCount)
-   domain: weights summed on the host over all directional and environment lights, or 0; lamps in fours as srbfUnpackLamp takes them,
-           the first lampCount in use (0 is allowed); receiver the world position of this place, metres, one frame with the lamps;
+                                  vec4 lamps[4 * SRBF_POINT_LIGHTS], int pointLightCount)
+   domain: weights summed on the host over all directional and environment lights, or 0; lamps in fours as srbfUnpackPointLight takes them,
+           the first pointLightCount in use (0 is allowed); receiver the world position of this place, meters, one frame with the lamps;
            firstMap 0 where one pass combines all maps; level: of mip maps, 0 without. Call srbfFinish once, after all passes
    twin:   srbf.methods.relighting_map.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
 #include "combine/finish.glsl"
-#include "combine/lamps.glsl"
-#include "lights/lamps_at.glsl"
+#include "combine/point_lights.glsl"
+#include "lights/point_lights_at.glsl"
 
 vec3 srbfRelightLights(highp sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], highp sampler2D rTable,
                        vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver,
-                       vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    vec4 directions[SRBF_LAMPS];
-    vec4 colors[SRBF_LAMPS];
-    int shining = srbfLampsAt(lamps, lampCount, receiver, directions, colors);
-    return srbfCombineLamps(maps, uv, level, firstMap, weights, rTable, centers, scale, bias, directions, colors, shining);
+                       vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount) {
+    vec4 directions[SRBF_POINT_LIGHTS];
+    vec4 colors[SRBF_POINT_LIGHTS];
+    int shining = srbfPointLightsAt(pointLights, pointLightCount, receiver, directions, colors);
+    return srbfCombinePointLights(maps, uv, level, firstMap, weights, rTable, centers, scale, bias, directions, colors, shining);
 }

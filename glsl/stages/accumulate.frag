@@ -18,7 +18,7 @@ uniform vec4 weights[SRBF_UNITS];
 uniform vec4 scale[SRBF_UNITS];
 uniform vec4 bias[SRBF_UNITS];
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 #define SRBF_TERM(i) (weights[i].rgb * srbfDecode(textureLod(maps[i], uv, 0.0).rgb, scale[i].rgb, bias[i].rgb))
 
@@ -46,5 +46,5 @@ void main() {
 #if SRBF_UNITS > 7
     sum += SRBF_TERM(7);
 #endif
-    answer = vec4(sum, 1.0);
+    response = vec4(sum, 1.0);
 }

@@ -7,8 +7,8 @@ precision highp sampler2D;
 
 uniform sampler2D light;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
-    answer = vec4(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, 1.0);
+    response = vec4(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, 1.0);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
 // The multi-pass variant for clusters: a few plain textures of four scalars a pass, the cluster and its row of weights, many passes, as
-// in clustered_eigen_map_folded.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8, and two units more are taken.
+// in clustered_eigen_map_projected.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8, and two units more are taken.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -18,7 +18,7 @@ uniform sampler2D clusters;
 uniform int firstLayer;
 uniform sampler2D weights;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 vec3 term(vec4 stored, ivec2 at) {
     vec4 red = texelFetch(weights, at, 0);
@@ -55,5 +55,5 @@ void main() {
 #if SRBF_UNITS > 7
     sum += SRBF_TERM(7);
 #endif
-    answer = vec4(sum, 1.0);
+    response = vec4(sum, 1.0);
 }

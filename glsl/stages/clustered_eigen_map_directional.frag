@@ -15,9 +15,9 @@ uniform sampler2D weights;
 uniform vec4 scale[SRBF_LAYERS];
 uniform vec4 bias[SRBF_LAYERS];
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
-    answer = vec4(srbfClusteredDirectional(planes, clusters, texel, firstLayer, weights, scale, bias), 1.0);
+    response = vec4(srbfClusteredDirectional(planes, clusters, texel, firstLayer, weights, scale, bias), 1.0);
 }

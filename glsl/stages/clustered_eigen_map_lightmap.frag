@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// A surface lit by scalar planes of clusters: directional lights, environments and up to SRBF_LAMPS points and spots in one draw, finished.
+// A surface lit by scalar planes of clusters: directional lights, environments and up to SRBF_POINT_LIGHTS points and spots in one draw, finished.
 // Its place in the lightmap and its position come from lightmap.vert. Irradiance assets: outgoing light = albedo * relit / pi.
 precision highp float;
 precision highp int;
@@ -16,8 +16,8 @@ uniform sampler2D wTable;
 uniform int tableSize;
 uniform vec4 scale[SRBF_LAYERS];
 uniform vec4 bias[SRBF_LAYERS];
-uniform vec4 lamps[4 * SRBF_LAMPS];
-uniform int lampCount;
+uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS];
+uniform int pointLightCount;
 uniform sampler2D ambient;
 
 in vec3 receiver;
@@ -27,6 +27,6 @@ layout(location = 0) out vec4 relit;
 
 void main() {
     vec3 sum = srbfClusteredLightsFiltered(planes, clusters, uv, 0, weights, wTable, tableSize, scale, bias, receiver,
-                                           lamps, lampCount);
+                                           pointLights, pointLightCount);
     relit = vec4(srbfFinish(sum, textureLod(ambient, uv, 0.0).rgb), 1.0);
 }

@@ -17,12 +17,12 @@ uniform int tableSize;
 uniform int firstLayer;
 uniform vec4 scale[SRBF_LAYERS];
 uniform vec4 bias[SRBF_LAYERS];
-uniform SrbfLamp lamp;
+uniform SrbfPointLight pointLight;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
     vec3 receiver = texelFetch(positions, texel, 0).xyz;
-    answer = vec4(srbfClusteredPoint(planes, clusters, texel, firstLayer, wTable, tableSize, scale, bias, receiver, lamp), 1.0);
+    response = vec4(srbfClusteredPoint(planes, clusters, texel, firstLayer, wTable, tableSize, scale, bias, receiver, pointLight), 1.0);
 }

@@ -21,9 +21,9 @@ uniform vec2 low;
 uniform float extent;
 uniform float weight;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
-const float STEEPEST = 16.0;  // metres a metre: beyond it a receiver's plane tells nothing
+const float STEEPEST = 16.0;  // meters a meter: beyond it a receiver's plane tells nothing
 const float BIAS = 0.5;       // map texels
 
 void main() {
@@ -37,5 +37,5 @@ void main() {
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
     visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
-    answer = vec4(srbfDirect(normal, toLight, visibility) * weight, 1.0);
+    response = vec4(srbfDirect(normal, toLight, visibility) * weight, 1.0);
 }

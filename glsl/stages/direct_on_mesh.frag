@@ -10,7 +10,7 @@ precision highp sampler2D;
 #include "shadow/shadow_place.glsl"
 
 uniform sampler2D points;   // a: weight in the texel's mean
-uniform sampler2D normals;  // of shading; a: height of the rounded surface above its triangle, metres
+uniform sampler2D normals;  // of shading; a: height of the rounded surface above its triangle, meters
 uniform sampler2D faces;    // normals of the triangles
 uniform sampler2D heights;
 uniform sampler2D tints;
@@ -22,9 +22,9 @@ uniform vec2 low;
 uniform float extent;
 uniform float weight;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
-const float STEEPEST = 64.0;   // metres a metre: beyond it a receiver's plane tells nothing
+const float STEEPEST = 64.0;   // meters a meter: beyond it a receiver's plane tells nothing
 const float BIAS = 0.5;        // map texels
 const float TERMINATOR = 0.1;  // cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021]
 
@@ -46,5 +46,5 @@ void main() {
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
     visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
-    answer = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
+    response = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
 }

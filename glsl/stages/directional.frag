@@ -14,9 +14,9 @@ uniform vec4 weights[SRBF_K];
 uniform vec4 scale[SRBF_K];
 uniform vec4 bias[SRBF_K];
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
-    answer = vec4(srbfRelightDirectional(maps, uv, firstMap, weights, scale, bias), 1.0);
+    response = vec4(srbfRelightDirectional(maps, uv, firstMap, weights, scale, bias), 1.0);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
 // The multi-pass variant for scalar planes: a few plain textures of four scalars a pass, many passes, decoding folded into the weights as
-// in eigen_map_folded.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8; a sampler array takes constant indices only.
+// in eigen_map_projected.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8; a sampler array takes constant indices only.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -15,7 +15,7 @@ uniform sampler2D planes[SRBF_UNITS];
 uniform vec4 weights[3 * SRBF_UNITS];
 uniform vec3 offset;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 vec3 term(vec4 stored, vec4 red, vec4 green, vec4 blue) {
     return vec3(dot(stored, red), dot(stored, green), dot(stored, blue));
@@ -47,5 +47,5 @@ void main() {
 #if SRBF_UNITS > 7
     sum += SRBF_TERM(7);
 #endif
-    answer = vec4(sum, 1.0);
+    response = vec4(sum, 1.0);
 }

@@ -14,9 +14,9 @@ uniform sampler2D weights;
 uniform vec4 scale[SRBF_LAYERS];
 uniform vec4 bias[SRBF_LAYERS];
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(planes, 0).xy);
-    answer = vec4(srbfEigenMapDirectional(planes, uv, firstLayer, weights, scale, bias), 1.0);
+    response = vec4(srbfEigenMapDirectional(planes, uv, firstLayer, weights, scale, bias), 1.0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// All lights in one pass over scalar planes: directional, environments and up to SRBF_LAMPS points and spots. Receivers'
+// All lights in one pass over scalar planes: directional, environments and up to SRBF_POINT_LIGHTS points and spots. Receivers'
 // positions are read from a map or, with SRBF_DEPTH, rebuilt from a camera's depth buffer. Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;
@@ -25,10 +25,10 @@ uniform SrbfCamera camera;
 #else
 uniform sampler2D positions;
 #endif
-uniform vec4 lamps[4 * SRBF_LAMPS];
-uniform int lampCount;
+uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS];
+uniform int pointLightCount;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     ivec2 texel = ivec2(gl_FragCoord.xy);
@@ -40,6 +40,6 @@ void main() {
     vec3 receiver = texelFetch(positions, texel, 0).xyz;
 #endif
     vec3 sum = srbfEigenMapLights(planes, uv, 0.0, firstLayer, weights, wTable, tableSize, scale, bias, receiver,
-                                  lamps, lampCount);
-    answer = vec4(sum, 1.0);
+                                  pointLights, pointLightCount);
+    response = vec4(sum, 1.0);
 }

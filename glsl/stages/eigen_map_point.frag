@@ -16,12 +16,12 @@ uniform int tableSize;
 uniform int firstLayer;
 uniform vec4 scale[SRBF_LAYERS];
 uniform vec4 bias[SRBF_LAYERS];
-uniform SrbfLamp lamp;
+uniform SrbfPointLight pointLight;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(planes, 0).xy);
     vec3 receiver = texelFetch(positions, ivec2(gl_FragCoord.xy), 0).xyz;
-    answer = vec4(srbfEigenMapPoint(planes, uv, firstLayer, wTable, tableSize, scale, bias, receiver, lamp), 1.0);
+    response = vec4(srbfEigenMapPoint(planes, uv, firstLayer, wTable, tableSize, scale, bias, receiver, pointLight), 1.0);
 }

@@ -15,12 +15,12 @@ uniform int firstMap;
 uniform vec4 centers[SRBF_K];
 uniform vec4 scale[SRBF_K];
 uniform vec4 bias[SRBF_K];
-uniform SrbfLamp lamp;
+uniform SrbfPointLight pointLight;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
     vec3 receiver = texelFetch(positions, ivec2(gl_FragCoord.xy), 0).xyz;
-    answer = vec4(srbfRelightPoint(maps, uv, firstMap, rTable, centers, scale, bias, receiver, lamp), 1.0);
+    response = vec4(srbfRelightPoint(maps, uv, firstMap, rTable, centers, scale, bias, receiver, pointLight), 1.0);
 }

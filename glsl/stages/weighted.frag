@@ -15,9 +15,9 @@ uniform sampler2D weights;
 uniform vec4 scale[SRBF_K];
 uniform vec4 bias[SRBF_K];
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
-    answer = vec4(srbfCombineWeighted(maps, uv, 0.0, firstMap, weights, scale, bias), 1.0);
+    response = vec4(srbfCombineWeighted(maps, uv, 0.0, firstMap, weights, scale, bias), 1.0);
 }

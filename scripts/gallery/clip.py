@@ -53,17 +53,17 @@ def frames_of(places: Places, fit: Fit) -> list[ndarray]:
     scene, asset = places.scene, Asset.open(places.asset(fit))
     with Added(asset, fit.direct) as added:
 
-        def answer(light: Light) -> ndarray:
-            direct = added.answer([light])
+        def response(light: Light) -> ndarray:
+            direct = added.response([light])
             response = linear_response(asset, [light])
             return response if direct is None else response + direct
 
         if isinstance(scene.clip, Lantern):
-            moon = answer(DirectionalLight(scene.clip.moon, scene.clip.moon_color))  # stands still, and lights add up
-            lamps = lantern_lights(scene.clip, scene.frames)
-            return [with_flame(np.maximum(moon + answer(lamp), 0), asset, lamp) for lamp in lamps]
+            moon = response(DirectionalLight(scene.clip.moon, scene.clip.moon_color))  # stands still, and lights add up
+            point_lights = lantern_lights(scene.clip, scene.frames)
+            return [with_flame(np.maximum(moon + response(point_light), 0), asset, point_light) for point_light in point_lights]
         suns = sun_lights(scene.clip, scene.frames)
-        return [np.maximum(sum(answer(light) for light in lights), 0) for lights in suns]
+        return [np.maximum(sum(response(light) for light in lights), 0) for lights in suns]
 
 
 def sun_directions(sun: Sun, frames: int) -> Float64[ndarray, "F 3"]:
@@ -95,20 +95,20 @@ def lantern_lights(lantern: Lantern, frames: int) -> list[PointLight]:
     return [PointLight(_triple(place), _triple(color), falloff="inverse-square", radius=lantern.radius) for place in places]
 
 
-def with_flame(linear: ndarray, asset: Asset, lamp: PointLight) -> ndarray:
+def with_flame(linear: ndarray, asset: Asset, point_light: PointLight) -> ndarray:
     """The picture with the lamp's own flame painted where the camera sees it, in front of what lies beyond; as it is without a camera."""
     camera = asset.manifest.get("direct", {}).get("camera")
     if camera is None or camera["type"] != "PERSP":
         return linear
     height, width = linear.shape[:2]
-    x, y, depth = seen_at(camera, lamp.position, width, height)
+    x, y, depth = seen_at(camera, point_light.position, width, height)
     radius = GLOW / (depth * pixel_angle(camera, width))
     rows, columns = np.mgrid[:height, :width]
     away = np.hypot(columns + 0.5 - x, rows + 0.5 - y) / radius
     eye = np.array(camera["matrix_world"])[:3, 3]
-    beyond = np.linalg.norm(asset.images["position"] - eye, axis=2) > np.linalg.norm(np.array(lamp.position) - eye)
+    beyond = np.linalg.norm(asset.images["position"] - eye, axis=2) > np.linalg.norm(np.array(point_light.position) - eye)
     flame = np.exp(-(away**2)) + 0.01 * np.exp(-((away / HALO) ** 2))
-    strength = (flame * beyond)[..., None] * np.array(lamp.color) * 4
+    strength = (flame * beyond)[..., None] * np.array(point_light.color) * 4
     return (linear + strength).astype(np.float32)
 
 

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import srbf
-from scripts.gallery import clip, drawing, lamps, photographs, strip
+from scripts.gallery import clip, drawing, photographs, point_lights, strip
 from scripts.gallery.places import Places
 from scripts.gallery.scenes import Fit, Lantern
 from scripts.gallery.steps import Steps
@@ -35,7 +35,7 @@ FITTING = (
     "basis/*",
     "model_selection",
     "light_space",
-    "scalar_planes",
+    "coefficient_maps",
     "fitting",
     "budget",
     "stitch",
@@ -67,7 +67,7 @@ def make(places: Places, steps: Steps, reporter: Reporter) -> None:
     step("strip", source, [places.strip], lambda: strip.draw(places))
     source = [scored, _source(clip, drawing), asdict(scene)["clip"], scene.moving, scene.frames, scene.clip_width]
     step("clip", source, [places.clip], lambda: clip.draw(places))
-    _lamps(places, steps, reporter, built, scored)
+    _point_lights(places, steps, reporter, built, scored)
 
 
 def is_done(places: Places, steps: Steps) -> bool:
@@ -81,9 +81,9 @@ def _bake(places: Places, steps: Steps, reporter: Reporter, built: str) -> str:
     """The capture, by way of photographs where the scene has a dome; returns its digest."""
     scene, settings = places.scene, places.scene.bake_settings()
     if scene.dome is not None:
-        listed = places.folder / photographs.LAMPS
+        listed = places.folder / photographs.POINT_LIGHTS
         files.make_folder(places.folder)
-        photographs.write_lamps(listed, scene.dome)
+        photographs.write_point_lights(listed, scene.dome)
         settings = replace(settings, light_list=listed)
     rendered = places.rendered
     source = [built, srbf.__version__, settings.record()]
@@ -109,7 +109,7 @@ def _render(folder: Path, blend: Path, settings: BakeSettings, reporter: Reporte
 
 def _fit(places: Places, fit: Fit, say: Callable[[str], None]) -> None:
     settings = {"domain": "auto", "spread": "auto", "ridge": "auto", **fit.settings}
-    capture = places.answers(fit)
+    capture = places.responses(fit)
     asset = encode(method_for(capture, fit.method, settings, say), capture)
     asset.save(places.asset(fit), force=True)
 
@@ -134,25 +134,25 @@ def read_scores(places: Places) -> list[Score]:
     return [Score(**score) for score in files.read_json(places.scores)["scores"]]
 
 
-def _lamps(places: Places, steps: Steps, reporter: Reporter, built: str, scored: list[str]) -> None:
+def _point_lights(places: Places, steps: Steps, reporter: Reporter, built: str, scored: list[str]) -> None:
     """Where a lantern is carried: true lamps of Cycles on its path, how far the relit ones are from them, and both side by side."""
-    scene, settings = places.scene, places.scene.lamp_settings()
+    scene, settings = places.scene, places.scene.point_light_settings()
     if settings is None or not isinstance(scene.clip, Lantern):
         return
-    known = [places.true_lamps / MANIFEST]
+    known = [places.true_point_lights / MANIFEST]
     source = [built, srbf.__version__, settings.record()]
-    work = partial(_render, places.true_lamps, places.blend, settings, reporter)
+    work = partial(_render, places.true_point_lights, places.blend, settings, reporter)
     baked = steps.run(f"{scene.name}/bake true lamps", source, known, work)
     split = scene.moved[0]
-    errors = [places.lamp_errors(split)]
+    errors = [places.point_light_errors(split)]
     measured = steps.run(
         f"{scene.name}/evaluate true lamps",
-        [baked, scored, split.folder, library(MEASURING), _source(lamps)],
+        [baked, scored, split.folder, library(MEASURING), _source(point_lights)],
         errors,
-        lambda: lamps.evaluate_lamps(places, split),
+        lambda: point_lights.evaluate_point_lights(places, split),
     )
-    source = [measured, _source(lamps, strip, drawing)]
-    steps.run(f"{scene.name}/lamp strip", source, [places.lamp_strip], lambda: lamps.draw(places, split))
+    source = [measured, _source(point_lights, strip, drawing)]
+    steps.run(f"{scene.name}/lamp strip", source, [places.point_light_strip], lambda: point_lights.draw(places, split))
 
 
 def library(patterns: Sequence[str]) -> str:

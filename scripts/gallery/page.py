@@ -37,17 +37,17 @@ def _scene(places: Places, steps: Steps, folder: str) -> str:
     parts = [f"## {TITLES[scene.name]}", WORDS[scene.name].strip()]
     parts.append(f"![{scene.name}: rendered and relit under held-out lights]({folder}/{places.strip.name})")
     parts.append(f"![{scene.name} under lights that move]({folder}/{places.clip.name})")
-    parts.append(_lamps(places, folder))
+    parts.append(_point_lights(places, folder))
     parts.append(_bake_table(places, steps))
     parts.append(_asset_table(places, steps))
     return "\n\n".join(part for part in parts if part)
 
 
-def _lamps(places: Places, folder: str) -> str:
+def _point_lights(places: Places, folder: str) -> str:
     fit = places.scene.moved[0]
-    if not places.lamp_strip.is_file() or not places.lamp_errors(fit).is_file():
+    if not places.point_light_strip.is_file() or not places.point_light_errors(fit).is_file():
         return ""
-    errors = files.read_json(places.lamp_errors(fit))
+    errors = files.read_json(places.point_light_errors(fit))
     relit, alone, count = errors["relit"], errors["alone"], _number(len(errors["lights"]))
     words = (
         f"The lantern against {count} true Cycles lamps on its path (a bake of point lights), and in brackets its\n"
@@ -56,7 +56,7 @@ def _lamps(places: Places, folder: str) -> str:
         f"without the worst pixel in a hundred, highlights and Cycles' own sparks, **{relit['rest']:.2f}** ({alone['rest']:.2f});\n"
         f"mean brightness {100 * relit['brightness']:.0f} % ({100 * alone['brightness']:.0f} %) of the true one."
     )
-    return f"{words}\n\n![Three true lamps, relit, and their direct light alone]({folder}/{places.lamp_strip.name})"
+    return f"{words}\n\n![Three true lamps, relit, and their direct light alone]({folder}/{places.point_light_strip.name})"
 
 
 def _bake_table(places: Places, steps: Steps) -> str:

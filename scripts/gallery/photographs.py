@@ -15,7 +15,7 @@ from srbf.io import files
 from srbf.io.image import encode_srgb
 from srbf.sphere import point_set, random_directions
 
-LAMPS, DIRS, TEST = "lamps.lp", "dirs.lp", "test.lp"
+POINT_LIGHTS, DIRS, TEST = "point_lights.lp", "dirs.lp", "test.lp"
 QUALITY = 95  # of the JPEGs
 WHITEST = 0.998  # of the pixels of all photographs are below white
 
@@ -23,7 +23,7 @@ WHITEST = 0.998  # of the pixels of all photographs are below white
 def dome_directions(dome: Dome) -> Float64[ndarray, "L 3"]:
     """Its lamps, evenly spread above its lowest elevation, then the random ones to test by."""
     floor = np.sin(np.radians(dome.lowest))
-    even = point_set("fibonacci", dome.lamps, "hemisphere")
+    even = point_set("fibonacci", dome.point_lights, "hemisphere")
     random = random_directions(dome.tests, "hemisphere", np.random.default_rng(5))
     return np.concatenate([_lifted(even, floor), _lifted(random, floor)])
 
@@ -41,7 +41,7 @@ def write_list(path: Path, names: list[str], directions: Float64[ndarray, "n 3"]
     files.write_text(path, "\n".join([str(len(lines)), *lines]) + "\n")
 
 
-def write_lamps(path: Path, dome: Dome) -> None:
+def write_point_lights(path: Path, dome: Dome) -> None:
     """The light list that Blender bakes by."""
     directions = dome_directions(dome)
     write_list(path, [f"{i:03d}" for i in range(len(directions))], directions)
@@ -53,11 +53,11 @@ def photograph(rendered: Path, dome: Dome, folder: Path) -> None:
     capture = Capture.open(rendered)
     everything = np.concatenate([image[::4, ::4].ravel() for image in map(capture.image, range(len(capture.lights)))])
     gain = 1.0 / float(np.quantile(everything, WHITEST))
-    names = [f"{'test' if i >= dome.lamps else 'photo'}_{i:03d}.jpg" for i in range(len(capture.lights))]
+    names = [f"{'test' if i >= dome.point_lights else 'photo'}_{i:03d}.jpg" for i in range(len(capture.lights))]
     for i, name in enumerate(names):
         bytes_ = np.round(encode_srgb(np.clip(capture.image(i) * gain, 0, 1)) * 255).astype(np.uint8)
         with files.atomic_path(folder / name) as temporary:
             Image.fromarray(bytes_).save(temporary, "JPEG", quality=QUALITY, subsampling=0)
     directions = capture.directions()
-    write_list(folder / DIRS, names[: dome.lamps], directions[: dome.lamps])
-    write_list(folder / TEST, names[dome.lamps :], directions[dome.lamps :])
+    write_list(folder / DIRS, names[: dome.point_lights], directions[: dome.point_lights])
+    write_list(folder / TEST, names[dome.point_lights :], directions[dome.point_lights :])

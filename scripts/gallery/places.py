@@ -35,8 +35,8 @@ class Places:
         return self.folder / "photographs"
 
     @property
-    def true_lamps(self) -> Path:
-        return self.folder / "true-lamps"
+    def true_point_lights(self) -> Path:
+        return self.folder / "true-point_lights"
 
     @property
     def scores(self) -> Path:
@@ -51,8 +51,8 @@ class Places:
         return self.docs / f"{self.scene.name}-clip.webp"
 
     @property
-    def lamp_strip(self) -> Path:
-        return self.docs / f"{self.scene.name}-lamps.webp"
+    def point_light_strip(self) -> Path:
+        return self.docs / f"{self.scene.name}-point_lights.webp"
 
     def asset(self, fit: Fit) -> Path:
         return self.folder / fit.folder
@@ -60,10 +60,10 @@ class Places:
     def errors(self, fit: Fit) -> Path:
         return self.folder / f"{fit.folder}.errors.json"
 
-    def lamp_errors(self, fit: Fit) -> Path:
-        return self.folder / f"{fit.folder}.lamps.json"
+    def point_light_errors(self, fit: Fit) -> Path:
+        return self.folder / f"{fit.folder}.point_lights.json"
 
-    def answers(self, fit: Fit) -> Capture:
+    def responses(self, fit: Fit) -> Capture:
         """What a fit is fitted to."""
         opened = Capture.open(self.capture)
         return opened.combined() if fit.light == "all" else opened

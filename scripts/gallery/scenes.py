@@ -35,7 +35,7 @@ class Fit:
 class Dome:
     """A photographer's dome: so many lamps above an elevation (degrees), every one photographed, some only to test by."""
 
-    lamps: int
+    point_lights: int
     tests: int
     lowest: float
 
@@ -58,7 +58,7 @@ class Sun:
     low: float
     high: float
     swings: int = 1
-    second: Place | None = None  # colour of another one that goes the other way
+    second: Place | None = None  # color of another one that goes the other way
     color: Place = (1.0, 1.0, 1.0)
 
 
@@ -115,7 +115,7 @@ class Scene:
             return replace(settings, validation=0, holdout=0)
         return settings.with_matched_sun() if self.soft_sun else settings
 
-    def lamp_settings(self, samples: int = 64) -> BakeSettings | None:
+    def point_light_settings(self, samples: int = 64) -> BakeSettings | None:
         """A bake of true lamps on the lantern's path, by which the relit lantern is measured."""
         if not isinstance(self.clip, Lantern):
             return None
@@ -127,7 +127,7 @@ class Scene:
         """The same with few lights on few texels, in seconds: for the test."""
         largest = max(self.size)
         size = (max(24, 64 * self.size[0] // largest), max(24, 64 * self.size[1] // largest))
-        dome = self.dome and replace(self.dome, lamps=24, tests=4)
+        dome = self.dome and replace(self.dome, point_lights=24, tests=4)
         return replace(
             self,
             size=size,
@@ -179,7 +179,7 @@ SCENES = (
         ),
     ),
     Scene(
-        name="coloured_room",
+        name="colored_room",
         receivers=("view",),
         size=(384, 288),
         soft_sun=True,

@@ -40,7 +40,7 @@ def draw(places: Places) -> None:
     scene = places.scene
     capture = Capture.open(places.capture).combined()
     chosen = tested_lights(capture, scene.tested)
-    answers = [relit(places, fit_index, capture, chosen) for fit_index in range(len(scene.fits))]
+    responses = [relit(places, fit_index, capture, chosen) for fit_index in range(len(scene.fits))]
     errors = [files.read_json(places.errors(fit)) for fit in scene.fits]
     rows = []
     for n, index in enumerate(chosen):
@@ -55,7 +55,7 @@ def draw(places: Places) -> None:
             Row(
                 drawing.sun(direction, SIDE - 14),
                 (f"{elevation:.0f}° high",),
-                (reference, *(answer[n] for answer in answers)),
+                (reference, *(response[n] for response in responses)),
                 tuple(under),
                 drawing.gain_of(reference),
             )

@@ -21,9 +21,9 @@ picture's many, most where things gloss. Dashed and dotted: all captured images 
 every image."""
 
 TITLES = {
-    "caustics": "Caustics and coloured shadows",
+    "caustics": "Caustics and colored shadows",
     "house": "A lantern carried through a room at night",
-    "coloured_room": "Glossy things in a coloured room",
+    "colored_room": "Glossy things in a colored room",
     "lattice": "Shadows of laths and leaves",
     "coin": "A coin under a dome of lamps",
     "still_life": "Vases and a ring in one atlas",
@@ -31,7 +31,7 @@ TITLES = {
 
 WORDS = {
     "caustics": """
-A table's lightmap under two glass rings, a ball and an angel of tinted glass, beside an opaque pawn: light gathers, shadows have colours.
+A table's lightmap under two glass rings, a ball and an angel of tinted glass, beside an opaque pawn: light gathers, shadows have colors.
 The glass is the scene's stand-in, a tint by angle; the sun is as wide as the captured lights stand apart.
 
 Where it fails: 25 maps blur every shape to their own width and smear what a low sun draws out. Clusters keep the shapes at a small part of
@@ -45,7 +45,7 @@ Where it fails: all light in the maps does not work, 25 of them lose the shadow 
 maps and look worse, shade turning into brown fog or grain, since a few glossy sparks take what they hold. And a capture under suns
 outside can only guess where a lamp inside is reflected to: its shade stays too dark; how far off that is stands below.
 """,
-    "coloured_room": """
+    "colored_room": """
 A stage between a red and a green wall, with steel, copper, gold, glaze and lacquer on it, under a sun as wide as the captured lights stand
 apart. What has met a wall bleeds and is held: red and green on floor and block, and soft shadows about where they belong.
 
@@ -58,7 +58,7 @@ A terrace under a vine: leaves and laths draw hard shadows, finer than the captu
 through leaves as well, 16 bytes a texel hold what is left.
 
 Where it fails: with the shadows in the maps nothing works, neither 25 maps nor the best of 16 bytes, which show stains that come and go
-in the shadows' places. And 16 scalars share their colours: a blue bench turns green in the shade.
+in the shadows' places. And 16 scalars share their colors: a blue bench turns green in the shade.
 """,
     "coin": """
 A relightable photograph: a coin of ours under a dome of lamps, delivered as a photographer would, as 8-bit JPEGs and a light list, and

@@ -35,7 +35,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "width": settings.width,
         "height": settings.height,
         "quantity": settings.quantity,
-        "keep_lamps": settings.keep_lamps,
+        "keep_scene_lights": settings.keep_scene_lights,
         "sun_angle": settings.sun_angle,
         "transport": settings.transport,
         "no_shadow": list(settings.no_shadow),

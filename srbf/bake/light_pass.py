@@ -5,12 +5,12 @@ from __future__ import annotations
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.bake.crew import Answer, Task
 from srbf.bake.images import CaptureImages
 from srbf.bake.sums import NOTHING, Sums
+from srbf.bake.worker_pool import Response, Task
 
 
-def add_pass(images: CaptureImages, sums: Sums, task: Task, answer: Answer) -> Float32[ndarray, "H W 3"] | None:
+def add_pass(images: CaptureImages, sums: Sums, task: Task, response: Response) -> Float32[ndarray, "H W 3"] | None:
     """Add `answer` to the light of `task`; what the capture then holds of it but for the rounding.
 
     None where the light is not at the pass that `task` adds to: it is rendered again from where it is. BakeError on NaN or another size.
@@ -22,11 +22,11 @@ def add_pass(images: CaptureImages, sums: Sums, task: Task, answer: Answer) -> F
     if total.passes != task.before:  # damaged since it was counted
         sums.forget(light)
         return None
-    for image in (answer.whole, answer.direct):
+    for image in (response.whole, response.direct):
         if image is not None:
             images.require_size(light, image)
-    total = total.with_pass(task.samples, answer.whole, answer.direct, task.squares)
+    total = total.with_pass(task.samples, response.whole, response.direct, task.squares)
     own = images.own_light(light, total.mean)
     images.publish(light, own, total.direct_mean)
-    sums.write(light, total, task.keep, images.checksum(light, answer.direct is not None))
+    sums.write(light, total, task.keep, images.checksum(light, response.direct is not None))
     return own

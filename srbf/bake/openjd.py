@@ -17,7 +17,7 @@ from srbf.io import files
 TEMPLATE = "template.json"
 PARAMETERS = "parameters.json"
 LIGHT_LIST = "lights.lp"
-LIGHTS_A_TASK = 32
+LIGHTS_PER_TASK = 32
 NAME_LENGTH = 64  # of a job, at most
 FIT = """import shlex, subprocess, sys
 
@@ -42,11 +42,11 @@ def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> No
 
 
 def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
-    """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_A_TASK lights."""
+    """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_PER_TASK lights."""
     if bake.is_open_ended:
         raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time")
     lights = len(plan_lights(bake.settings))
-    count = min(lights, tasks or -(-lights // LIGHTS_A_TASK))
+    count = min(lights, tasks or -(-lights // LIGHTS_PER_TASK))
     command = ["-m", "srbf", "bake", "{{Param.Scene}}", "-o", "{{Param.Capture}}", *_flags(bake)]
     listed = [_path("LightList", "FILE", "IN", "Directions to fit.", LIGHT_LIST)] if bake.settings.light_list is not None else []
     return {
@@ -97,15 +97,15 @@ def arguments(settings: BakeSettings) -> list[str]:
     words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
     flags += [f"--no-shadow={name}" for name in settings.no_shadow]
-    flags += ["--keep-lamps"] if settings.keep_lamps else []
+    flags += ["--keep-scene-lights"] if settings.keep_scene_lights else []
     return flags + (["--denoise"] if settings.denoise else [])
 
 
 def _flags(bake: Bake) -> list[str]:
     crew = {
         "workers": bake.crew.workers,
-        "lights-a-worker": bake.crew.lights_a_worker,
-        "hang-after": bake.crew.hang_after,
+        "lights-a-worker": bake.crew.lights_per_worker,
+        "hang-after": bake.crew.worker_timeout,
         "blender": bake.blender,
     }
     flags = [f"--{name}={value}" for name, value in crew.items() if value is not None]

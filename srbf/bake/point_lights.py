@@ -13,15 +13,15 @@ from numpy import ndarray
 from srbf.arrays import Float64
 from srbf.errors import InputError
 
-Box = tuple[float, float, float, float, float, float]  # x0, y0, z0, x1, y1, z1, metres
+Box = tuple[float, float, float, float, float, float]  # x0, y0, z0, x1, y1, z1, meters
 Places = tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True)
 class PointGrid:
-    """Lamps `spacing` metres apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
+    """Lamps `spacing` meters apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
 
-    `grid` and `random` are positions in metres, not known before `srbf.bake.survey.with_free_lamps` has asked the scene.
+    `grid` and `random` are positions in meters, not known before `srbf.bake.survey.with_free_point_lights` has asked the scene.
     """
 
     spacing: float
@@ -43,18 +43,18 @@ class PointGrid:
         kind, _, spacing = light_set.partition(":")
         box: Box | None = None
         try:
-            metres = float(spacing)
+            meters = float(spacing)
         except ValueError:
-            kind, metres = "", 0.0
+            kind, meters = "", 0.0
         if kind != "point":
-            raise InputError(f"expected --light-set point:SPACING, the spacing in metres, found {light_set!r}")
+            raise InputError(f"expected --light-set point:SPACING, the spacing in meters, found {light_set!r}")
         if light_box is not None:
             try:
                 x0, y0, z0, x1, y1, z1 = (float(word) for word in light_box.split(","))
                 box = (x0, y0, z0, x1, y1, z1)
             except ValueError as error:
-                raise InputError(f"expected --light-box x0,y0,z0,x1,y1,z1 in metres, found {light_box!r}") from error
-        return PointGrid(metres, box)
+                raise InputError(f"expected --light-box x0,y0,z0,x1,y1,z1 in meters, found {light_box!r}") from error
+        return PointGrid(meters, box)
 
     def places(self, validation: int, holdout: int) -> tuple[Float64[ndarray, "L 3"], Float64[ndarray, "V 3"], Float64[ndarray, "H 3"]]:
         """(train, validation, holdout) positions; InputError before a survey, or where it was for fewer."""

@@ -24,7 +24,7 @@ MIDDLE = (0.1, 0.9)  # quantiles of the receivers' positions that bound the scen
 DISTANCE = (0.1, 0.6)  # from a lamp to the receiver that it stands before, in extents of that box
 
 
-def compare_with_lamps(
+def compare_with_point_lights(
     asset: Asset,
     scene: Path,
     count: int,
@@ -58,22 +58,22 @@ def compare_with_lamps(
         say(f"{scene.name} is not as it was when this asset's capture was baked: the figures mix two scenes")
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
-    lamps = lamp_positions(asset, count, seed)
-    references = _render(asset, described, scene, lamps, samples, seed, progress, say, blender)
+    point_lights = point_light_positions(asset, count, seed)
+    references = _render(asset, described, scene, point_lights, samples, seed, progress, say, blender)
     distances: list[np.ndarray] = []
     errors: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]] = {falloff: [] for falloff in FALLOFFS}
-    for lamp, reference in zip(lamps, references, strict=True):
-        distances.append(np.linalg.norm(lamp - positions, axis=1))
+    for point_light, reference in zip(point_lights, references, strict=True):
+        distances.append(np.linalg.norm(point_light - positions, axis=1))
         for falloff in FALLOFFS:
-            lights = [PointLight(tuple(lamp), falloff=falloff)]
+            lights = [PointLight(tuple(point_light), falloff=falloff)]
             relit = methods.relight(asset, lights, direct(lights))
             if "ambient" in asset.images:
                 relit = relit - asset.images["ambient"]
             errors[falloff].append((relit[covered], reference[covered]))
-    return _by_distance(np.concatenate(distances), errors, lamps)
+    return _by_distance(np.concatenate(distances), errors, point_lights)
 
 
-def lamp_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
+def point_light_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
     """(count, 3) places inside the scene: before a random receiver, along its normal, by a random part of the scene's extent.
 
     The extent, and the receivers to choose from, are the box that holds the middle four fifths of the receivers on each axis: a
@@ -94,7 +94,7 @@ def _render(
     asset: Asset,
     described: list[dict[str, Any]],
     scene: Path,
-    lamps: np.ndarray,
+    point_lights: np.ndarray,
     samples: int,
     seed: int,
     progress: Callable[[float, float], None],
@@ -104,8 +104,8 @@ def _render(
     chosen = asset.manifest["source"].get("settings", {}).get("scene")
     settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
     lights = [
-        {"index": i, "kind": "point", "position": lamp.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
-        for i, lamp in enumerate(lamps)
+        {"index": i, "kind": "point", "position": point_light.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
+        for i, point_light in enumerate(point_lights)
     ]
     images: list[np.ndarray] = []
     left: np.ndarray | float = 0.0
@@ -129,7 +129,9 @@ def _render(
     return images
 
 
-def _by_distance(distance: np.ndarray, pairs: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]], lamps: np.ndarray) -> dict[str, Any]:
+def _by_distance(
+    distance: np.ndarray, pairs: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]], point_lights: np.ndarray
+) -> dict[str, Any]:
     edges = np.quantile(distance, np.linspace(0, 1, DISTANCE_BINS + 1))
     which = np.clip(np.searchsorted(edges, distance, side="right") - 1, 0, DISTANCE_BINS - 1)
     measured: dict[str, tuple[np.ndarray, np.ndarray, float]] = {}
@@ -149,7 +151,7 @@ def _by_distance(distance: np.ndarray, pairs: dict[Falloff, list[tuple[np.ndarra
         return row
 
     return {
-        "lamps": lamps.tolist(),
+        "point_lights": point_lights.tolist(),
         "best_scale": {falloff: scale for falloff, (_, _, scale) in measured.items()},
         "all": errors(slice(None)),
         "by_distance": [

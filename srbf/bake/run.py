@@ -16,7 +16,6 @@ from numpy import ndarray
 
 from srbf.bake import folder, stopping
 from srbf.bake.checks import FIRST_LIGHTS, FirstLights, bytes_needed, check_disk
-from srbf.bake.crew import Answer, Committed, Crew, CrewSettings, Renderer, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
@@ -27,12 +26,13 @@ from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, rende
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
 from srbf.bake.sums import LATE, SUMS, Sums
 from srbf.bake.worker import Worker
+from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, WorkerPool, WorkerPoolSettings
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError
 from srbf.io import files
 
 if TYPE_CHECKING:
-    from srbf.bake.dask_crew import DaskCrew
+    from srbf.bake.dask_workers import DaskWorkerPool
 
 CURVE = "curve.json"  # in the folder of sums: what --samples auto measured
 
@@ -56,7 +56,7 @@ class Bake:
     folder: Path
     settings: BakeSettings
     blender: Path | None = None
-    crew: CrewSettings = field(default_factory=CrewSettings)
+    crew: WorkerPoolSettings = field(default_factory=WorkerPoolSettings)
     seconds: float | None = None
     keep_sums: bool = False
     dask: str | None = None  # address of a scheduler whose workers render, instead of a crew of this machine
@@ -187,14 +187,14 @@ class _Passes:
                 raise
         self._finish()
 
-    def _renderer(self) -> Crew | DaskCrew:
-        crew = Crew(self._bake.crew, self._scratch, self._start, self._ready, self._reporter.say)
+    def _renderer(self) -> WorkerPool | DaskWorkerPool:
+        crew = WorkerPool(self._bake.crew, self._scratch, self._start, self._ready, self._reporter.say)
         if self._bake.dask is None:
             return crew
-        from srbf.bake.dask_crew import DaskCrew
+        from srbf.bake.dask_workers import DaskWorkerPool
         from srbf.compute.dask_client import checked
 
-        return DaskCrew(checked(self._bake.dask), self._bake, self._identity, crew, self._say_once)
+        return DaskWorkerPool(checked(self._bake.dask), self._bake, self._identity, crew, self._say_once)
 
     def _passes(self, crew: Renderer) -> None:
         while not self._is_time_up():
@@ -274,10 +274,14 @@ class _Passes:
         seed = noise_seed(self._settings.seed, light.index, level)
         return Task(light, samples, seed, level, self._needs_squares(light), self._keep or done + samples < goal, denoise)
 
-    def _take(self, task: Task, answer: Answer | Committed) -> None:
+    def _take(self, task: Task, response: Response | RemoteResult) -> None:
         light = task.light
         try:
-            own = self._committed(task, answer) if isinstance(answer, Committed) else add_pass(self._images, self._sums, task, answer)
+            own = (
+                self._committed(task, response)
+                if isinstance(response, RemoteResult)
+                else add_pass(self._images, self._sums, task, response)
+            )
         except BakeError as error:
             if self._first.looking:
                 raise
@@ -289,12 +293,12 @@ class _Passes:
         with self._mutex:
             self._first.look(own)
             self._tell_progress(task.before + 1)
-            self._log(f"light {light.index} pass {task.before + 1} of {task.samples} in {answer.seconds:.3f} s")
+            self._log(f"light {light.index} pass {task.before + 1} of {task.samples} in {response.seconds:.3f} s")
 
-    def _committed(self, task: Task, answer: Committed) -> ndarray:
+    def _committed(self, task: Task, response: RemoteResult) -> ndarray:
         """What another machine wrote, while the first lights are looked at."""
-        if answer.error is not None:
-            raise BakeError(answer.error)
+        if response.error is not None:
+            raise BakeError(response.error)
         if not self._sums.refresh(task.light, task.before + 1, LATE):
             raise BakeError(
                 f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see one folder?"

@@ -124,7 +124,7 @@ class BakeSettings:
     quantity: Quantity = "irradiance"
     seed: int = 0
     sun_angle: float = 0.0  # angular diameter of the light
-    keep_lamps: bool = False
+    keep_scene_lights: bool = False
     light_list: Path | None = None
     transport: Transport = "combined"
     points: PointGrid | None = None  # lamps instead of directional lights

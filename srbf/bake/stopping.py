@@ -41,7 +41,7 @@ def measure(capture: Capture, samples: int, sums: Sequence[Sum]) -> Measure:
     train = sample.directions[: sample.train]
     choice = choose_functions(sample, dense_centers(train, domain_of(train)))
     noise = float(np.mean([total.noise_variance().reshape(-1, 3)[sample.texels].mean(dtype=np.float64) for total in sums]))
-    power = float((sample.answers[:, sample.train :].astype(np.float64) ** 2).mean()) - noise
+    power = float((sample.responses[:, sample.train :].astype(np.float64) ** 2).mean()) - noise
     power = max(power, 1e-30)
     return Measure(samples, float(np.sqrt(max(choice.error - noise, 0.0) / power)), float(np.sqrt(noise / power)))
 

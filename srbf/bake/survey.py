@@ -43,32 +43,32 @@ def objects_of(bake: Bake, collections: list[str], say: Callable[[str], None] = 
     return list(survey(bake, {"collections": collections}, say)["objects"])
 
 
-def with_size(bake: Bake, texels_per_metre: float | None = None, say: Callable[[str], None] = lambda line: None) -> Bake:
+def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[str], None] = lambda line: None) -> Bake:
     """The same bake with the size that its receiver takes: of a list of vertices, or of a lightmap of a mean density.
 
     The square's side is D sqrt(area in the world / area of the UV layer), rounded up to a multiple of 4; InputError where that is past
     16384, with the density to take. A bake that needs neither is returned as it is.
     """
     if bake.settings.receiver.kind == "vertices":
-        if texels_per_metre is not None:
-            raise InputError("--texels-per-metre belongs to a lightmap, found it with vertices")
+        if texels_per_meter is not None:
+            raise InputError("--texels-per-meter belongs to a lightmap, found it with vertices")
         facts = survey(bake, {"vertices": True}, say)
         return _sized(bake, facts["width"], facts["height"])
-    if texels_per_metre is None:
+    if texels_per_meter is None:
         return bake
     if bake.settings.receiver.kind != "lightmap":
-        raise InputError("--texels-per-metre belongs to a lightmap, found it with a view; give its --size")
-    if not (texels_per_metre > 0 and math.isfinite(texels_per_metre)):
-        raise InputError(f"expected --texels-per-metre above 0, found {texels_per_metre:g}")
-    facts = survey(bake, {"texels_per_metre": texels_per_metre}, say)
+        raise InputError("--texels-per-meter belongs to a lightmap, found it with a view; give its --size")
+    if not (texels_per_meter > 0 and math.isfinite(texels_per_meter)):
+        raise InputError(f"expected --texels-per-meter above 0, found {texels_per_meter:g}")
+    facts = survey(bake, {"texels_per_meter": texels_per_meter}, say)
     side = MULTIPLE * math.ceil(facts["side"] / MULTIPLE)
     if side > LARGEST_SIDE:
         most = math.floor(LARGEST_SIDE * math.sqrt(facts["uv_area"] / facts["world_area"]) * 100) / 100
         raise InputError(
-            f"expected a lightmap of at most {LARGEST_SIDE} texels a side, found {side} at {texels_per_metre:g} texels a metre on "
-            f"{facts['world_area']:.4g} square metres; take --texels-per-metre {most:g} or less, or --separate lightmaps"
+            f"expected a lightmap of at most {LARGEST_SIDE} texels a side, found {side} at {texels_per_meter:g} texels a meter on "
+            f"{facts['world_area']:.4g} square meters; take --texels-per-meter {most:g} or less, or --separate lightmaps"
         )
-    say(f"{side}x{side} texels: {texels_per_metre:g} a metre on {facts['world_area']:.4g} square metres, UVs fill {facts['uv_area']:.0%}")
+    say(f"{side}x{side} texels: {texels_per_meter:g} a meter on {facts['world_area']:.4g} square meters, UVs fill {facts['uv_area']:.0%}")
     return _sized(bake, side, side)
 
 
@@ -98,7 +98,7 @@ def size_of_begun(folder: Path) -> tuple[int, int] | None:
     return None
 
 
-def with_free_lamps(bake: Bake, say: Callable[[str], None] = lambda line: None) -> Bake:
+def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line: None) -> Bake:
     """The same bake with the lamps that are free in its scene, where it is one under point lights whose places are not known yet."""
     settings, points = bake.settings, bake.settings.points
     if points is None or points.grid is not None:

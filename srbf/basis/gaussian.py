@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
 from srbf.errors import InputError
-from srbf.sphere import nearest_neighbour_angles
+from srbf.sphere import nearest_neighbor_angles
 
 SpreadRule = Literal["mean", "min"]
 
@@ -46,13 +46,13 @@ class GaussianBasis:
 
 
 def spread_of(centers: Float[ndarray, "K 3"], rule: SpreadRule | float) -> float:
-    """The shared spread, rad: `mean` nearest-neighbour distance (the authors' released code), `min` (the article), or a number."""
+    """The shared spread, rad: `mean` nearest-neighbor distance (the authors' released code), `min` (the article), or a number."""
     if isinstance(rule, (int, float)):
         spread = float(rule)
         if not (np.isfinite(spread) and spread > 0):
             raise InputError(f"expected a spread above 0 rad, found {rule}")
         return spread
-    distances = nearest_neighbour_angles(centers)
+    distances = nearest_neighbor_angles(centers)
     if rule == "mean":
         return float(distances.mean())
     if rule == "min":

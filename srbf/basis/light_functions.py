@@ -34,10 +34,10 @@ class LightFunctions:
 
     def fold(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
         """sum_n color_n w_f(direction_n): what many lights, or the texels of an environment, come to together."""
-        folded = np.empty((len(self.spreads), 3))
+        projected = np.empty((len(self.spreads), 3))
         for chosen, weights in self._by_spread(directions):
-            folded[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)
-        return folded
+            projected[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)
+        return projected
 
     def _by_spread(self, directions: Float[ndarray, "N 3"]) -> Iterator[tuple[Bool[ndarray, " F"], Float64[ndarray, "N B"]]]:
         cosines = np.asarray(directions, np.float64) @ self.centers.T

@@ -15,13 +15,13 @@ SIZES = (17, 33, 65, 129)
 TABLE_ERROR = 2.0**-5  # rms of the mixed table's error over the rms of the functions: 30 dB below them, where captures hold 20 to 35
 TABLE_BYTES = 32 << 20  # that a table may take at most, as RGBA halves
 PROBES, PROBED = 4096, 64  # directions, and functions of many, on which the error is taken
-NODES_AT_A_TIME = 512
+NODE_BATCH = 512
 
 
 def table_directions(size: int) -> Float64[ndarray, "n n 3"]:
     """The unit direction of every node: row i, column j at octahedral coordinates -1 + 2 j / (n - 1), -1 + 2 i / (n - 1).
 
-    Nodes stand on the borders, where partners across a fold are one direction: mixing needs no neighbour outside the tile.
+    Nodes stand on the borders, where partners across a fold are one direction: mixing needs no neighbor outside the tile.
     """
     line = np.linspace(-1, 1, size)
     return octahedral_decode(*np.meshgrid(line, line))
@@ -81,8 +81,8 @@ def _atlas(functions: LightFunctions, size: int) -> tuple[np.ndarray, int]:
     rows = -(-count // columns)
     nodes = table_directions(size).reshape(-1, 3)
     tiles = np.zeros((rows * columns, size * size, 3), np.float16)
-    for start in range(0, len(nodes), NODES_AT_A_TIME):
-        part = slice(start, start + NODES_AT_A_TIME)
+    for start in range(0, len(nodes), NODE_BATCH):
+        part = slice(start, start + NODE_BATCH)
         tiles[:count, part] = functions.evaluate(nodes[part]).transpose(1, 0, 2)
     atlas = tiles.reshape(rows, columns, size, size, 3).transpose(0, 2, 1, 3, 4).reshape(rows * size, columns * size, 3)
     return np.ascontiguousarray(atlas), columns

@@ -8,14 +8,14 @@ from typing import Annotated, Literal
 
 import typer
 
-from srbf.bake.crew import CrewSettings
 from srbf.bake.estimate import estimate
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
 from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import objects_of, with_frame, with_free_lamps, with_size
+from srbf.bake.survey import objects_of, with_frame, with_free_point_lights, with_size
+from srbf.bake.worker_pool import WorkerPoolSettings
 from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
 from srbf.errors import InputError
@@ -47,7 +47,7 @@ def bake(
             help="Texels, WxH, or N for NxN. Default: 256x256; of a view, 256 on the longer side of its camera's frame.", show_default=False
         ),
     ] = None,
-    texels_per_metre: Annotated[
+    texels_per_meter: Annotated[
         float | None, typer.Option(help="Mean density of a lightmap, which decides its size.", show_default=False)
     ] = None,
     unwrap: Annotated[
@@ -83,7 +83,7 @@ def bake(
     ] = None,
     light_set: Annotated[
         str | None,
-        typer.Option(help="point:SPACING: a box filled with lamps so many metres apart, instead of --lights.", show_default=False),
+        typer.Option(help="point:SPACING: a box filled with lamps so many meters apart, instead of --lights.", show_default=False),
     ] = None,
     light_box: Annotated[
         str | None, typer.Option(help="x0,y0,z0,x1,y1,z1 of --light-set, m; default: all that renders.", show_default=False)
@@ -91,13 +91,13 @@ def bake(
     sun_angle: Annotated[
         str, typer.Option(help="Angular diameter of the light, rad; auto: as large as the fitted lights stand apart.")
     ] = "0",
-    keep_lamps: Annotated[bool, typer.Option("--keep-lamps", help="The scene's own lamps and world become ambient.")] = False,
+    keep_scene_lights: Annotated[bool, typer.Option("--keep-scene-lights", help="The scene's own lamps and world become ambient.")] = False,
     blender: Blender = None,
     workers: Annotated[int, typer.Option(help="Blender processes at a time.", min=1)] = 1,
-    lights_a_worker: Annotated[int, typer.Option(help="Lights after which a Blender process is replaced.", min=1)] = 500,
-    hang_after: Annotated[
+    lights_per_worker: Annotated[int, typer.Option(help="Lights after which a Blender process is replaced.", min=1)] = 500,
+    worker_timeout: Annotated[
         float | None,
-        typer.Option(help="Seconds after which a silent Blender is replaced; default: learnt from the lights before.", show_default=False),
+        typer.Option(help="Seconds after which a silent Blender is replaced; default: learned from the lights before.", show_default=False),
     ] = None,
     keep_sums: Annotated[bool, typer.Option("--keep-sums", help="Keep what --samples N can later add to; --time and auto do.")] = False,
     dask: Dask = None,
@@ -131,7 +131,7 @@ def bake(
 
     if light_set is None and light_box is not None:
         raise InputError("expected --light-set point:SPACING with --light-box, found none")
-    crew = CrewSettings(workers, lights_a_worker, hang_after)
+    crew = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
         settings = BakeSettings(
@@ -147,7 +147,7 @@ def bake(
             quantity=quantity or ("radiance" if one.kind == "view" else "irradiance"),
             seed=seed,
             sun_angle=0.0 if angle == "auto" else angle,
-            keep_lamps=keep_lamps,
+            keep_scene_lights=keep_scene_lights,
             light_list=light_list,
             transport=transport,
             points=None if light_set is None else PointGrid.parse(light_set, light_box),
@@ -169,10 +169,10 @@ def bake(
         sun = jobs[0].settings.sun_angle
         note(f"a sun of {sun:.4g} rad ({degrees(sun):.1f} degrees), as far as the fitted lights stand apart")
     for job in jobs:
-        job = with_size(job, texels_per_metre if job.settings.receiver.kind == "lightmap" or not several else None, note)
+        job = with_size(job, texels_per_meter if job.settings.receiver.kind == "lightmap" or not several else None, note)
         if size is None and job.settings.receiver.kind == "view":
             job = with_frame(job, DEFAULT_SIZE, force or restart, note)
-        job = with_free_lamps(job, note)
+        job = with_free_point_lights(job, note)
         _check_spread(job, part, farm, restart or force)
         if farm is not None:
             write_bundle(job, job.folder, farm_tasks, force)

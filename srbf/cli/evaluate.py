@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from srbf.asset import Asset
-from srbf.bake.point_reference import compare_with_lamps
+from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
 from srbf.cli.fit_parameters import (
     Basis,
@@ -88,14 +88,16 @@ def evaluate(
         raise InputError("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
     opened = Asset.open(asset)
     if point_reference is not None:
-        with Added(opened, chosen(opened, direct)) as added, progress_bar("lamps") as update:
-            lamps = compare_with_lamps(opened, reference, point_reference, samples, seed, update, note, blender, added.answer)
+        with Added(opened, chosen(opened, direct)) as added, progress_bar("point_lights") as update:
+            point_lights = compare_with_point_lights(
+                opened, reference, point_reference, samples, seed, update, note, blender, added.response
+            )
         if json:
-            print_json(lamps)
+            print_json(point_lights)
             return
         typer.echo(f"{point_reference} true lamps against the point relighter, relative RMSE (at the best scale of each falloff)")
         typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")
-        for row in lamps["by_distance"]:
+        for row in point_lights["by_distance"]:
             cells = [f"{row[name]['relative_rmse']:.3f} ({row[name]['scaled']:.3f})" for name in ("inverse-square", "linear")]
             typer.echo(f"{row['from']:7.2f} – {row['to']:6.2f} {cells[0]:>18} {cells[1]:>18} {row['texels']:>10}")
         return

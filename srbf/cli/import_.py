@@ -23,7 +23,7 @@ def import_capture(
     ] = None,
     mask: Annotated[Path | None, typer.Option(help="Image that becomes coverage: white is real.", show_default=False)] = None,
     light_kind: Annotated[
-        Literal["directional", "point"], typer.Option(help="Whether the lists hold directions, or positions in metres.")
+        Literal["directional", "point"], typer.Option(help="Whether the lists hold directions, or positions in meters.")
     ] = "directional",
     quantity: Annotated[Literal["radiance", "irradiance"], typer.Option(help="What the images measure.")] = "radiance",
     layer: Annotated[

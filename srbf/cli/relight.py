@@ -33,7 +33,7 @@ def relight(
     point: Annotated[list[str] | None, typer.Option(help="X,Y,Z[,R,G,B] position. Repeats.", show_default=False)] = None,
     spot: Annotated[list[str] | None, typer.Option(help="X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]. Repeats.", show_default=False)] = None,
     environment: Annotated[list[Path] | None, typer.Option(help="Equirectangular image. Repeats.", show_default=False)] = None,
-    a0: Annotated[float, typer.Option(help="Distance (m) at which a point or spot light has its colour.")] = 1.0,
+    a0: Annotated[float, typer.Option(help="Distance (m) at which a point or spot light has its color.")] = 1.0,
     falloff: Annotated[Literal["linear", "inverse-square"], typer.Option(help="Of point and spot lights.")] = "linear",
     lights: Annotated[Path | None, typer.Option(help="FRAMES.json: a folder of images, one a frame.", show_default=False)] = None,
     direct: Annotated[
@@ -113,7 +113,7 @@ def check_image_output(path: Path, force: bool) -> None:
 
 def _render(asset: Asset, frames: list[list[Light]], renderer: str, added: Added) -> Iterator[np.ndarray]:
     if renderer == "numpy":
-        yield from (methods.relight(asset, lights, added.answer(lights)) for lights in frames)
+        yield from (methods.relight(asset, lights, added.response(lights)) for lights in frames)
     else:
         with Relighter(asset) as relighter:
-            yield from (relighter.relight(lights, direct=added.answer(lights)) for lights in frames)
+            yield from (relighter.relight(lights, direct=added.response(lights)) for lights in frames)

@@ -20,8 +20,25 @@ from srbf.errors import SrbfError
 STDERR = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
+FORMER_FLAGS = {  # hidden aliases, for one version
+    "--hang-after": "--worker-timeout",
+    "--keep-lamps": "--keep-scene-lights",
+    "--lights-a-worker": "--lights-per-worker",
+    "--texels-per-metre": "--texels-per-meter",
+}
+
+
+def renamed(argument: str) -> str:
+    """The argument with a former flag's present name."""
+    flag, equals, value = argument.partition("=")
+    return FORMER_FLAGS.get(flag, flag) + equals + value
+
+
 class Commands(typer.core.TyperGroup):
     """A command group that turns the project's errors into one line on stderr and exit 1; wrong usage exits 2 as click has it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        return super().parse_args(ctx, [renamed(argument) for argument in args])
 
     def invoke(self, ctx: Any) -> Any:
         warnings.showwarning = lambda message, *_args, **_kwargs: note(str(message))

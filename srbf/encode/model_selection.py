@@ -19,7 +19,7 @@ from srbf.solve.kernel_ridge import KernelPath
 Rule = Literal["validation", "leave-one-light-out"]
 
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
-SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighbouring centers
+SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighboring centers
 WIDEST = 1.0  # rad: past it the R table has a cusp
 USUAL_SPREAD, USUAL_RIDGE = 0.85, RIDGES[7]  # of the mean distance between neighboring centers; on the diagonal
 NARROWEST = 0.05  # rad
@@ -46,7 +46,7 @@ class TexelSample:
     """
 
     texels: Int[ndarray, " n"]
-    answers: Float32[ndarray, "n M 3"]
+    responses: Float32[ndarray, "n M 3"]
     directions: Float64[ndarray, "M 3"]
     train: int
 
@@ -71,8 +71,8 @@ class TexelSample:
 
     @property
     def gram(self) -> Float64[ndarray, "M M"]:
-        """Inner products of the lights' images, mean over texels and colours: all that a linear fit's error depends on."""
-        images = self.answers.transpose(1, 0, 2).reshape(self.answers.shape[1], -1)
+        """Inner products of the lights' images, mean over texels and colors: all that a linear fit's error depends on."""
+        images = self.responses.transpose(1, 0, 2).reshape(self.responses.shape[1], -1)
         return (images @ images.T).astype(np.float64) / images.shape[1]
 
 

@@ -12,7 +12,7 @@ from srbf.compute.threads import each
 from srbf.io.image import HALF_MAX, Encoding
 
 HALF_DIM = 2.0**-6  # below it a hundredth of a layer's largest value is already a subnormal half
-VALUES_AT_A_TIME = 1 << 12
+VALUE_BATCH = 1 << 12
 RANGED_VALUES = 1 << 16  # of a layer, looked at for its range
 CLIPPED = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # shares of values at either end that may be clipped
 LEAST_SEEN = 1e-4  # of a function's rms: what a sum of functions counts at least
@@ -104,14 +104,14 @@ def round_together(
     stored = np.empty(flat.shape, np.uint8)
 
     def work(task: int) -> None:
-        part = slice(task * VALUES_AT_A_TIME, (task + 1) * VALUES_AT_A_TIME)
+        part = slice(task * VALUE_BATCH, (task + 1) * VALUE_BATCH)
         errors = np.zeros((k, len(flat[0, part]), channels), np.float32)
         for i in reversed(range(k)):
             wanted = flat[i, part] + np.tensordot(passed_on[i, i + 1 :], errors[i + 1 :], 1)
             stored[i, part] = np.clip(np.round((wanted - low[i]) / step[i]), 0, 255)
             errors[i] = flat[i, part] - (stored[i, part] * step[i] + low[i])
 
-    each(work, -(-flat.shape[1] // VALUES_AT_A_TIME))
+    each(work, -(-flat.shape[1] // VALUE_BATCH))
     return stored.reshape(values.shape)
 
 

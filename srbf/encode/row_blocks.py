@@ -16,7 +16,7 @@ from srbf.errors import SrbfError
 from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.solve.streamed_product import TASK_COLUMNS
 
-TILES_A_THREAD = 3  # so that a slow machine holds up few
+TILES_PER_THREAD = 3  # so that a slow machine holds up few
 RESULT_BYTES = 128 << 20  # of a tile's maps, which travel
 
 # Has work(*items[i]) done somewhere, in any order: (i, its answer, or the error that stands for it).
@@ -76,6 +76,6 @@ def tiles_of(height: int, width: int, k: int, threads: int) -> list[tuple[int, i
     unit = lcm(STRIP, TASK_COLUMNS // gcd(TASK_COLUMNS, 3 * width))
     if 2 * unit > height:
         unit = STRIP
-    wanted = min(height / (TILES_A_THREAD * max(1, threads)), RESULT_BYTES / (12 * k * width))
+    wanted = min(height / (TILES_PER_THREAD * max(1, threads)), RESULT_BYTES / (12 * k * width))
     rows = unit * max(1, round(wanted / unit))
     return [(begin, min(begin + rows, height)) for begin in range(0, height, rows)]

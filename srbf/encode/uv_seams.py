@@ -22,7 +22,7 @@ from srbf.encode.dilation import nearest_covered
 HOLD = 0.1  # weight of a covered texel's own value against one sample's difference
 FREE = 1e-3  # that of a texel outside the receiver, which only filtering at a chart's edge sees
 
-LIGHTS_AT_A_TIME = 16
+LIGHT_BATCH = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +86,11 @@ class Stitch:
 
     def blocks(self, capture: Capture, lights: Sequence[int]) -> Iterator[tuple[int, Float32[ndarray, "b n 3"]]]:
         """A capture's answers of `texels`, dilated and stitched, some lights at a time: (position of the first of them, (b, n, 3))."""
-        for first in range(0, len(lights), LIGHTS_AT_A_TIME):
-            answers = capture.sample(lights[first : first + LIGHTS_AT_A_TIME], self.sources)
-            flat = answers.reshape(len(answers), -1)
-            answers += self.change(flat).astype(np.float32).reshape(answers.shape)
-            yield first, np.ascontiguousarray(answers.transpose(1, 0, 2))
+        for first in range(0, len(lights), LIGHT_BATCH):
+            responses = capture.sample(lights[first : first + LIGHT_BATCH], self.sources)
+            flat = responses.reshape(len(responses), -1)
+            responses += self.change(flat).astype(np.float32).reshape(responses.shape)
+            yield first, np.ascontiguousarray(responses.transpose(1, 0, 2))
 
     def difference(self, values: Float[ndarray, "n M"]) -> float:
         """Root mean square difference between the two sides of all seams, over samples and columns, of `values` of `texels`."""
@@ -98,7 +98,7 @@ class Stitch:
 
 
 def edge_points(edges: Float32[ndarray, "E 8"], width: int, height: int) -> tuple[Float64[ndarray, "S 2"], Float64[ndarray, "S 2"]]:
-    """(left, right) points (column, row), in texels from the first one's centre: the same places on both sides, about one a texel."""
+    """(left, right) points (column, row), in texels from the first one's center: the same places on both sides, about one a texel."""
     ends = edges.reshape(-1, 2, 2, 2).astype(np.float64)  # side, vertex, (u, v)
     ends = np.stack([ends[..., 0] * width - 0.5, (1 - ends[..., 1]) * height - 0.5], axis=-1)
     lengths = np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=-1).max(axis=1)

@@ -33,16 +33,16 @@ class LightSpace:
     @staticmethod
     def of(sample: TexelSample, weighting: Weighting) -> LightSpace:
         """Weights and mean of a sample's train lights."""
-        answers = sample.answers[:, : sample.train]
+        responses = sample.responses[:, : sample.train]
         angles = solid_angles(sample.directions[: sample.train])
-        rows = np.ones(len(answers), np.float32)
+        rows = np.ones(len(responses), np.float32)
         if weighting == "relative":
-            own = np.abs(answers).mean(axis=(1, 2))
+            own = np.abs(responses).mean(axis=(1, 2))
             rows = (1 / (own + DARK * max(float(own.mean()), 1e-30))).astype(np.float32)
             rows /= np.sqrt((rows**2).mean())
-        mean = np.tensordot(rows.astype(np.float64) ** 2, answers, 1) / float((rows.astype(np.float64) ** 2).sum())
-        centered = (answers - mean.astype(np.float32)) * np.sqrt(angles).astype(np.float32)[:, None]
-        return LightSpace(sample, angles, mean, centered.reshape(len(answers), -1), rows)
+        mean = np.tensordot(rows.astype(np.float64) ** 2, responses, 1) / float((rows.astype(np.float64) ** 2).sum())
+        centered = (responses - mean.astype(np.float32)) * np.sqrt(angles).astype(np.float32)[:, None]
+        return LightSpace(sample, angles, mean, centered.reshape(len(responses), -1), rows)
 
     @property
     def scale(self) -> float:

@@ -16,7 +16,7 @@ from srbf.methods import directional_responses
 
 @dataclass(frozen=True)
 class Seams:
-    """Root mean squares over lights of one role, colours and pairs of neighbouring covered texels; e = relit - reference, clamped at 0.
+    """Root mean squares over lights of one role, colors and pairs of neighboring covered texels; e = relit - reference, clamped at 0.
 
     border       share of the pairs whose texels are of different clusters
     error        rms of e on either side of a border, and on the texels of the pairs next to them within one cluster

@@ -24,7 +24,7 @@ PEAK_QUANTILE = 0.999
 WATCHED_BYTES = 192 << 20  # half answers of all covered texels to all train lights, where they fit: 256² under 500 lights
 SAMPLE_TEXELS = 1 << 15  # watched where they do not, or fewer under very many lights
 PIECE = 1 << 14  # values whose squares are summed in float32
-LIGHTS_AT_A_TIME = 16  # relit on the watched texels by one thread
+LIGHT_BATCH = 16  # relit on the watched texels by one thread
 
 
 @dataclass(frozen=True)
@@ -117,12 +117,12 @@ class TrainWatch:
             texels = texels[(runs[:-1] + np.random.default_rng(0).random(count) * np.diff(runs)).astype(np.int64)]
         self.texels: Int[ndarray, " n"] = texels
         self.peaks = PeakHistogram(int(covered.sum()) * 3 * len(self.lights), PEAK_QUANTILE)
-        self._answers: dict[int, ndarray] = {}
+        self._responses: dict[int, ndarray] = {}
         self._combined = capture.combined() if capture.transport == "indirect" and capture.has_direct else None
 
     def look(self, row: int, image: Float[ndarray, "P 3"]) -> None:
         """See the answer to train light `row`, as stored."""
-        self._answers[row] = image[self.texels]
+        self._responses[row] = image[self.texels]
         whole = image if self._combined is None else self._combined.image(self.lights[row]).reshape(-1, 3)
         self.peaks.add(whole, self._rows)
 
@@ -133,16 +133,16 @@ class TrainWatch:
         sums = np.empty((2, len(self.lights)))
 
         def compare(task: int) -> None:
-            rows = range(task * LIGHTS_AT_A_TIME, min((task + 1) * LIGHTS_AT_A_TIME, len(self.lights)))
+            rows = range(task * LIGHT_BATCH, min((task + 1) * LIGHT_BATCH, len(self.lights)))
             relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
-            for row, answer in zip(rows, relit, strict=True):
-                reference = self._answers[row]
+            for row, response in zip(rows, relit, strict=True):
+                reference = self._responses[row]
                 if reference.dtype == np.float16:
                     reference = finite_to_float32(reference, np.empty(reference.shape, np.float32))
-                sums[:, row] = squared_errors(answer, reference, floor)
+                sums[:, row] = squared_errors(response, reference, floor)
 
         with one_blas_thread():
-            each(compare, -(-len(self.lights) // LIGHTS_AT_A_TIME))
+            each(compare, -(-len(self.lights) // LIGHT_BATCH))
         return sums[0], sums[1]
 
 
@@ -185,11 +185,11 @@ def evaluate(
             indices = capture.indices(role) if role != "train" or watch is None else []
             for first, block in reference.blocks(indices):
                 chosen = indices[first : first + len(block)]
-                for index, answer, true in zip(chosen, _relit(asset, capture, chosen, added), block, strict=True):
+                for index, response, true in zip(chosen, _relit(asset, capture, chosen, added), block, strict=True):
                     true = true[covered]
                     if role == "train" and peak_source is reference:
                         peaks.add(true)
-                    squares[index], powers[index] = squared_errors(answer[covered], true, floor)
+                    squares[index], powers[index] = squared_errors(response[covered], true, floor)
                     progress(len(squares), total)
     has_train = bool(capture.indices("train"))
     peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
@@ -216,14 +216,14 @@ def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) 
     """
     if capture.kind == "point":
         for position in capture.positions(lights):
-            lamp = [PointLight(tuple(position), falloff="inverse-square")]
-            answer, direct = linear_response(asset, lamp), added.answer(lamp)
-            yield (answer if direct is None else answer + direct).reshape(-1, 3)
+            point_light = [PointLight(tuple(position), falloff="inverse-square")]
+            response, direct = linear_response(asset, point_light), added.response(point_light)
+            yield (response if direct is None else response + direct).reshape(-1, 3)
         return
     directions = capture.directions(lights)
-    for direction, answer in zip(directions, directional_responses(asset, directions), strict=True):
+    for direction, response in zip(directions, directional_responses(asset, directions), strict=True):
         lit = added.directional(direction[None])
-        yield (answer if isinstance(lit, float) else answer + lit[0]).reshape(-1, 3)
+        yield (response if isinstance(lit, float) else response + lit[0]).reshape(-1, 3)
 
 
 def _covered(capture: Capture) -> Bool[ndarray, " P"]:
@@ -233,10 +233,10 @@ def _covered(capture: Capture) -> Bool[ndarray, " P"]:
     return covered
 
 
-def squared_errors(answer: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
+def squared_errors(response: Float32[ndarray, "n 3"], reference: Float32[ndarray, "n 3"], floor: float = 0.0) -> tuple[float, float]:
     """Sums of squared differences and of squared references, both images clamped at `floor`."""
     reference = np.maximum(reference, np.float32(floor))
-    difference = np.maximum(answer, np.float32(floor)) - reference
+    difference = np.maximum(response, np.float32(floor)) - reference
     return _energy(difference), _energy(reference)
 
 

@@ -14,7 +14,7 @@ from srbf.evaluation.flip import Flip
 
 LIGHTS = (1, 2, 8)  # at once
 SUMS = 16  # pictures of several lights
-DIMMEST = 0.25  # of a channel of a light's random colour, before the sum's colours are brought to a mean of 1
+DIMMEST = 0.25  # of a channel of a light's random color, before the sum's colors are brought to a mean of 1
 EDGES = 0.05  # of the covered texels: those where the light changes most from one to the next
 DARK = 0.1  # of the mean picture's mean: added to it before the picture is divided by it
 FLIP_PIXELS = 8 << 16  # that are looked at by FLIP in a row of the table: eight pictures of 256²
@@ -43,8 +43,8 @@ def sums_of_lights(
 ) -> tuple[Float32[ndarray, "n H W 3"], Float32[ndarray, "n H W 3"]]:
     """The same SUMS random sums of `lights` pictures of both stacks, or for one light the stacks as they are.
 
-    Light is linear: a sum of pictures times colours is the picture under those lights. Lights are drawn without repetition where there
-    are enough; their colours are uniform in [DIMMEST, 1] a channel, over their sum's mean channel: as bright as one white light.
+    Light is linear: a sum of pictures times colors is the picture under those lights. Lights are drawn without repetition where there
+    are enough; their colors are uniform in [DIMMEST, 1] a channel, over their sum's mean channel: as bright as one white light.
     """
     if lights == 1:
         return images
@@ -62,9 +62,9 @@ def sums_of_lights(
 def shadow_edges(
     reference: Float32[ndarray, "H W 3"], mean: Float32[ndarray, "H W 3"], covered: Bool[ndarray, "H W"]
 ) -> Bool[ndarray, "H W"]:
-    """The EDGES of the covered texels where light changes most from a texel to its neighbours, which is where shadows end.
+    """The EDGES of the covered texels where light changes most from a texel to its neighbors, which is where shadows end.
 
-    What changes is the luminance of the reference over that of the mean picture plus DARK of its mean: the surfaces' own colours and
+    What changes is the luminance of the reference over that of the mean picture plus DARK of its mean: the surfaces' own colors and
     outlines divide out. Steps to uncovered texels do not count. The definition is ours.
     """
     whole = mean.sum(axis=2)

@@ -23,7 +23,7 @@ def leave_one_out(
     """Fit to all train lights but one, everything that is chosen chosen anew, and relight that one; so for each.
 
     {"leave_one_out": RoleError as a dict, "lights": one {file, role, rmse} each}, on all covered texels, or as many, drawn at random, as
-    KEPT_BYTES hold: their number stands in `texels` then. Validation and holdout lights play no part. A light without near neighbours is
+    KEPT_BYTES hold: their number stands in `texels` then. Validation and holdout lights play no part. A light without near neighbors is
     extrapolated to: this is an upper bound of the error between the lights. Work: a fit a light.
     InputError where there are fewer than three train lights.
     """
@@ -40,10 +40,10 @@ def leave_one_out(
     for left in range(len(lights)):
         rest = kept.with_roles([None if i == left else "train" for i in range(len(lights))])
         asset = encode(rest)
-        answer = directional_responses(asset, kept.directions([left]))[0].reshape(-1, 3)
+        response = directional_responses(asset, kept.directions([left]))[0].reshape(-1, 3)
         reference = kept.image(left).reshape(-1, 3)
         peaks.add(reference)
-        squares[left], powers[left] = squared_errors(answer, reference)
+        squares[left], powers[left] = squared_errors(response, reference)
         progress(left + 1, len(lights))
     peak = 1.0 if capture.source_bits == 8 else peaks.quantile(PEAK_QUANTILE)
     error = asdict(role_error(squares, powers, 3 * len(texels), peak))

@@ -12,14 +12,14 @@ from srbf.capture import COVERED, Capture
 from srbf.errors import InputError
 from srbf.sphere import mean_spacing
 
-NEIGHBOURS = 4  # of each light, the nearest
+NEIGHBORS = 4  # of each light, the nearest
 TEXELS = 4096
 LIT = 0.5  # of the 90 % quantile of texels' peaks: dimmer texels see light at grazing angles alone, where it falls off steeply anyhow
 BRIGHT = float(np.sqrt(0.5))  # of a texel's peak: the brighter answer of a pair that is looked at
 HALF_CELL = 0.7  # of the lights' spacing: how far the light nearest to a texel's normal may stand from it
 MARGIN = 0.15  # of the brighter answer, lost beyond what an unshadowed surface can lose: an edge lies between the two lights
-JUMP = 0.75  # of what the texel's answer changes in the neighbourhood, or of the answer itself: the whole edge lies between them
-AROUND = 8  # nearest lights of either one of a pair, its neighbourhood
+JUMP = 0.75  # of what the texel's answer changes in the neighborhood, or of the answer itself: the whole edge lies between them
+AROUND = 8  # nearest lights of either one of a pair, its neighborhood
 MOST = 0.5  # of the edges jumped: too coarse
 RESOLVED = 0.7  # of the spacing: a sun of this size has about half of its edges jumped
 RARE = 1e-3  # of the pairs: fewer edges than these are no shadows to speak of
@@ -29,7 +29,7 @@ RARE = 1e-3  # of the pairs: fewer edges than these are no shadows to speak of
 class ShadowSampling:
     """How the shadows of a capture meet the spacing of its N train lights.
 
-    `spacing` is the lights' mean distance (rad), `edges` the share of (texel, pair of neighbouring lights) between which a shadow edge or
+    `spacing` is the lights' mean distance (rad), `edges` the share of (texel, pair of neighboring lights) between which a shadow edge or
     an end of a highlight lies, `jumped` the share of those that the texel crosses at once, wholly between the two lights.
     """
 
@@ -50,16 +50,16 @@ class ShadowSampling:
         """The finding in one sentence, with its figures."""
         stand = f"{self.lights} lights stand {np.degrees(self.spacing):.1f} degrees apart"
         if self.edges < RARE:
-            return f"{stand}, and the capture has hardly a shadow edge between neighbouring ones."
+            return f"{stand}, and the capture has hardly a shadow edge between neighboring ones."
         sun = "" if self.sun_angle is None else f"the sun is {np.degrees(self.sun_angle):.1f} degrees wide and "
-        crossed = f"{sun}{self.jumped:.0%} of the shadow edges between neighbours are crossed at once"
+        crossed = f"{sun}{self.jumped:.0%} of the shadow edges between neighbors are crossed at once"
         if self.too_coarse:
             return f"{stand}, {crossed}: too coarse for these shadows; bake more lights, or a softer sun (--sun-angle auto)."
         return f"{stand}, {crossed}: close enough for these shadows."
 
 
 def shadow_sampling(capture: Capture, texels: Int[ndarray, " n"] | None = None) -> ShadowSampling:
-    """Look at every pair of neighbouring train lights for texels that lose their light between the two.
+    """Look at every pair of neighboring train lights for texels that lose their light between the two.
 
     For a pair an angle t apart whose brighter answer is at least cos a of the texel's peak, an unshadowed Lambert surface loses at most
     1 - cos t + tan a sin t of it (a is 45 degrees, and more where few lights may all miss the peak); an edge lies between where MARGIN
@@ -84,23 +84,23 @@ def shadow_sampling(capture: Capture, texels: Int[ndarray, " n"] | None = None) 
             raise InputError(f"expected covered texels in {capture.folder}, found none")
         texels = covered[np.linspace(0, len(covered) - 1, min(TEXELS, len(covered))).astype(int)]
     directions = capture.directions(train)
-    answers = np.empty((len(train), len(texels)), np.float32)
+    responses = np.empty((len(train), len(texels)), np.float32)
     for first, block in capture.blocks(train):
-        answers[first : first + len(block)] = np.maximum(block[:, texels], 0).sum(axis=-1)
-    edges, jumped, looked = count_edges(directions, answers)
+        responses[first : first + len(block)] = np.maximum(block[:, texels], 0).sum(axis=-1)
+    edges, jumped, looked = count_edges(directions, responses)
     sun_angle = capture.manifest.get("source", {}).get("settings", {}).get("sun_angle")
     return ShadowSampling(len(train), mean_spacing(directions), edges / max(looked, 1), jumped / max(edges, 1), sun_angle)
 
 
-def count_edges(directions: Float64[ndarray, "L 3"], answers: Float32[ndarray, "L n"]) -> tuple[int, int, int]:
-    """(edges, jumped ones, all that were looked at) over texels and pairs of each light with its NEIGHBOURS nearest."""
+def count_edges(directions: Float64[ndarray, "L 3"], responses: Float32[ndarray, "L n"]) -> tuple[int, int, int]:
+    """(edges, jumped ones, all that were looked at) over texels and pairs of each light with its NEIGHBORS nearest."""
     cosines = directions @ directions.T
     np.fill_diagonal(cosines, -np.inf)
     nearest = np.argsort(-cosines, axis=1)[:, : min(AROUND, len(directions) - 1)]
-    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(nearest) for j in row[:NEIGHBOURS]}
-    peak = answers.max(axis=0)  # (n,)
+    pairs = {(min(i, int(j)), max(i, int(j))) for i, row in enumerate(nearest) for j in row[:NEIGHBORS]}
+    peak = responses.max(axis=0)  # (n,)
     lit = peak >= LIT * np.quantile(peak, 0.9)
-    answers, floor = answers[:, lit], BRIGHT * peak[lit]
+    responses, floor = responses[:, lit], BRIGHT * peak[lit]
     cos_a = BRIGHT * np.cos(HALF_CELL * min(mean_spacing(directions), 1.0))
     tan_a = np.sqrt(1 - cos_a**2) / cos_a
     edges = jumped = looked = 0
@@ -109,12 +109,12 @@ def count_edges(directions: Float64[ndarray, "L 3"], answers: Float32[ndarray, "
         unshadowed = 1 - np.cos(angle) + tan_a * np.sin(angle)
         if unshadowed + MARGIN >= JUMP:
             continue
-        brighter, dimmer = np.maximum(answers[i], answers[j]), np.minimum(answers[i], answers[j])
+        brighter, dimmer = np.maximum(responses[i], responses[j]), np.minimum(responses[i], responses[j])
         bright = (brighter >= floor) & (brighter > 0)
         lost = 1 - dimmer[bright] / brighter[bright]
         looked += len(lost)
         between = np.flatnonzero(bright)[lost > unshadowed + MARGIN]
-        around = answers[np.union1d(nearest[i], nearest[j])][:, between]
+        around = responses[np.union1d(nearest[i], nearest[j])][:, between]
         change = brighter[between] - dimmer[between]
         whole = (change >= JUMP * np.ptp(around, axis=0)) | (change >= JUMP * brighter[between])
         edges += len(between)

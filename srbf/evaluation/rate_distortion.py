@@ -87,19 +87,19 @@ def baselines(capture: Capture, role: Role, peak: float) -> list[Score]:
     """What all N train images give without any compression, at the N images' bytes: the nearest one, and all of them interpolated."""
     texels = np.arange(capture.width * capture.height)
     every = IMAGE_BYTES * len(capture.indices("train"))
-    answers = ((NEAREST, nearest_image(capture, texels)), (ALL, dense_reference(capture, texels)))
-    return [Score(name, name, float(every), *error_of(answer, capture, role, peak)) for name, answer in answers]
+    responses = ((NEAREST, nearest_image(capture, texels)), (ALL, dense_reference(capture, texels)))
+    return [Score(name, name, float(every), *error_of(response, capture, role, peak)) for name, response in responses]
 
 
 def nearest_image(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
     """Each direction answered by the train image closest to it. Memory: (L, n, 3) float32."""
     train = capture.indices("train")
-    answers = capture.sample(train, texels)
+    responses = capture.sample(train, texels)
     towards = capture.directions(train).T
-    return lambda directions: answers[:, (directions @ towards).argmax(axis=1)].transpose(1, 0, 2)
+    return lambda directions: responses[:, (directions @ towards).argmax(axis=1)].transpose(1, 0, 2)
 
 
-def error_of(answers: Reference, capture: Capture, role: Role, peak: float) -> tuple[float, float]:
+def error_of(responses: Reference, capture: Capture, role: Role, peak: float) -> tuple[float, float]:
     """(PSNR in dB, mean over images, and relative rmse) of answers to the lights of `role`.
 
     Both are clamped at 0, but where the capture is of indirect light: there the clamp comes after the direct light.
@@ -109,39 +109,39 @@ def error_of(answers: Reference, capture: Capture, role: Role, peak: float) -> t
     squares: list[float] = []
     power = 0.0
     for first, block in capture.blocks(indices):
-        relit = np.maximum(answers(capture.directions(indices[first : first + len(block)])), floor)
-        for answer, reference in zip(relit, np.maximum(block, floor), strict=True):
-            squares.append(float(((answer - reference) ** 2).mean(dtype=np.float64)))
+        relit = np.maximum(responses(capture.directions(indices[first : first + len(block)])), floor)
+        for response, reference in zip(relit, np.maximum(block, floor), strict=True):
+            squares.append(float(((response - reference) ** 2).mean(dtype=np.float64)))
             power += float((reference**2).mean(dtype=np.float64))
     return float(np.mean([psnr(peak, np.sqrt(s)) for s in squares])), float(np.sqrt(sum(squares) / max(power, 1e-30)))
 
 
 def spectrum(sample: Capture) -> Float64[ndarray, " r"]:
-    """Singular values of all train answers as a (texels, lights x colours) matrix less its mean texel, largest first.
+    """Singular values of all train answers as a (texels, lights x colors) matrix less its mean texel, largest first.
 
-    They are what the best scalar planes could hold, one a plane; all colours share a plane and weigh alike, as all lights do.
+    They are what the best scalar planes could hold, one a plane; all colors share a plane and weigh alike, as all lights do.
     Work: the smaller side squared times the larger.
     """
     texels = sample.width * sample.height
     return singular_values(sample.sample(sample.indices("train"), np.arange(texels)).reshape(texels, -1))
 
 
-def singular_values(answers: Float32[ndarray, "n m"]) -> Float64[ndarray, " r"]:
+def singular_values(responses: Float32[ndarray, "n m"]) -> Float64[ndarray, " r"]:
     """Singular values of `answers` less their mean row, largest first; by the smaller side's Gram matrix, good to 1e-6 of the first."""
-    centred: Float32[ndarray, "n m"] = answers - answers.mean(axis=0, dtype=np.float64).astype(np.float32)
-    smaller = centred.T if len(centred) > centred.shape[1] else centred
+    centerd: Float32[ndarray, "n m"] = responses - responses.mean(axis=0, dtype=np.float64).astype(np.float32)
+    smaller = centerd.T if len(centerd) > centerd.shape[1] else centerd
     double = smaller.astype(np.float64)
     gram = double @ double.T
     return np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[::-1], 0))
 
 
-def planes_bound(values: Float64[ndarray, " r"], answers: int, peak: float) -> Float64[ndarray, " r"]:
+def planes_bound(values: Float64[ndarray, " r"], responses: int, peak: float) -> Float64[ndarray, " r"]:
     """PSNR (dB, pooled over `answers` values) of the best 0 … r - 1 scalar planes on the very answers they come from, before a clamp."""
     left = np.cumsum((values**2)[::-1])[::-1]  # beyond the first s planes
-    return np.array([psnr(peak, float(np.sqrt(energy / answers))) for energy in left])
+    return np.array([psnr(peak, float(np.sqrt(energy / responses))) for energy in left])
 
 
-def scalars_of(asset: Asset) -> int:
+def components_of(asset: Asset) -> int:
     """Numbers that an asset keeps of a texel."""
     return 3 * asset.k if asset.method == "relighting-map" else asset.scalars
 

@@ -38,8 +38,8 @@ BELOW = 3.0  # spacings of the lights: how far below the horizon a dense referen
 class Motion:
     """What a sweep of C great circles by F frames showed of n texels, whose answers a are clamped at 0; steps join frames of a circle.
 
-    change         |a_{s+1} - a_s| over texels and colours, of the relit picture and of the reference (C, F-1)
-    brightness     mean of a over texels and colours, of both (C, F)
+    change         |a_{s+1} - a_s| over texels and colors, of the relit picture and of the reference (C, F-1)
+    brightness     mean of a over texels and colors, of both (C, F)
     ripple         relit less reference brightness, high-passed: less the best affine function of direction a circle, over the mean
                    reference brightness (C, F)
     ghost, edge    sums over texels and steps of |change of relit - change of reference| at shadow-edge texels while no edge passes, and

@@ -2,7 +2,7 @@
 
 `srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
 centers, scale and bias are constants of the shader, floats that need no decoding are not decoded, and an engine passes weights and
-lamps alone.
+point lights alone.
 """
 
 from __future__ import annotations
@@ -18,39 +18,45 @@ from srbf.errors import InputError
 from srbf.export.translation import PackFile, pack_files, parse
 from srbf.gl.uniforms import padded
 
-MOST_LAMPS = 8  # that srbfAssetLights takes at once
+MOST_POINT_LIGHTS = 8  # that srbfAssetLights takes at once
 _MAPS = """
-/* All directional and environment lights of this asset: weights of srbf.methods.folded_weights. */
+/* All directional and environment lights of this asset: weights of srbf.methods.projected_weights. */
 vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, vec4 weights[SRBF_K]) {
     return srbfRelightDirectional(layers, uv, 0, weights, srbfScale, srbfBias);
 }
 
 /* One point or spot light of this asset; table is r_table.exr, or pairs of it where SRBF_PAIRS is defined. */
-vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
-    return srbfRelightPoint(layers, uv, 0, table, srbfCenters, srbfScale, srbfBias, receiver, lamp);
+vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver,
+        SrbfPointLight pointLight) {
+    return srbfRelightPoint(layers, uv, 0, table, srbfCenters, srbfScale, srbfBias, receiver, pointLight);
 }
 
-/* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+/* All lights of this asset at once, each texel fetched once: weights as above or 0, point lights in fours
+   as srbfUnpackPointLight takes them. */
 vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, vec4 weights[SRBF_K], highp sampler2D table, vec3 receiver,
-                     vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfRelightLights(layers, uv, level, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, lamps, lampCount);
+                     vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount) {
+    return srbfRelightLights(layers, uv, level, 0, weights, table, srbfCenters, srbfScale, srbfBias, receiver, pointLights,
+        pointLightCount);
 }
 """
 _PLANES = """
-/* All directional and environment lights of this asset: weights (SRBF_SCALARS + 1) x 1 texels of srbf.methods.folded_weights. */
+/* All directional and environment lights of this asset: weights (SRBF_COMPONENTS + 1) x 1 texels of srbf.methods.projected_weights. */
 vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, highp sampler2D weights) {
     return srbfEigenMapDirectional(layers, uv, 0, weights, srbfScale, srbfBias);
 }
 
 /* One point or spot light of this asset; table is w_table.exr. */
-vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
-    return srbfEigenMapPoint(layers, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamp);
+vec3 srbfAssetPoint(highp sampler2DArray layers, vec2 uv, highp sampler2D table, vec3 receiver,
+        SrbfPointLight pointLight) {
+    return srbfEigenMapPoint(layers, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, pointLight);
 }
 
-/* All lights of this asset at once, each texel fetched once: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+/* All lights of this asset at once, each texel fetched once: weights as above or 0, point lights in fours
+   as srbfUnpackPointLight takes them. */
 vec3 srbfAssetLights(highp sampler2DArray layers, vec2 uv, float level, highp sampler2D weights, highp sampler2D table,
-                     vec3 receiver, vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfEigenMapLights(layers, uv, level, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps, lampCount);
+                     vec3 receiver, vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount) {
+    return srbfEigenMapLights(layers, uv, level, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, pointLights,
+        pointLightCount);
 }
 """
 _CLUSTERED = """
@@ -60,15 +66,17 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, highp sampler2D clusters,
 }
 
 /* One point or spot light of this asset, bilinear between texels; table is w_table.exr. */
-vec3 srbfAssetPoint(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D table, vec3 receiver, SrbfLamp lamp) {
-    return srbfClusteredPointFiltered(layers, clusters, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamp);
+vec3 srbfAssetPoint(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D table, vec3 receiver,
+        SrbfPointLight pointLight) {
+    return srbfClusteredPointFiltered(layers, clusters, uv, 0, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, pointLight);
 }
 
-/* All lights of this asset at once, bilinear between texels: weights as above or 0, lamps in fours as srbfUnpackLamp takes them. */
+/* All lights of this asset at once, bilinear between texels: weights as above or 0, point lights in fours
+   as srbfUnpackPointLight takes them. */
 vec3 srbfAssetLights(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D weights, highp sampler2D table,
-                     vec3 receiver, vec4 lamps[4 * SRBF_LAMPS], int lampCount) {
-    return srbfClusteredLightsFiltered(layers, clusters, uv, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, lamps,
-                                       lampCount);
+                     vec3 receiver, vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount) {
+    return srbfClusteredLightsFiltered(layers, clusters, uv, 0, weights, table, SRBF_TABLE_SIZE, srbfScale, srbfBias, receiver, pointLights,
+                                       pointLightCount);
 }
 """
 _FUNCTIONS = {"relighting-map": _MAPS, "eigen-map": _PLANES, "clustered-eigen-map": _CLUSTERED}
@@ -100,9 +108,14 @@ def counts(asset: Asset, pairs: bool = False) -> dict[str, int]:
         raise InputError(f"expected an asset of {', '.join(_FUNCTIONS)}, found {asset.method}: no shader relights it")
     plain = {"SRBF_PLAIN": 1} if _is_plain(asset) else {}
     if asset.method == "relighting-map":
-        return {"SRBF_K": len(asset.basis.centers), "SRBF_LAMPS": MOST_LAMPS} | plain | ({"SRBF_PAIRS": 1} if pairs else {})
+        return {"SRBF_K": len(asset.basis.centers), "SRBF_POINT_LIGHTS": MOST_POINT_LIGHTS} | plain | ({"SRBF_PAIRS": 1} if pairs else {})
     size = asset.manifest["w_table"]["size"]
-    return {"SRBF_SCALARS": asset.scalars, "SRBF_LAYERS": len(asset.scale), "SRBF_TABLE_SIZE": size, "SRBF_LAMPS": MOST_LAMPS} | plain
+    return {
+        "SRBF_COMPONENTS": asset.scalars,
+        "SRBF_LAYERS": len(asset.scale),
+        "SRBF_TABLE_SIZE": size,
+        "SRBF_POINT_LIGHTS": MOST_POINT_LIGHTS,
+    } | plain
 
 
 def _is_plain(asset: Asset) -> bool:

@@ -149,7 +149,7 @@ def _receivers(document: Document, asset: Asset) -> set[int]:
 
 
 def _material(document: Document, before: int | None, picture: int, cut_out: bool) -> dict[str, Any]:
-    """The lightmap unlit, in the colour of the material before where the map holds none, and the extension; a view by its alpha."""
+    """The lightmap unlit, in the color of the material before where the map holds none, and the extension; a view by its alpha."""
     old = document.json["materials"][before] if before is not None else {}
     base = old.get("pbrMetallicRoughness", {})
     factor = {"baseColorFactor": base["baseColorFactor"]} if "baseColorFactor" in base else {}

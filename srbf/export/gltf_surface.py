@@ -18,7 +18,7 @@ def surface(look: dict[str, Any], thickness: float = 0.0, picture: dict[str, int
     """The material; `look` as in `blender_bake.looks.Look`.
 
     thickness: of a solid body, m (see `mean_thickness`), seen from outside alone; 0 is a thin wall, behind which nothing is displaced
-    picture: glTF's texture info of its base colour; colored: the vertices hold it. Either makes the base colour itself white.
+    picture: glTF's texture info of its base color; colored: the vertices hold it. Either makes the base color itself white.
     """
     base = [1.0, 1.0, 1.0] if colored or picture is not None else look["base_color"]
     solid = look["transmission"] > 0 and thickness > 0
@@ -57,7 +57,7 @@ def surface(look: dict[str, Any], thickness: float = 0.0, picture: dict[str, int
 
 
 def mean_thickness(corners: Float32[ndarray, "T 3 3"]) -> float:
-    """4 V / A of a body's triangles, metres: the mean length of the straight ways through it, if it is convex (Cauchy's theorem).
+    """4 V / A of a body's triangles, meters: the mean length of the straight ways through it, if it is convex (Cauchy's theorem).
 
     A ball of radius r has 4r/3, a torus the width of its tube, a thin plate twice its height. 0 where the surface has a hole, and so no
     inside, or is inside out.

@@ -69,7 +69,7 @@ NUMBER = re.compile(r"-?[\d.]+(?:[eE][+-]?\d+)?")
 def include(paths: Iterable[str], root: Path | None = None) -> str:
     """The functions of some files of the pack, and of all that these include, as one HLSL include.
 
-    What the pack asks for by `#define` (`SRBF_K`, `SRBF_SCALARS`) the including shader defines first.
+    What the pack asks for by `#define` (`SRBF_K`, `SRBF_COMPONENTS`) the including shader defines first.
     Raises ShaderError on GLSL that HLSL has no word for.
     """
     pack = pack_files(paths, root)

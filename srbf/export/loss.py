@@ -28,11 +28,11 @@ def relit_psnr(asset: Asset, other: Asset) -> float:
     peaks, squares = PeakHistogram(), []
     for start in range(0, LIGHTS, AT_A_TIME):
         some = directions[start : start + AT_A_TIME]
-        references, answers = directional_responses(asset, some), directional_responses(other, some)
-        for reference, answer in zip(references, answers, strict=True):
+        references, responses = directional_responses(asset, some), directional_responses(other, some)
+        for reference, response in zip(references, responses, strict=True):
             true = reference[covered]
             peaks.add(true)
-            squares.append(squared_errors(answer[covered], true, floor)[0])
+            squares.append(squared_errors(response[covered], true, floor)[0])
     peak = peaks.quantile(PEAK_QUANTILE)
     samples = int(covered.sum()) * 3
     return float(np.mean([psnr(peak, float(np.sqrt(square / samples))) for square in squares]))

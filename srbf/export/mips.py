@@ -69,7 +69,7 @@ def coverage_of(asset: Asset) -> Float32[ndarray, "H W"]:
 
 def levels_without_bleeding(asset: Asset) -> int:
     """The most levels, full size included, with GUTTER of their own texels between any two charts, so that a bilinear sample of one chart
-    never takes of another; 1 where a texel's neighbour is not its neighbour on the surface (vertices) or means another thing (clusters).
+    never takes of another; 1 where a texel's neighbor is not its neighbor on the surface (vertices) or means another thing (clusters).
     """
     kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
     if "cluster_index" in asset.tables or kind == "vertices":

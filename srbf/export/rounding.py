@@ -10,7 +10,7 @@ from srbf.compute.threads import each
 from srbf.encode.quantization import metric, round_alone
 from srbf.io.containers.blocks import BLOCK_BYTES, SIDE, BlockFormat, decode, encode
 
-TEXELS_AT_A_TIME = 1 << 15
+TEXEL_BATCH = 1 << 15
 PASSES = 1  # over all blocks after the first; a second gains 0.1 dB
 
 
@@ -45,7 +45,7 @@ def blocks_together(
     high, wide = -(-height // SIDE), -(-width // SIDE)  # blocks
     padded = np.pad(values, ((0, 0), (0, high * SIDE - height), (0, wide * SIDE - width), (0, 0)), "edge")
     found = np.empty((len(values), high, wide * BLOCK_BYTES[form]), np.uint8)
-    upper, at_a_time = metric(functions), max(1, TEXELS_AT_A_TIME // (SIDE * SIDE * wide))
+    upper, at_a_time = metric(functions), max(1, TEXEL_BATCH // (SIDE * SIDE * wide))
 
     def work(task: int) -> None:
         rows = slice(task * at_a_time, (task + 1) * at_a_time)

@@ -51,7 +51,7 @@ def write_scene_mesh(
     """Write the objects of a .blend that render as `output`, a .glb, whole or not at all: of its scene `scene_name`, else of the one that
     the capture was baked of, else of the active one.
 
-    With a lightmap's `capture`, its receivers get TEXCOORD_1, and its albedo for a base colour. InputError on what cannot be used,
+    With a lightmap's `capture`, its receivers get TEXCOORD_1, and its albedo for a base color. InputError on what cannot be used,
     BakeError where Blender fails or the scene is not the one of the capture, OutputExistsError where `output` may not be replaced.
     """
     if output.suffix.lower() != SUFFIX:

@@ -1,4 +1,4 @@
-"""A mesh from the texels of a lightmap: every covered texel a vertex, neighbours joined where they are neighbours on the surface."""
+"""A mesh from the texels of a lightmap: every covered texel a vertex, neighbors joined where they are neighbors on the surface."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from srbf.arrays import Bool, Float32, Int
 from srbf.asset import Asset
 from srbf.errors import InputError
 
-LONGEST = 8.0  # of the median distance of neighbours: longer ones leap from one chart, or one side of an edge, to another
+LONGEST = 8.0  # of the median distance of neighbors: longer ones leap from one chart, or one side of an edge, to another
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
 
     UVs are exact, each vertex the middle of its texel; half a texel of each chart's border is left out. Front faces look where the
     normals do.
-    InputError without positions, and where no three texels are neighbours.
+    InputError without positions, and where no three texels are neighbors.
     """
     if "position" not in asset.images:
         raise InputError("expected a position map to rebuild the mesh from, found none; give the mesh: --mesh FILE.glb")
@@ -48,9 +48,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
         found.append(quads[chosen][:, [a, b, c]])
     triangles = np.concatenate(found)
     if not len(triangles):
-        raise InputError(
-            "expected texels that are neighbours on the surface to rebuild the mesh from, found none; give it: --mesh FILE.glb"
-        )
+        raise InputError("expected texels that are neighbors on the surface to rebuild the mesh from, found none; give it: --mesh FILE.glb")
     points = position[covered]
     normal = asset.images["normal"][covered] if "normal" in asset.images else None
     if normal is not None:

@@ -21,10 +21,10 @@ SCRIPT = "import_srbf.py"
 LIGHTS = {
     "SunDirection": (0.0, 0.0, 1.0, 0.0),  # towards the sun, Unreal's frame
     "SunColor": (0.0, 0.0, 0.0, 0.0),  # linear, lux
-    "LampPosition": (0.0, 0.0, 100.0, 0.0),  # cm
-    "LampColor": (0.0, 0.0, 0.0, 0.0),  # linear, candela: lux at the distance a0 = 1 m
-    "LampAxis": (0.0, 0.0, -1.0, 0.0),  # where a spot shines
-    "LampShape": (1.0, 0.05, 3.0, 4.0),  # a0, radius (m), 1 - cos of a spot's half-angles, or 3 and 4
+    "PointLightPosition": (0.0, 0.0, 100.0, 0.0),  # cm
+    "PointLightColor": (0.0, 0.0, 0.0, 0.0),  # linear, candela: lux at the distance a0 = 1 m
+    "PointLightAxis": (0.0, 0.0, -1.0, 0.0),  # where a spot shines
+    "PointLightShape": (1.0, 0.05, 3.0, 4.0),  # a0, radius (m), 1 - cos of a spot's half-angles, or 3 and 4
 }
 
 
@@ -55,8 +55,8 @@ def unreal_include(asset: Asset) -> str:
 def custom_node(asset: Asset, name: str) -> dict[str, Any]:
     """The Custom node: its include, `inputs` in order, and `code`; the textures' files by input.
 
-    The result is what a surface sends out, to be added to the emissive colour: of irradiance assets for a white surface, so that the
-    material multiplies by its base colour, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
+    The result is what a surface sends out, to be added to the emissive color: of irradiance assets for a white surface, so that the
+    material multiplies by its base color, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
     """
     clustered = asset.method == "clustered-eigen-map"
     textures = {"Table": asset.manifest["r_table" if asset.method == "relighting-map" else "w_table"]["file"]}
@@ -69,8 +69,8 @@ def custom_node(asset: Asset, name: str) -> dict[str, Any]:
     common = f"Layers, LayersSampler, {'Clusters, ' if clustered else ''}UV, Table"
     code = [
         f"float3 Sum = srbfAssetPoint({common}, float3(0.0, 0.0, 0.0), SrbfUnrealSun(SunDirection, SunColor));",
-        "SrbfLamp Lamp = SrbfUnrealLamp(LampPosition, LampColor, LampAxis, LampShape);",
-        f"Sum += srbfAssetPoint({common}, SrbfPlaceFromUnreal(WorldPosition), Lamp);",
+        "SrbfPointLight PointLight = SrbfUnrealPointLight(PointLightPosition, PointLightColor, PointLightAxis, PointLightShape);",
+        f"Sum += srbfAssetPoint({common}, SrbfPlaceFromUnreal(WorldPosition), PointLight);",
         f"return srbfFinish(Sum, {ambient}) * {scale!r};",
     ]
     return {

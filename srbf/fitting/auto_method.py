@@ -27,9 +27,9 @@ Planes = EigenMap | ClusteredEigenMap
 
 DEFAULT_BUDGET = 16  # bytes a texel
 LEAST_BUDGET = 4  # one image of four bytes
-MOST_SCALARS = 64
+MOST_COMPONENTS = 64
 CLUSTERS = (16, 64, 256)
-TEXELS_A_CLUSTER = 64  # fewer would have functions, not planes, hold the picture
+TEXELS_PER_CLUSTER = 64  # fewer would have functions, not planes, hold the picture
 TRIED_TEXELS = 1 << 13
 LEAST_LIGHTS = 8  # that a choice without validation lights needs
 WORTH = 0.2  # dB that more clusters or more bytes must bring to be chosen
@@ -61,7 +61,7 @@ def within_budget(
     trial = _without_holdout(capture.kept(texels))
     missed = None if trial.indices("validation") else _between_lights(trial)
     share = len(covered) / max(1, len(texels))
-    sizes = [budget or DEFAULT_BUDGET] if psnr is None else range(LEAST_BUDGET, MOST_SCALARS + 5, 4)
+    sizes = [budget or DEFAULT_BUDGET] if psnr is None else range(LEAST_BUDGET, MOST_COMPONENTS + 5, 4)
     best: tuple[float, Planes] | None = None
     for size in sizes:
         for method in _candidates(size, len(covered), 3 * len(trial.indices("train"))):
@@ -86,11 +86,11 @@ def within_budget(
 def _candidates(size: int, texels: int, most: int) -> Iterable[Planes]:
     """What `size` bytes a texel can hold, fewest light functions first."""
     if size >= 4:
-        yield EigenMap(scalars=min(size // 4 * 4, MOST_SCALARS, most), encoding="uint8")
-    scalars = min((size - 1) // 4 * 4, MOST_SCALARS, most)
+        yield EigenMap(scalars=min(size // 4 * 4, MOST_COMPONENTS, most), encoding="uint8")
+    scalars = min((size - 1) // 4 * 4, MOST_COMPONENTS, most)
     if scalars >= 1:
         for clusters in CLUSTERS:
-            if clusters * TEXELS_A_CLUSTER <= texels and clusters <= MOST_CLUSTERS:
+            if clusters * TEXELS_PER_CLUSTER <= texels and clusters <= MOST_CLUSTERS:
                 yield ClusteredEigenMap(clusters=clusters, scalars=scalars, encoding="uint8")
 
 

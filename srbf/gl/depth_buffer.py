@@ -13,20 +13,20 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32, Float64
 from srbf.errors import InputError
 
-FARTHEST = 1e9  # metres: where a depth buffer holds nothing
+FARTHEST = 1e9  # meters: where a depth buffer holds nothing
 
 
 @dataclass(frozen=True, eq=False)
 class DepthCamera:
-    """A camera as the shaders' SrbfCamera: `centre`, `across` and `up` lead from the eye to the picture's middle, from there to its right
+    """A camera as the shaders' SrbfCamera: `center`, `across` and `up` lead from the eye to the picture's middle, from there to its right
     edge and to its upper one, 1 m ahead in perspective, sideways alone where the view is orthographic.
 
-    All in the asset's frame, metres; `forward` is unit, `depth_terms` are `depth_terms` of the projection.
+    All in the asset's frame, meters; `forward` is unit, `depth_terms` are `depth_terms` of the projection.
     """
 
     eye: Float64[ndarray, " 3"]
     forward: Float64[ndarray, " 3"]
-    centre: Float64[ndarray, " 3"]
+    center: Float64[ndarray, " 3"]
     across: Float64[ndarray, " 3"]
     up: Float64[ndarray, " 3"]
     depth_terms: Float64[ndarray, " 4"]
@@ -34,7 +34,7 @@ class DepthCamera:
 
     @staticmethod
     def of(world_from_view: Float64[ndarray, "4 4"], projection: Float64[ndarray, "4 4"], *, from_zero: bool) -> DepthCamera:
-        """From a pose without scale and a projection matrix, off-centre ones included; `from_zero`: clip z is 0 to 1, not -1 to 1.
+        """From a pose without scale and a projection matrix, off-center ones included; `from_zero`: clip z is 0 to 1, not -1 to 1.
 
         InputError where clip w is neither -z nor 1, or the projection turns or shears the picture.
         """
@@ -45,11 +45,11 @@ class DepthCamera:
         right, upward, back = world_from_view[:3, :3].T
         orthographic = projection[3, 3] == 1
         shift = -projection[:2, 3] if orthographic else projection[:2, 2]
-        centre = right * shift[0] / projection[0, 0] + upward * shift[1] / projection[1, 1]
+        center = right * shift[0] / projection[0, 0] + upward * shift[1] / projection[1, 1]
         return DepthCamera(
             world_from_view[:3, 3],
             -back,
-            centre if orthographic else centre - back,
+            center if orthographic else center - back,
             right / projection[0, 0],
             upward / projection[1, 1],
             depth_terms(projection, from_zero=from_zero),
@@ -77,7 +77,7 @@ def depth_terms(projection: Float64[ndarray, "4 4"], *, from_zero: bool) -> Floa
 
 
 def eye_depth(stored: Float[ndarray, "*shape"], terms: Float64[ndarray, " 4"]) -> Float64[ndarray, "*shape"]:
-    """Depth along the view axis, metres, of samples in [0, 1]; at most FARTHEST."""
+    """Depth along the view axis, meters, of samples in [0, 1]; at most FARTHEST."""
     sample = np.asarray(stored, np.float64)
     above, below = np.abs(terms[0] + terms[1] * sample), np.abs(terms[2] + terms[3] * sample)
     return np.where(above < below * FARTHEST, above / np.maximum(below, 1e-300), FARTHEST)
@@ -99,7 +99,7 @@ def point_on_ray(
 
 def receivers(stored: Float[ndarray, "*shape"], place: Float[ndarray, "*shape 2"], camera: DepthCamera) -> Float64[ndarray, "*shape 3"]:
     """World positions at places of a picture, (-1, -1) its lower left corner, out of samples of its depth buffer."""
-    sideways = camera.centre + place[..., :1] * camera.across + place[..., 1:] * camera.up
+    sideways = camera.center + place[..., :1] * camera.across + place[..., 1:] * camera.up
     eye = camera.eye + (sideways if camera.orthographic else 0 * sideways)
     to_eye = np.broadcast_to(-camera.forward, sideways.shape) if camera.orthographic else -sideways
     return point_on_ray(eye, to_eye, ray_length(eye_depth(stored, camera.depth_terms), to_eye, camera.forward))

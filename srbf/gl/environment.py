@@ -1,4 +1,4 @@
-"""Environment lights integrated on the GPU: the weights that `folded_weights` has of them, left in a texture."""
+"""Environment lights integrated on the GPU: the weights that `projected_weights` has of them, left in a texture."""
 
 from __future__ import annotations
 

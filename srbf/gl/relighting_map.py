@@ -14,13 +14,21 @@ from srbf.errors import InputError
 from srbf.gl.context import Limits
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
-from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, padded, vectors_free
+from srbf.gl.uniforms import (
+    VECTORS_PER_POINT_LIGHT,
+    packed_point_lights,
+    padded,
+    point_light_groups,
+    point_light_uniforms,
+    point_lights_per_pass,
+    vectors_free,
+)
 from srbf.lights import PointLight
 
 if TYPE_CHECKING:
     import moderngl
 
-VECTORS_A_MAP = 4  # weight, center, scale, bias
+VECTORS_PER_MAP = 4  # weight, center, scale, bias
 
 
 class MapPasses:
@@ -30,21 +38,21 @@ class MapPasses:
         self._asset, self._programs, self._textures = asset, programs, textures
         self._scale, self._bias = padded(asset.scale), padded(asset.bias)
         self._free = vectors_free(limits)
-        self._lamps = lamps_a_pass(self._free, VECTORS_A_MAP)
+        self._point_lights = point_lights_per_pass(self._free, VECTORS_PER_MAP)
         self._formula = formula
         self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
         self._functions = {"SRBF_FORMULA": 1} if formula else {"SRBF_PAIRS": 1} | ({"SRBF_SAMPLED": 1} if limits.software else {})
 
-    def check_lamps(self) -> None:
+    def check_point_lights(self) -> None:
         """InputError where the shaders know no formula for the functions of a lamp's direction."""
         kind = self._asset.manifest["basis"]["kind"]
         if kind != "gaussian":
             raise InputError(f"expected Gaussians for point and spot lights on the GPU, found {kind}; relight them by numpy")
 
-    def layers_a_pass(self, lamps: int) -> int:
+    def layers_per_pass(self, point_lights: int) -> int:
         """Maps that a pass of so many lamps holds the uniforms of."""
-        vectors = VECTORS_A_MAP if lamps else 1
-        return max(1, (self._free - VECTORS_A_LAMP * lamps) // vectors)
+        vectors = VECTORS_PER_MAP if point_lights else 1
+        return max(1, (self._free - VECTORS_PER_POINT_LIGHT * point_lights) // vectors)
 
     def far(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
         """All directional and environment lights; `units` maps a pass as plain textures, or all that uniforms hold from an array."""
@@ -52,20 +60,20 @@ class MapPasses:
             self._accumulate(weights, units)
             return
         self._textures.layers().use(0)
-        folded, offset = padded(weights * self._asset.scale), (weights * self._asset.bias).sum(axis=0)
-        for first, count in ranges(self._asset.k, self.layers_a_pass(0)):
-            values = {"firstMap": first, "maps": 0, "weights": folded[first : first + count]}
+        projected, offset = padded(weights * self._asset.scale), (weights * self._asset.bias).sum(axis=0)
+        for first, count in ranges(self._asset.k, self.layers_per_pass(0)):
+            values = {"firstMap": first, "maps": 0, "weights": projected[first : first + count]}
             values["offset"] = tuple((offset if first == 0 else 0 * offset).tolist())
-            self._programs.run("folded.frag", {"SRBF_K": count}, values)
+            self._programs.run("projected.frag", {"SRBF_K": count}, values)
 
     def weighted(self, weights: moderngl.Texture) -> None:
         """All directional and environment lights, by weights that are on the GPU."""
         weights.use(1)
         self._textures.layers().use(0)
         values = {"maps": 0, "weights": 1}
-        self._over_maps("weighted.frag", {}, values, {}, self.layers_a_pass(1))
+        self._over_maps("weighted.frag", {}, values, {}, self.layers_per_pass(1))
 
-    def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "K 3"], units: int | None) -> None:
+    def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "K 3"], units: int | None) -> None:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` maps a pass."""
         self._textures.layers().use(0)
         where, values = self._textures.receivers(1)
@@ -75,15 +83,19 @@ class MapPasses:
             centers[:, 3] = 0.5 / self._asset.basis.spread**2
         values |= {"maps": 0, "rTable": 2}
         if len(lights) == 1 and not weights.any() and not where:
-            values |= {f"lamp.{name}": value for name, value in lamp_uniforms(lights[0]).items()}
-            self._over_maps("point.frag", self._functions, values, {"centers": centers}, units or self.layers_a_pass(1))
+            values |= {f"pointLight.{name}": value for name, value in point_light_uniforms(lights[0]).items()}
+            self._over_maps("point.frag", self._functions, values, {"centers": centers}, units or self.layers_per_pass(1))
             return
         far = padded(weights)
-        for group, places in lamp_groups(lights, self._lamps):
-            values |= {"lamps": packed_lamps(group, places), "lampCount": len(group)}
+        for group, places in point_light_groups(lights, self._point_lights):
+            values |= {"pointLights": packed_point_lights(group, places), "pointLightCount": len(group)}
             arrays = {"centers": centers, "weights": far}
             self._over_maps(
-                "lights.frag", {"SRBF_LAMPS": places} | where | self._functions, values, arrays, units or self.layers_a_pass(places)
+                "lights.frag",
+                {"SRBF_POINT_LIGHTS": places} | where | self._functions,
+                values,
+                arrays,
+                units or self.layers_per_pass(places),
             )
             far = np.zeros_like(far)
 

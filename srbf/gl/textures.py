@@ -19,7 +19,7 @@ from srbf.gl.uniforms import camera_uniforms
 if TYPE_CHECKING:
     import moderngl
 
-_DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalised byte
+_DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalized byte
 
 
 class AssetTextures:

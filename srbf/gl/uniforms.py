@@ -15,8 +15,8 @@ from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE
 VECTORS_KEPT_FREE = 32  # vec4 for the lamp and what drivers take for themselves
-VECTORS_A_LAMP = 4
-MOST_LAMPS = 16  # a pass
+VECTORS_PER_POINT_LIGHT = 4
+MOST_POINT_LIGHTS = 16  # a pass
 NO_CONE = (3.0, 4.0)  # versines past every angle: the cone of a point light is 1 everywhere
 
 
@@ -27,8 +27,8 @@ def padded(triples: Float[ndarray, "K 3"]) -> Float32[ndarray, "K 4"]:
     return out
 
 
-def lamp_uniforms(light: PointLight) -> dict[str, Any]:
-    """Members of the shader's SrbfLamp for a point or spot light that is already in the asset's frame."""
+def point_light_uniforms(light: PointLight) -> dict[str, Any]:
+    """Members of the shader's SrbfPointLight for a point or spot light that is already in the asset's frame."""
     position = np.array(light.position, np.float64)
     high = position.astype(np.float32)
     low = (position - high).astype(np.float32)
@@ -55,30 +55,30 @@ def vectors_free(limits: Limits) -> int:
     return limits.fragment_vectors - VECTORS_KEPT_FREE
 
 
-def lamps_a_pass(free: int, vectors_a_layer: int) -> int:
+def point_lights_per_pass(free: int, vectors_per_layer: int) -> int:
     """How many lamps a pass takes: a power of two that leaves half of the `free` uniforms to layers, where that many are needed."""
-    lamps = MOST_LAMPS
-    while lamps > 1 and VECTORS_A_LAMP * lamps > max(free // 2, free - 32 * vectors_a_layer):
-        lamps //= 2
-    return lamps
+    point_lights = MOST_POINT_LIGHTS
+    while point_lights > 1 and VECTORS_PER_POINT_LIGHT * point_lights > max(free // 2, free - 32 * vectors_per_layer):
+        point_lights //= 2
+    return point_lights
 
 
-def lamp_groups(lamps: Sequence[PointLight], most: int) -> Iterator[tuple[Sequence[PointLight], int]]:
+def point_light_groups(point_lights: Sequence[PointLight], most: int) -> Iterator[tuple[Sequence[PointLight], int]]:
     """(lamps of a pass, places in its array) of at most `most`; places are powers of two, so that few programs serve any number."""
-    for first in range(0, len(lamps), most):
-        group = lamps[first : first + most]
+    for first in range(0, len(point_lights), most):
+        group = point_lights[first : first + most]
         yield group, 1 << (len(group) - 1).bit_length()
 
 
-def packed_lamps(lamps: Sequence[PointLight], count: int) -> Float32[ndarray, "rows 4"]:
+def packed_point_lights(point_lights: Sequence[PointLight], count: int) -> Float32[ndarray, "rows 4"]:
     """Point and spot lights, already in the asset's frame, four vec4 each; zeros up to `count` lamps (4 count rows).
 
-    They hold (position, radius), (positionLow, falloff), (colour, versineInner), (axis, versineOuter); the colour is the irradiance
+    They hold (position, radius), (positionLow, falloff), (color, versineInner), (axis, versineOuter); the color is the irradiance
     at 1 m, so that a0 needs no place of its own.
     """
     rows = np.zeros((count, 4, 4), np.float32)
-    for row, light in zip(rows, lamps, strict=False):
-        u = lamp_uniforms(light)
+    for row, light in zip(rows, point_lights, strict=False):
+        u = point_light_uniforms(light)
         at_one = light.a0 if light.falloff == "linear" else light.a0**2
         row[0] = *u["position"], u["radius"]
         row[1] = *u["positionLow"], u["falloff"]
@@ -89,7 +89,7 @@ def packed_lamps(lamps: Sequence[PointLight], count: int) -> Float32[ndarray, "r
 
 def camera_uniforms(camera: DepthCamera) -> dict[str, Any]:
     """Members of the shader's SrbfCamera."""
-    vectors = {name: getattr(camera, name) for name in ("eye", "forward", "centre", "across", "up")}
+    vectors = {name: getattr(camera, name) for name in ("eye", "forward", "center", "across", "up")}
     return {
         **{name: tuple(vector.tolist()) for name, vector in vectors.items()},
         "depthTerms": tuple(camera.depth_terms.tolist()),

@@ -63,19 +63,19 @@ class _Folder:
     """A folder's files and folders by name, by folded name, and its images by folded stem."""
 
     names: dict[str, Path]
-    folded: dict[str, list[Path]]
+    projected: dict[str, list[Path]]
     stems: dict[str, list[Path]]
 
     @staticmethod
     def of(path: Path) -> _Folder:
         names = {entry.name: entry for entry in sorted(path.iterdir())}
-        folded: dict[str, list[Path]] = {}
+        projected: dict[str, list[Path]] = {}
         stems: dict[str, list[Path]] = {}
         for name, entry in names.items():
-            folded.setdefault(_fold(name), []).append(entry)
+            projected.setdefault(_fold(name), []).append(entry)
             if entry.suffix.lower() in RANKS and not name.startswith("."):
                 stems.setdefault(_fold(entry.stem), []).append(entry)
-        return _Folder(names, folded, stems)
+        return _Folder(names, projected, stems)
 
 
 @dataclass
@@ -137,7 +137,7 @@ class _Search:
         content = self._folder(folder)
         if name in content.names:
             return content.names[name]
-        alike = content.folded.get(_fold(name), [])
+        alike = content.projected.get(_fold(name), [])
         composed = [path for path in alike if unicodedata.normalize("NFC", path.name) == unicodedata.normalize("NFC", name)]
         alike = composed or alike
         if len(alike) > 1:

@@ -24,14 +24,14 @@ COMMENT = re.compile(r"\s(?:#|//|;).*$")
 
 @dataclass(frozen=True)
 class LightListEntry:
-    """One image's name as the list spells it, and its light's unit direction, or position in metres (axes as they stand)."""
+    """One image's name as the list spells it, and its light's unit direction, or position in meters (axes as they stand)."""
 
     name: str
     place: tuple[float, float, float]
 
 
 def read_light_list(path: Path, kind: LightKind = "directional", say: Callable[[str], None] = lambda line: None) -> list[LightListEntry]:
-    """All entries of a .lp file, directions normalised, positions of point lights as they are; ManifestError names the line that is bad.
+    """All entries of a .lp file, directions normalized, positions of point lights as they are; ManifestError names the line that is bad.
 
     Names may be in quotes. Blank lines, and lines that begin with #, // or ;, are skipped. `say` hears of an encoding that is not UTF-8.
     """

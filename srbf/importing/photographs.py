@@ -25,7 +25,7 @@ class LightListImport:
 
     transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are; what files say of their own values comes first
     (`srbf.importing.pictures`). `layer` names one of multilayer EXR. `mask` becomes coverage. `kind` says whether the lists hold
-    directions, or positions of point lights in metres, whose irradiance the images have at 1 m from each. `images` is a folder
+    directions, or positions of point lights in meters, whose irradiance the images have at 1 m from each. `images` is a folder
     that images may be in besides the list's own.
     """
 

@@ -24,7 +24,7 @@ NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO stamps the time otherwise, and eq
 def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W C"]:
     """All channels of an image as float32: EXR values as stored, integers over their maximum (8 bit: byte / 255).
 
-    With `channels` 3, grey is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned as they
+    With `channels` 3, gray is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned as they
     are: `require_finite` names the file. ImageError on a missing, damaged or truncated file.
     """
     pixels = read_stored(path, channels)
@@ -40,7 +40,7 @@ def read_stored(path: Path, channels: int | None = None, rows: Sequence[tuple[in
     """
     oiio = _oiio()
     wanted = oiio.ImageSpec()
-    wanted.attribute("oiio:UnassociatedAlpha", 1)  # colours as the file holds them, not multiplied by its alpha
+    wanted.attribute("oiio:UnassociatedAlpha", 1)  # colors as the file holds them, not multiplied by its alpha
     source = oiio.ImageInput.open(str(path), wanted) if path.is_file() else None
     if source is None:
         reason = _first_line(oiio.geterror()) if path.is_file() else "no such file"

@@ -23,7 +23,7 @@ Z_UP_FROM_Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """T triangles: corners and the normals there (T, 3, 3), the material of each, and who casts. World frame, metres.
+    """T triangles: corners and the normals there (T, 3, 3), the material of each, and who casts. World frame, meters.
 
     `tints` (M, KNOTS, 3) is what one wall of a material lets through of a shadow ray that meets its normal at the cosine
     0, 1/(KNOTS-1), …, 1; 0 throughout is opaque. `lightmap`: where a receiver's corners lie in the lightmap, (0, 0) at the top left of
@@ -141,7 +141,7 @@ class _Reader:
 
 
 def _tint(material: dict[str, Any]) -> Float64[ndarray, "KNOTS 3"]:
-    """By angle where srbf wrote it, else a transmission's base colour at every angle."""
+    """By angle where srbf wrote it, else a transmission's base color at every angle."""
     curve = material.get("extras", {}).get("tint_by_cosine")
     if curve is not None:
         return np.array(curve, np.float64).reshape(KNOTS, 3)

@@ -35,6 +35,6 @@ def directional_responses(asset: Asset, directions: np.ndarray) -> np.ndarray:
     return METHODS[asset.method].directional_responses(asset, directions)
 
 
-def folded_weights(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
-    """One weight a map, or a light function, and colour for all directional and environment lights together, float64."""
-    return METHODS[asset.method].folded_weights(asset, lights)
+def projected_weights(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
+    """One weight a map, or a light function, and color for all directional and environment lights together, float64."""
+    return METHODS[asset.method].projected_weights(asset, lights)

@@ -19,12 +19,12 @@ from srbf.encode.weighted_rows import LightSpace
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.methods.coefficient_maps import (
-    SewnPlanes,
+    StitchedComponents,
     check_plane_settings,
+    coefficient_maps_asset,
     directional_responses,
-    folded_weights,
     linear_response,
-    planes_asset,
+    projected_weights,
     relight,
 )
 from srbf.methods.receivers import covered_texels
@@ -34,11 +34,11 @@ from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct, in_tasks
 from srbf.sphere import Domain, domain_of
 
-__all__ = ["ClusteredEigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
+__all__ = ["ClusteredEigenMap", "directional_responses", "projected_weights", "linear_response", "relight"]
 
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
-TEXELS_A_CLUSTER = 96
+TEXELS_PER_CLUSTER = 96
 FEATURES = 48  # numbers a texel by which it finds its cluster
 
 
@@ -87,7 +87,7 @@ class ClusteredEigenMap:
         if self.scalars > 3 * len(train):
             raise InputError(f"expected at most {3 * len(train)} scalars for {len(train)} lights, found {self.scalars}")
         # From every row: clusters are of places, and those of a few strips of rows serve the rows between badly.
-        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_A_CLUSTER * self.clusters), share=1.0)
+        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_PER_CLUSTER * self.clusters), share=1.0)
         directions = capture.directions(train)
         domain = domain_of(directions) if self.domain == "auto" else self.domain
         space = LightSpace.of(sample, "plain")
@@ -97,7 +97,7 @@ class ClusteredEigenMap:
         for first, block in capture.stream(train, look):
             seen.add(first, block)
             progress(first + len(block), 2 * len(train))
-        columns = seen.result if stitch is None else _with_sewn(seen.result, stitch)
+        columns = seen.result if stitch is None else _with_stitched(seen.result, stitch)
         index = _assigned(columns, space, features, found)
         del seen, columns
         axes = found.axes.transpose(0, 2, 1)  # (C, S, M)
@@ -109,7 +109,7 @@ class ClusteredEigenMap:
             progress(len(train) + first + len(block), 2 * len(train))
         projected, covered = product.result, covered_texels(capture)
         del product
-        sewn = None
+        stitched = None
         if stitch is not None:
             again = GroupedProduct(weights, index[texels:])
             for first, block in stitch.blocks(capture, train):
@@ -122,15 +122,15 @@ class ClusteredEigenMap:
             covered = np.concatenate([covered, np.zeros(len(loose_index), bool)])
         planes, values = _in_own_range(projected, index, covered, space, found)
         if stitch is not None:
-            sewn = SewnPlanes(planes[:, texels:], index[texels:])
+            stitched = StitchedComponents(planes[:, texels:], index[texels:])
             planes, index = planes[:, :texels], index[:texels]
         functions, fit = functions_through(sample, values, domain, self.spread, self.ridge)
-        return planes_asset(
-            capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index, stitch, sewn
+        return coefficient_maps_asset(
+            capture, "clustered-eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, index, stitch, stitched
         )
 
 
-def _with_sewn(seen: Float32[ndarray, "D P"], stitch: Stitch) -> Float32[ndarray, "D Q"]:
+def _with_stitched(seen: Float32[ndarray, "D P"], stitch: Stitch) -> Float32[ndarray, "D Q"]:
     """Features of all texels, and behind them those of the stitch's texels once their (dilated) images are: features are sums."""
     values = seen[:, stitch.sources].T
     return np.concatenate([seen, (values + stitch.change(values)).T.astype(np.float32)], axis=1)

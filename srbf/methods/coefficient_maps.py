@@ -25,7 +25,7 @@ from srbf.methods.receivers import (
     carried_images,
     carried_scene,
     common_manifest,
-    far_lights,
+    distant_lights,
     finish,
     inside,
     seam_report,
@@ -34,13 +34,13 @@ from srbf.methods.receivers import (
 from srbf.sphere import Domain
 
 CHANNELS = 4  # planes to an image
-MOST_SCALARS = 1024
+MOST_COMPONENTS = 1024
 
 
 def check_plane_settings(scalars: int, spread: float | str, ridge: float | str, encoding: str) -> None:
     """InputError on settings that no set of planes can have."""
-    if not 1 <= scalars <= MOST_SCALARS:
-        raise InputError(f"expected 1 to {MOST_SCALARS} scalars, found {scalars}")
+    if not 1 <= scalars <= MOST_COMPONENTS:
+        raise InputError(f"expected 1 to {MOST_COMPONENTS} scalars, found {scalars}")
     for name, value in (("spread", spread), ("ridge", ridge)):
         if value != "auto" and not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0):
             raise InputError(f"expected a {name} of auto or a number above 0 for light functions, found {value}")
@@ -54,29 +54,29 @@ def relight(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
 
 
 def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-    """The sum over lights before the clamp and without ambient: linear in every light's colour.
+    """The sum over lights before the clamp and without ambient: linear in every light's color.
 
     Directional and environment lights weigh by the functions themselves; a point or spot light reads each receiver's own
     weights from the octahedral table.
     """
-    weights = folded_weights(asset, lights).astype(np.float32)
+    weights = projected_weights(asset, lights).astype(np.float32)
     table, entry = asset.tables["w_table"], asset.manifest["w_table"]
 
-    def folded(layers: ndarray, rows: slice) -> ndarray:
+    def projected(layers: ndarray, rows: slice) -> ndarray:
         first = first_function(asset, rows)  # (h, W)
         total = weights[first]
         for j, plane in enumerate(planes_of(layers, asset.scalars), start=1):
             total += plane[..., None] * weights[first + j]
         return total
 
-    def answer(layers: ndarray, rows: slice, unit: ndarray) -> ndarray:
+    def response(layers: ndarray, rows: slice, unit: ndarray) -> ndarray:
         first = first_function(asset, rows)
         total = lookup(table, entry["size"], entry["columns"], first, unit)
         for j, plane in enumerate(planes_of(layers, asset.scalars), start=1):
             total += plane[..., None] * lookup(table, entry["size"], entry["columns"], first + j, unit)
         return total
 
-    return sum_over_lights(asset, lights, folded if weights.any() else None, answer)
+    return sum_over_lights(asset, lights, projected if weights.any() else None, response)
 
 
 def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
@@ -85,9 +85,9 @@ def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> 
     weights = asset.light_functions.evaluate(inside(asset, directions)).astype(np.float32)  # (b, F, 3)
     weights = weights.transpose(1, 0, 2).reshape(asset.clusters, size, -1)  # (C, S + 1, 3 b)
     images = np.empty((len(directions), asset.height, asset.width, 3), np.float32)
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
+    rows_per_chunk = max(1, CHUNK // asset.width)
+    for start in range(0, asset.height, rows_per_chunk):
+        rows = slice(start, start + rows_per_chunk)
         planes = planes_of(asset.coefficients(rows), asset.scalars)
         ones = np.concatenate([np.ones_like(planes[:1]), planes]).reshape(size, -1)  # (S + 1, n)
         cluster = (first_function(asset, rows) // size).ravel()
@@ -99,11 +99,11 @@ def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> 
     return images
 
 
-def folded_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
-    """One weight a light function and colour for all directional and environment lights together."""
+def projected_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
+    """One weight a light function and color for all directional and environment lights together."""
     weights = np.zeros((asset.clusters * (asset.scalars + 1), 3))
     functions = asset.light_functions
-    for directions, colors in far_lights(asset, lights):
+    for directions, colors in distant_lights(asset, lights):
         weights += functions.fold(directions, colors)
     return weights
 
@@ -123,14 +123,14 @@ def first_function(asset: Asset, rows: slice) -> Int[ndarray, "h W"]:
 
 
 @dataclass(frozen=True, eq=False)
-class SewnPlanes:
+class StitchedComponents:
     """What planes `loose` (S, n) and clusters `loose_index` (n,) the texels of a stitch would have had without it."""
 
     loose: Float32[ndarray, "S n"]
     loose_index: Int[ndarray, " n"]
 
 
-def planes_asset(
+def coefficient_maps_asset(
     capture: Capture,
     method: str,
     domain: Domain,
@@ -141,7 +141,7 @@ def planes_asset(
     fit: dict[str, Any],
     index: Int[ndarray, " P"] | None = None,
     stitch: Stitch | None = None,
-    sewn: SewnPlanes | None = None,
+    stitched: StitchedComponents | None = None,
 ) -> Asset:
     """An asset of scalar planes, dilated, stored four to an image; `index` the cluster of every texel where there are clusters.
 
@@ -151,7 +151,7 @@ def planes_asset(
     scalars, shape = len(planes), (capture.height, capture.width)
     nearest = nearest_covered(capture.coverage())
     images = carried_images(capture, nearest)
-    if nearest is not None and stitch is not None and sewn is not None:
+    if nearest is not None and stitch is not None and stitched is not None:
         nearest = nearest.copy()
         nearest.flat[stitch.texels] = stitch.texels
     layers = np.zeros((-(-scalars // CHANNELS), *shape, CHANNELS), np.float32)
@@ -160,10 +160,10 @@ def planes_asset(
     loose = None
     if stitch is not None:
         loose = layers.reshape(len(layers), -1, CHANNELS)[:, stitch.texels]
-        if sewn is None:
+        if stitched is None:
             stitch.apply(layers)
         else:
-            for j, plane in enumerate(sewn.loose):
+            for j, plane in enumerate(stitched.loose):
                 loose[j // CHANNELS, :, j % CHANNELS] = plane
     stored, scale, bias = quantize(layers, encoding)
     unused = range(scalars % CHANNELS or CHANNELS, CHANNELS)
@@ -188,5 +188,7 @@ def planes_asset(
         tables["cluster_index"] = dilate(index.reshape(*shape, 1), nearest)[:, :, 0].astype(np.uint8)
     asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
     if stitch is not None and loose is not None:
-        manifest["seams"] = seam_report(asset, capture, stitch, loose, directional_responses, None if sewn is None else sewn.loose_index)
+        manifest["seams"] = seam_report(
+            asset, capture, stitch, loose, directional_responses, None if stitched is None else stitched.loose_index
+        )
     return asset

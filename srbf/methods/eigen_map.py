@@ -16,29 +16,29 @@ from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.methods.coefficient_maps import (
     check_plane_settings,
+    coefficient_maps_asset,
     directional_responses,
-    folded_weights,
     linear_response,
-    planes_asset,
+    projected_weights,
     relight,
 )
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct
 from srbf.sphere import Domain, domain_of
 
-__all__ = ["EigenMap", "directional_responses", "folded_weights", "linear_response", "relight"]
+__all__ = ["EigenMap", "directional_responses", "projected_weights", "linear_response", "relight"]
 
 SAMPLE_TEXELS = 1 << 14
 
 
 @dataclass(frozen=True)
 class EigenMap:
-    """Joint-colour principal components of T, their light functions smooth on the sphere.
+    """Joint-color principal components of T, their light functions smooth on the sphere.
 
     T(p, L, c) ~ w_0(L, c) + sum_j a_j(p) w_j(L, c), j = 1 … `scalars`
 
     The rows of T, (L x 3) numbers a texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
-    number a texel for all three colours. What an axis holds at the lights becomes a function of every direction by kernel
+    number a texel for all three colors. What an axis holds at the lights becomes a function of every direction by kernel
     ridge regression on a dense set of spherical Gaussians. One kernel, of one spread or of two, and one ridge serve all functions: those
     that predict best the lights left out and the validation lights (`auto`, `light_function_fit.choose_functions`). Columns of T are
     weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives the least squared error, `relative` divides
@@ -91,4 +91,4 @@ class EigenMap:
             "singular_values": (values / max(float(values[0]), 1e-30)).tolist(),
             "energy_kept": space.energy_kept(values),
         }
-        return planes_asset(capture, "eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, stitch=stitch)
+        return coefficient_maps_asset(capture, "eigen-map", domain, planes, functions, self.encoding, asdict(self), fit, stitch=stitch)

@@ -24,7 +24,7 @@ SEAM_TEXELS = 1 << 13  # that give the pictures' mean
 CHUNK = 1 << 16  # receivers, or environment texels, weighed at a time: (CHUNK, K) float64 stays in cache-sized memory
 
 Combine = Callable[[ndarray, slice], ndarray]  # (layers (N, h, W, C), rows) -> (h, W, 3)
-Answer = Callable[[ndarray, slice, ndarray], ndarray]  # (layers, rows, unit directions (h, W, 3)) -> (h, W, 3), for unit irradiance
+Response = Callable[[ndarray, slice, ndarray], ndarray]  # (layers, rows, unit directions (h, W, 3)) -> (h, W, 3), for unit irradiance
 
 
 def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dict[str, ndarray]:
@@ -71,21 +71,21 @@ def common_manifest(
     }
 
 
-def sum_over_lights(asset: Asset, lights: Sequence[Light], folded: Combine | None, answer: Answer) -> Float32[ndarray, "H W 3"]:
+def sum_over_lights(asset: Asset, lights: Sequence[Light], projected: Combine | None, response: Response) -> Float32[ndarray, "H W 3"]:
     """Rows at a time: `folded` for all directional and environment lights together, `answer` for each point or spot light."""
     total = np.zeros((asset.height, asset.width, 3), np.float32)
-    local = [lamp for light in lights if isinstance(lamp := moved(light, asset.asset_from_world), PointLight)]
+    local = [point_light for light in lights if isinstance(point_light := moved(light, asset.asset_from_world), PointLight)]
     if local and "position" not in asset.images:
         raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height if folded or local else 0, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
+    rows_per_chunk = max(1, CHUNK // asset.width)
+    for start in range(0, asset.height if projected or local else 0, rows_per_chunk):
+        rows = slice(start, start + rows_per_chunk)
         layers = asset.coefficients(rows)
-        if folded is not None:
-            total[rows] += folded(layers, rows)
+        if projected is not None:
+            total[rows] += projected(layers, rows)
         for light in local:
             unit, strength = light_vectors(light, asset.images["position"][rows])
-            total[rows] += answer(layers, rows, unit) * (strength[..., None] * light.color)
+            total[rows] += response(layers, rows, unit) * (strength[..., None] * light.color)
     return total
 
 
@@ -101,10 +101,10 @@ def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tup
     return unit, strength
 
 
-def far_lights(asset: Asset, lights: Sequence[Light]) -> list[tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]]:
-    """(unit directions in the asset's frame, colours) of directional lights, and of environments a piece of texels at a time.
+def distant_lights(asset: Asset, lights: Sequence[Light]) -> list[tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]]:
+    """(unit directions in the asset's frame, colors) of directional lights, and of environments a piece of texels at a time.
 
-    An environment's texels count radiance times solid angle over the captured domain: no cosine (T holds it), no normalisation.
+    An environment's texels count radiance times solid angle over the captured domain: no cosine (T holds it), no normalization.
     """
     pieces = []
     suns = [light for light in lights if isinstance(light, DirectionalLight)]
@@ -116,9 +116,9 @@ def far_lights(asset: Asset, lights: Sequence[Light]) -> list[tuple[Float64[ndar
             rotation = linear / np.cbrt(np.linalg.det(linear))
             directions, solid_angle = environment_samples(light.image, asset.domain, rotation)
             height, width = light.image.shape[:2]
-            rows_at_a_time = max(1, CHUNK // width)
-            for start in range(0, height, rows_at_a_time):
-                rows = slice(start, start + rows_at_a_time)
+            rows_per_chunk = max(1, CHUNK // width)
+            for start in range(0, height, rows_per_chunk):
+                rows = slice(start, start + rows_per_chunk)
                 radiance = light.image[rows] * solid_angle[rows, :, None] * np.array(light.color)
                 pieces.append((directions[rows].reshape(-1, 3), radiance.reshape(-1, 3)))
     return pieces
@@ -202,20 +202,20 @@ def seam_report(
     """
     train = capture.indices("train")
     directions = capture.directions(train[:: -(-len(train) // SEAM_LIGHTS)])
-    sewn = asset.at(stitch.texels)
+    stitched = asset.at(stitch.texels)
     entries = [{**entry, "encoding": "float"} for entry in asset.layers]
     as_fitted = replace(
-        sewn,
-        manifest={**sewn.manifest, LAYERS[asset.method]: entries},
+        stitched,
+        manifest={**stitched.manifest, LAYERS[asset.method]: entries},
         stored=loose[:, None],
         scale=np.ones_like(asset.scale),
         bias=np.zeros_like(asset.bias),
-        tables=sewn.tables if loose_index is None else {**sewn.tables, "cluster_index": loose_index[None].astype(np.uint8)},
+        tables=stitched.tables if loose_index is None else {**stitched.tables, "cluster_index": loose_index[None].astype(np.uint8)},
     )
     covered = np.flatnonzero(asset.covered)
     mean = float(np.abs(respond(asset.at(covered[:: -(-len(covered) // SEAM_TEXELS)]), directions)).mean())
     gaps = {}
-    for name, part in (("before", as_fitted), ("after", sewn)):
+    for name, part in (("before", as_fitted), ("after", stitched)):
         relit = respond(part, directions)[:, 0].transpose(1, 0, 2)  # (n, b, 3)
         gaps[name] = stitch.difference(relit.reshape(len(relit), -1)) / max(mean, 1e-30)
     return {"edges": stitch.edges, "samples": stitch.samples, **gaps}

@@ -27,7 +27,7 @@ from srbf.methods.receivers import (
     carried_images,
     carried_scene,
     common_manifest,
-    far_lights,
+    distant_lights,
     finish,
     inside,
     light_vectors,
@@ -87,7 +87,7 @@ class RelightingMap:
         stitch: Stitch | None = None,
         tiles: Tiles | None = None,
     ) -> Asset:
-        """Fit the train lights of a capture: one k x L factorisation, each image read once, never a solve a texel.
+        """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve a texel.
 
         `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`); `stitch` closes
         the seams of the dilated maps before they are rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes a texel, two
@@ -177,11 +177,11 @@ class RelightingMap:
         """What the encoding adds to a light's squared error: maps that cancel each other do not survive it."""
         if self.encoding == "float":
             return None
-        train = sample.answers[:, : sample.train]
+        train = sample.responses[:, : sample.train]
         energy = np.einsum("nlc,nlc->n", train, train)
         chosen = np.unique(np.concatenate([np.arange(0, len(train), -(-len(train) // NOISE_TEXELS)), energy.argsort()[-NOISE_TEXELS:]]))
-        answers = train[chosen].astype(np.float64).transpose(1, 0, 2)  # (L, n, 3); the brightest set the layers' range
-        flat = answers.reshape(sample.train, -1)
+        responses = train[chosen].astype(np.float64).transpose(1, 0, 2)  # (L, n, 3); the brightest set the layers' range
+        flat = responses.reshape(sample.train, -1)
 
         def variance(operator: np.ndarray, weights: np.ndarray) -> np.ndarray:
             maps = (operator @ flat).reshape(self.k, -1, 3)
@@ -196,32 +196,32 @@ class RelightingMap:
 def relight(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
     """max(0, sum over lights) + ambient, for any number of lights of any kind at once.
 
-    Directional and environment lights fold into one weight a map and colour, so a hundred of them cost as one; a point or
+    Directional and environment lights fold into one weight a map and color, so a hundred of them cost as one; a point or
     spot light weighs every receiver by itself [Wong2005, "Directional-Source Relighting", "Point-Source Relighting"].
     """
     return finish(asset, linear_response(asset, lights))
 
 
 def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-    """The sum over lights before the clamp and without ambient: linear in every light's colour."""
-    weights = folded_weights(asset, lights).astype(np.float32)
+    """The sum over lights before the clamp and without ambient: linear in every light's color."""
+    weights = projected_weights(asset, lights).astype(np.float32)
 
-    def folded(layers: ndarray, rows: slice) -> ndarray:
+    def projected(layers: ndarray, rows: slice) -> ndarray:
         return np.einsum("khwc,kc->hwc", layers, weights, optimize=True)
 
-    def answer(layers: ndarray, rows: slice, unit: ndarray) -> ndarray:
+    def response(layers: ndarray, rows: slice, unit: ndarray) -> ndarray:
         return np.einsum("khwc,hwk->hwc", layers, basis_weights(asset, unit).astype(np.float32), optimize=True)
 
-    return sum_over_lights(asset, lights, folded if weights.any() else None, answer)
+    return sum_over_lights(asset, lights, projected if weights.any() else None, response)
 
 
 def directional_responses(asset: Asset, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
     """`linear_response` to a white light from each of many unit directions: one (b, K) x (K, H W 3) product."""
     weights = basis_weights(asset, inside(asset, directions)).astype(np.float32)  # (b, K)
     images = np.empty((len(weights), asset.height, asset.width, 3), np.float32)
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
+    rows_per_chunk = max(1, CHUNK // asset.width)
+    for start in range(0, asset.height, rows_per_chunk):
+        rows = slice(start, start + rows_per_chunk)
         c = asset.coefficients(rows)
         images[:, rows] = (weights @ c.reshape(asset.k, -1)).reshape(len(weights), *c.shape[1:])
     return images
@@ -235,10 +235,10 @@ def basis_weights(asset: Asset, directions: Float64[ndarray, "*shape 3"]) -> Flo
     return basis.evaluate(directions.reshape(-1, 3)).reshape(*directions.shape[:-1], asset.k)
 
 
-def folded_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "K 3"]:
-    """One weight a map and colour for all directional and environment lights: sum of color R_i(L) and of W_i = int E R_i."""
+def projected_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "K 3"]:
+    """One weight a map and color for all directional and environment lights: sum of color R_i(L) and of W_i = int E R_i."""
     weights = np.zeros((asset.k, 3))
-    for directions, colors in far_lights(asset, lights):
+    for directions, colors in distant_lights(asset, lights):
         weights += basis_weights(asset, directions).T @ colors
     return weights
 

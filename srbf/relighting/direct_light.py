@@ -27,7 +27,7 @@ NAMES = {"ray": "exact direct light by rays", "shadow-map": "direct light by a s
 class DirectLight(Protocol):
     """Adds what an indirect asset leaves out; lights are in the asset's frame."""
 
-    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+    def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct diffuse light of `lights`; environments add nothing."""
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
@@ -69,9 +69,9 @@ class Added:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._stack.close()
 
-    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
+    def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
         """The direct light of world-space `lights`, None where none is added."""
-        return None if self._light is None else self._light.answer([moved(light, self._frame) for light in lights])
+        return None if self._light is None else self._light.response([moved(light, self._frame) for light in lights])
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
         """The answers to white lights from world-space `directions`, 0 where none is added."""

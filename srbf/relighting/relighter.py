@@ -13,15 +13,15 @@ from numpy import ndarray
 from srbf.arrays import Float32
 from srbf.asset import Asset
 from srbf.errors import InputError
+from srbf.gl.coefficient_maps import ComponentPasses
 from srbf.gl.context import Limits, create_context
 from srbf.gl.depth_buffer import DepthView
 from srbf.gl.environment import Sky
 from srbf.gl.programs import Programs
 from srbf.gl.relighting_map import MapPasses
-from srbf.gl.scalar_planes import PlanePasses
 from srbf.gl.textures import AssetTextures
 from srbf.lights import EnvironmentLight, Light, PointLight, moved
-from srbf.methods import folded_weights
+from srbf.methods import projected_weights
 
 if TYPE_CHECKING:
     import moderngl
@@ -32,10 +32,10 @@ Place = Literal["host", "gpu"]
 
 UNITS = 5  # maps, or images of four planes, a pass of the multi-pass variant
 MAX_UNITS = 8  # as many terms as stages/accumulate.frag spells out
-PASSES: dict[str, type[MapPasses | PlanePasses]] = {
+PASSES: dict[str, type[MapPasses | ComponentPasses]] = {
     "relighting-map": MapPasses,
-    "eigen-map": PlanePasses,
-    "clustered-eigen-map": PlanePasses,
+    "eigen-map": ComponentPasses,
+    "clustered-eigen-map": ComponentPasses,
 }
 
 
@@ -135,13 +135,13 @@ class Relighter:
         if not 1 <= units <= most:
             raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
         inside = [moved(light, self._asset.asset_from_world) for light in lights]
-        lamps = [light for light in inside if isinstance(light, PointLight)]
-        if lamps and not self._located:
+        point_lights = [light for light in inside if isinstance(light, PointLight)]
+        if point_lights and not self._located:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
-        if lamps:
-            self._passes.check_lamps()
+        if point_lights:
+            self._passes.check_point_lights()
         skies = [light for light in lights if isinstance(light, EnvironmentLight)] if self._sky is not None else []
-        weights = folded_weights(self._asset, [light for light in lights if light not in skies])
+        weights = projected_weights(self._asset, [light for light in lights if light not in skies])
         with self._context:
             by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
             self._sum_buffer.use()
@@ -151,11 +151,11 @@ class Relighter:
             if by_shader is not None:
                 self._passes.weighted(by_shader)
                 weights = 0 * weights
-            if weights.any() and (multipass or not lamps):
+            if weights.any() and (multipass or not point_lights):
                 self._passes.far(weights, at_once)
                 weights = 0 * weights
-            if lamps:
-                self._passes.lamps(lamps, weights, at_once)
+            if point_lights:
+                self._passes.point_lights(point_lights, weights, at_once)
             if direct is not None:
                 with self._textures.passing(direct) as texture:
                     texture.use(0)

@@ -98,22 +98,22 @@ def rebin(capture: Capture, indices: Sequence[int], tiles: csr_array) -> Float32
 
     NaN for a tile of no receivers.
     """
-    answers = np.empty((len(indices), tile_count(tiles), 3), np.float32)
+    responses = np.empty((len(indices), tile_count(tiles), 3), np.float32)
     for first, block in capture.blocks(indices):
         for i, image in enumerate(block):
-            answers[first + i] = tiles @ image
-    answers[:, _empty(tiles)] = np.nan
-    return answers
+            responses[first + i] = tiles @ image
+    responses[:, _empty(tiles)] = np.nan
+    return responses
 
 
 def captured_tiles(
-    answers: Float32[ndarray, "L G 3"], lights: Float64[ndarray, "L 3"], directions: Float64[ndarray, "h w 3"]
+    responses: Float32[ndarray, "L G 3"], lights: Float64[ndarray, "L 3"], directions: Float64[ndarray, "h w 3"]
 ) -> Float32[ndarray, "G h w 3"]:
     """Tiles whose pixel holds the answer to the nearest light; NaN where `directions` are, outside the disc [Wong2005, fig. 1]."""
     inside = np.isfinite(directions[..., 0])
     nearest = KDTree(lights).query(directions[inside])[1]  # the nearest chord is the nearest angle
-    result = np.full((answers.shape[1], *inside.shape, 3), np.nan, np.float32)
-    result[:, inside] = answers[nearest].transpose(1, 0, 2)
+    result = np.full((responses.shape[1], *inside.shape, 3), np.nan, np.float32)
+    result[:, inside] = responses[nearest].transpose(1, 0, 2)
     return result
 
 
@@ -126,15 +126,15 @@ def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h
     picked, columns = asset.at(receivers), tiles.tocsc()[:, receivers].tocsr()
     inside = np.isfinite(directions[..., 0])
     asked = directions[inside]
-    answers = np.full((len(asked), tile_count(tiles), 3), np.nan, np.float32)
+    responses = np.full((len(asked), tile_count(tiles), 3), np.nan, np.float32)
     at_a_time = max(1, 16 * CHUNK // max(1, len(receivers)))
     for start in range(0, len(asked) if len(receivers) else 0, at_a_time):
         images = directional_responses(picked, asked[start : start + at_a_time])[:, 0]  # (b, n, 3)
         means = columns @ images.transpose(1, 0, 2).reshape(len(receivers), -1)
-        answers[start : start + at_a_time] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
-    answers[:, _empty(tiles)] = np.nan
+        responses[start : start + at_a_time] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
+    responses[:, _empty(tiles)] = np.nan
     result = np.full((tile_count(tiles), *inside.shape, 3), np.nan, np.float32)
-    result[:, inside] = answers.transpose(1, 0, 2)
+    result[:, inside] = responses.transpose(1, 0, 2)
     return result
 
 

@@ -44,19 +44,19 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
     candidates = spread_receivers(covered, CANDIDATES)
     train = capture.indices("train") or list(range(len(capture.lights)))
     lights = capture.directions(train)
-    answers = rebin(capture, train, csr_array(vstack([blocks, single_receivers(candidates, covered.size)])))
-    gain = EXPOSURE_LEVEL / max(float(np.nanquantile(answers[:, : tile_count(blocks)], EXPOSURE_QUANTILE)), 1e-9)
-    probe_answers = answers[:, tile_count(blocks) :]
+    responses = rebin(capture, train, csr_array(vstack([blocks, single_receivers(candidates, covered.size)])))
+    gain = EXPOSURE_LEVEL / max(float(np.nanquantile(responses[:, : tile_count(blocks)], EXPOSURE_QUANTILE)), 1e-9)
+    probe_responses = responses[:, tile_count(blocks) :]
     probes = farthest_points(
-        np.append(probe_answers.transpose(1, 0, 2).reshape(len(candidates), -1), 0 * probe_answers[0, :, :1], 1), PROBES
+        np.append(probe_responses.transpose(1, 0, 2).reshape(len(candidates), -1), 0 * probe_responses[0, :, :1], 1), PROBES
     )
     squash = 2 if sphere else 1  # a latitude-longitude tile is twice as wide as high
     side = int(min(WIDE * DPI / 100 / grid[1] - GAP, squash * (TALL * DPI / 100 / grid[0] - GAP)))
     small, large = tile_directions(max(1, side // squash), projection), tile_directions(LARGE // squash, projection)
-    before = mosaic(captured_tiles(answers[:, : tile_count(blocks)], lights, small), grid, GAP)
+    before = mosaic(captured_tiles(responses[:, : tile_count(blocks)], lights, small), grid, GAP)
     after = mosaic(fitted_tiles(asset, blocks, small), grid, GAP)
     frame = mosaic(np.repeat(small[None], grid[0] * grid[1], axis=0).astype(np.float32), grid, GAP)
-    probe_before = captured_tiles(probe_answers[:, probes], lights, large)
+    probe_before = captured_tiles(probe_responses[:, probes], lights, large)
     probe_after = fitted_tiles(asset, single_receivers(candidates[probes], covered.size), large)
 
     wide, tall = before.shape[1] * 100 / DPI, before.shape[0] * 100 / DPI  # a pixel of the mosaic is a pixel of the file
@@ -102,7 +102,7 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
 
 
 def paper(image: Float32[ndarray, "H W 3"], gain: float, frame: ndarray) -> ndarray:
-    """Display values: as white as the sheet where `frame` (H, W, 3) is NaN, grey where a tile has no covered receiver."""
+    """Display values: as white as the sheet where `frame` (H, W, 3) is NaN, gray where a tile has no covered receiver."""
     display = shown(image, gain)
     display[np.isnan(frame[..., 0])] = 1.0
     return display

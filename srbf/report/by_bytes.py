@@ -30,7 +30,7 @@ def by_bytes(subject: Subject, findings: Findings) -> str:
     )  # fmt: skip
     n = len(subject.capture.indices("train"))
     for score in baselines:
-        plot.rule(y=score.psnr, style="line grey dash")
+        plot.rule(y=score.psnr, style="line gray dash")
         plot.label(low, score.psnr, BASELINES[score.family].format(n=n, b=score.bytes_per_texel), "soft halo", dx=8, dy=-6)
     ends = [(curve[-1], family, color) for (family, curve), color in zip(curves.items(), COLORS * len(curves), strict=False)]
     heights = [float(plot.point(low, score.psnr)[1]) for score, _, _ in ends]

@@ -10,7 +10,7 @@ from srbf.report.plot import Axis, Plot, disc, on_disc, svg
 from srbf.report.sphere import on_half
 from srbf.report.subject import Subject
 
-COLOR = {"train": "grey", "validation": "blue", "holdout": "red"}
+COLOR = {"train": "gray", "validation": "blue", "holdout": "red"}
 RADIUS = 142.0
 GAP, HEAD = 34.0, 34.0
 DOT = {"train": 4.4, "validation": 6.5, "holdout": 6.5}

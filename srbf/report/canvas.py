@@ -58,7 +58,7 @@ class Sheet:
         return axes
 
     def image(self, x: float, y: float, width: float, height: float, pixels: ndarray, label: str = "") -> None:
-        """Display values (H, W, 3) or grey (H, W) in [0, 1], row 0 at the top, with a label above the box."""
+        """Display values (H, W, 3) or gray (H, W) in [0, 1], row 0 at the top, with a label above the box."""
         shown = np.repeat(pixels[..., None], 3, axis=2) if pixels.ndim == 2 else pixels
         stored = np.round(np.clip(shown, 0, 1) * 255).astype(np.uint8)
         self._paper.imshow(stored, extent=(x, x + width, y + height, y), aspect="auto", interpolation="antialiased")
@@ -76,9 +76,9 @@ class Sheet:
         self._paper.plot([cx, cx], [cy - radius, cy + radius], color=RULE, lw=0.5)
         px, py = disc_points(np.asarray(direction)[None])[0] * radius
         self._paper.plot([cx, cx + px], [cy, cy - py], color="#e0a526", lw=1)
-        self.lamp(cx + px, cy - py, above=bool(direction[2] > 0))
+        self.point_light(cx + px, cy - py, above=bool(direction[2] > 0))
 
-    def lamp(self, x: float, y: float, above: bool = True, size: float = 6.5) -> None:
+    def point_light(self, x: float, y: float, above: bool = True, size: float = 6.5) -> None:
         """A yellow dot, hollow for what is below the horizon."""
         self._paper.plot(x, y, "o", ms=size, mfc="#f0b429" if above else "white", mec="#a87512", mew=0.9)
 
@@ -111,15 +111,15 @@ def draw_disc(axes: Any, rings: tuple[float, ...] = (0.0, 30.0, 60.0), labels: b
 
 
 def shown(linear: Float32[ndarray, "H W 3"], gain: float, covered: ndarray | None = None) -> ndarray:
-    """sRGB of clip(linear * gain) as display values, NaN and uncovered receivers neutral grey."""
-    grey = ~np.isfinite(linear).all(axis=2)
-    display = encode_srgb(np.clip(np.where(grey[..., None], 0, linear) * gain, 0, 1))
-    display[grey if covered is None else grey | ~covered] = UNCOVERED
+    """sRGB of clip(linear * gain) as display values, NaN and uncovered receivers neutral gray."""
+    gray = ~np.isfinite(linear).all(axis=2)
+    display = encode_srgb(np.clip(np.where(gray[..., None], 0, linear) * gain, 0, 1))
+    display[gray if covered is None else gray | ~covered] = UNCOVERED
     return display
 
 
 def shown_signed(values: Float32[ndarray, "H W 3"], scale: float, covered: ndarray | None = None) -> ndarray:
-    """Signed values as display values: mid grey is 0, white `scale`, black -`scale`, no sRGB curve."""
+    """Signed values as display values: mid gray is 0, white `scale`, black -`scale`, no sRGB curve."""
     display = 0.5 + 0.5 * np.clip(values / scale, -1, 1)
     if covered is not None:
         display[~covered] = UNCOVERED
@@ -139,5 +139,5 @@ def gain_text(gain: float) -> str:
 
 
 def place_text(position: Sequence[float]) -> str:
-    """A position in metres to the centimetre, without a negative zero."""
+    """A position in meters to the centimetre, without a negative zero."""
     return "(" + ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in position) + ")"

@@ -100,12 +100,12 @@ def spectrum_of(sample: Capture, asset: Asset, peak: float) -> Spectrum:
     """The spectrum, and the asset's own pooled PSNR on the same answers before any clamp, as the planes' bound has it."""
     train = sample.indices("train")
     values = spectrum(sample)
-    answers = sample.width * sample.height * 3 * len(train)
+    responses = sample.width * sample.height * 3 * len(train)
     squares = 0.0
     for first, block in sample.blocks(train):
         relit = directional_responses(asset, sample.directions(train[first : first + len(block)])).reshape(block.shape)
         squares += float(((relit - block) ** 2).sum(dtype=np.float64))
-    return Spectrum(values, planes_bound(values, answers, peak), psnr(peak, float(np.sqrt(squares / answers))))
+    return Spectrum(values, planes_bound(values, responses, peak), psnr(peak, float(np.sqrt(squares / responses))))
 
 
 def look_at_unseen(subject: Subject) -> Unseen:

@@ -57,7 +57,7 @@ def motion_curves(motion: Motion) -> str:
 def _two(
     label: str, frames: int, curves: tuple[np.ndarray, np.ndarray], names: tuple[str, str] = ("relit", "reference"), last: bool = False
 ) -> str:
-    """Two curves (C, F or F - 1), the first in colour, labelled at their ends; the frames' axis is named on the `last` plot."""
+    """Two curves (C, F or F - 1), the first in color, labeled at their ends; the frames' axis is named on the `last` plot."""
     circles, steps = curves[0].shape
     low, high = (float(f(np.stack(curves))) for f in (np.min, np.max))
     low = 0.0 if low >= 0 else low - 0.06 * (high - low)
@@ -70,9 +70,9 @@ def _two(
         if circle:
             plot.rule(x=circle * frames, style="axis")
         at = circle * frames + np.arange(steps)
-        plot.line(at, curves[1][circle], "grey")
+        plot.line(at, curves[1][circle], "gray")
         plot.line(at, curves[0][circle], "red")
     ends = [float(plot.point(0, curve[-1, -1])[1]) for curve in curves]
-    for name, y, color in zip(names, spread_labels(ends, 15), ("red", "grey"), strict=True):
+    for name, y, color in zip(names, spread_labels(ends, 15), ("red", "gray"), strict=True):
         plot.text(WIDTH - RIGHT + 8, min(y + 4, height - bottom), name, f"strong {color}")
     return plot.svg(label)

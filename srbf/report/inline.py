@@ -80,7 +80,7 @@ def paragraphs(*texts: str) -> str:
 
 
 def colored(values: ndarray, top: float, name: str, covered: ndarray, uncovered: float) -> ndarray:
-    """Scalars (H, W) as display values by a matplotlib colour map from 0 to `top`; `uncovered` grey where nothing is."""
+    """Scalars (H, W) as display values by a matplotlib color map from 0 to `top`; `uncovered` gray where nothing is."""
     from matplotlib import colormaps
 
     display = colormaps[name](np.clip(values / max(top, 1e-30), 0, 1))[..., :3]
@@ -89,7 +89,7 @@ def colored(values: ndarray, top: float, name: str, covered: ndarray, uncovered:
 
 
 def ramp(name: str, steps: int = 24) -> Sequence[str]:
-    """Hex colours along a matplotlib colour map."""
+    """Hex colors along a matplotlib color map."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 

@@ -38,7 +38,7 @@ def light_functions(subject: Subject) -> str:
         cells.append(f'<div>{image(pixels_uri(display), name, "sheet round")}<p class="head">{name}, ±{scale:.2g}</p></div>')
     view = "by latitude and longitude, +z on top" if sphere else "on the hemisphere seen from +z, x right, y up"
     caption = (
-        f"Functions of light direction{words}, {view}: what a texel's scalars are multiplied by, colour by colour. Mid grey is 0, each "
+        f"Functions of light direction{words}, {view}: what a texel's scalars are multiplied by, color by color. Mid gray is 0, each "
         "shown to its own largest value. A light's weights are read off here once a frame."
     )
     grid = f'<div class="pictures row" style="grid-template-columns: repeat(6, 1fr)">{"".join(cells)}</div>'

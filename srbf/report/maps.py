@@ -38,7 +38,7 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
         x_large + large_w + MARGIN,
         max(bottom + 6, top + 2 * large_h + 90),
         r"A relit image is a sum of relighting maps, $c_0 R_0(L_0) + c_1 R_1(L_0) + …$",
-        f"Maps and shares: mid grey is 0, white +{scale:.3g}, black −{scale:.3g}, per colour. Sums: clamped at 0, {gain_text(gain)}.",
+        f"Maps and shares: mid gray is 0, white +{scale:.3g}, black −{scale:.3g}, per color. Sums: clamped at 0, {gain_text(gain)}.",
     )
     for x, label in zip(xs, (r"map $c_i$", r"share $c_i\,R_i(L_0)$", "sum so far"), strict=True):
         sheet.text(x, top - 30, label, size=10, va="bottom")
@@ -76,7 +76,7 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
     sheet.save(folder / FILE)
     caption = (
         f"The {len(terms)} maps of largest weight for one {subject.role} light, times their weights, and the running sum "
-        "(after the article's figure 6). Coefficients are signed, so maps and shares are shown offset: mid grey is 0. "
+        "(after the article's figure 6). Coefficients are signed, so maps and shares are shown offset: mid gray is 0. "
         "The disc beside a weight shows where that map's center looks."
     )
     return Picture(FILE, "A sum of maps", caption)

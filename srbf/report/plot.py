@@ -1,4 +1,4 @@
-"""Plots as SVG that stand in the page itself: its type, its colours, light or dark, and sharp in print."""
+"""Plots as SVG that stand in the page itself: its type, its colors, light or dark, and sharp in print."""
 
 from __future__ import annotations
 

@@ -22,8 +22,8 @@ TERMS = 5
 def point_light(subject: Subject, folder: Path) -> Picture:
     """Write point_light.png: c_i, the maps R_i and their products, then the sum, the attenuation and the result [Wong2005, fig. 8, 10]."""
     asset, gain, covered = subject.asset, subject.gain, subject.covered
-    lamp = subject.points[1 if len(subject.points) > 1 else 0]
-    inside = moved(lamp, asset.asset_from_world)
+    point_light = subject.points[1 if len(subject.points) > 1 else 0]
+    inside = moved(point_light, asset.asset_from_world)
     assert isinstance(inside, PointLight)
     terms = strongest(subject, inside)
     r_maps, strength, signed = weighed(subject, inside, terms)
@@ -38,7 +38,8 @@ def point_light(subject: Subject, folder: Path) -> Picture:
         left + max(len(terms) * (w + gap) - gap, 3 * large_w + 92) + MARGIN,
         y_large + large_h + 34,
         "A point light weighs every receiver by itself",
-        f"Lamp at {place_text(lamp.position)} m, $a_o$ {lamp.a0:.3g} m. Maps: mid grey is 0, white +{scale:.3g}, black −{scale:.3g}. "
+        f"Point light at {place_text(point_light.position)} m, $a_o$ {point_light.a0:.3g} m. "
+        f"Maps: mid gray is 0, white +{scale:.3g}, black −{scale:.3g}. "
         f"$R_i$: black 0, white 1. Lower row: {gain_text(gain)}.",
     )
     labels = (r"$c_i$", r"$R_i(\hat{L})$", r"$c_i\,R_i$")
@@ -54,18 +55,18 @@ def point_light(subject: Subject, folder: Path) -> Picture:
     for n, i in enumerate(terms):
         column = left + n * (w + gap)
         sheet.image(column, top, w, h, shown_signed(maps[n], scale, covered), label=f"i = {i}")
-        sheet.image(column, top + h + 22, w, h, grey(r_maps[..., n], covered))
+        sheet.image(column, top + h + 22, w, h, gray(r_maps[..., n], covered))
         sheet.image(column, top + 2 * (h + 22), w, h, shown_signed(maps[n] * r_maps[..., n, None], scale, covered))
-    result = relight(asset, [lamp])
+    result = relight(asset, [point_light])
     if "ambient" in asset.images:
         result = result - asset.images["ambient"]
     limit = float(np.quantile(strength[covered], 0.995))
     panels = (
         (shown(np.maximum(signed, 0), gain, covered), f"sum of all {asset.k} products"),
         (
-            grey(strength / limit, covered),
+            gray(strength / limit, covered),
             f"× attenuation $a_o/|L|$ (white {limit:.2f})"
-            if lamp.falloff == "linear"
+            if point_light.falloff == "linear"
             else f"× attenuation $(a_o/|L|)^2$ (white {limit:.2f})",
         ),
         (shown(result, gain, covered), "= result"),
@@ -81,29 +82,29 @@ def point_light(subject: Subject, folder: Path) -> Picture:
     return Picture(FILE, "A point light", caption)
 
 
-def grey(values: ndarray, covered: ndarray) -> ndarray:
-    """Scalars (H, W) in [0, 1] as linear display greys, uncovered receivers as everywhere."""
+def gray(values: ndarray, covered: ndarray) -> ndarray:
+    """Scalars (H, W) in [0, 1] as linear display grays, uncovered receivers as everywhere."""
     return shown_signed(np.repeat(2 * values[..., None] - 1, 3, axis=2), 1.0, covered)
 
 
-def strongest(subject: Subject, lamp: PointLight) -> list[int]:
+def strongest(subject: Subject, point_light: PointLight) -> list[int]:
     """The maps whose weight peaks highest over the receivers (0.9 quantile), ordered by where their light comes from."""
     positions = subject.asset.images["position"][subject.covered]
-    weights, _ = receiver_weights(subject.asset, lamp, positions[:: max(1, len(positions) // 4096)])
+    weights, _ = receiver_weights(subject.asset, point_light, positions[:: max(1, len(positions) // 4096)])
     terms = np.argsort(-np.quantile(weights, 0.9, axis=0), kind="stable")[:TERMS]
     return sorted((int(i) for i in terms), key=lambda i: float(subject.asset.basis.centers[i, 0]))
 
 
-def weighed(subject: Subject, lamp: PointLight, terms: list[int]) -> tuple[ndarray, ndarray, ndarray]:
+def weighed(subject: Subject, point_light: PointLight, terms: list[int]) -> tuple[ndarray, ndarray, ndarray]:
     """(R_i of `terms` (H, W, n), attenuation (H, W), signed sum of c_i R_i before it (H, W, 3)), some rows at a time."""
     asset = subject.asset
     r_maps = np.empty((asset.height, asset.width, len(terms)), np.float32)
     strength = np.empty((asset.height, asset.width), np.float32)
     signed = np.empty((asset.height, asset.width, 3), np.float32)
-    rows_at_a_time = max(1, CHUNK // asset.width)
-    for start in range(0, asset.height, rows_at_a_time):
-        rows = slice(start, start + rows_at_a_time)
-        weights, strength[rows] = receiver_weights(asset, lamp, asset.images["position"][rows])
+    rows_per_chunk = max(1, CHUNK // asset.width)
+    for start in range(0, asset.height, rows_per_chunk):
+        rows = slice(start, start + rows_per_chunk)
+        weights, strength[rows] = receiver_weights(asset, point_light, asset.images["position"][rows])
         r_maps[rows] = weights[..., terms]
         signed[rows] = np.einsum("khwc,hwk->hwc", asset.coefficients(rows), weights.astype(np.float32), optimize=True)
     return r_maps, strength, signed

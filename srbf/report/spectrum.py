@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.evaluation.rate_distortion import scalars_of
+from srbf.evaluation.rate_distortion import components_of
 from srbf.report.findings import Findings, Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
@@ -17,7 +17,7 @@ ABOVE = 15.0  # dB over the asset's own: beyond, planes hold the noise
 
 def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> str:
     """Singular values, and what the best planes leave, side by side."""
-    scalars = scalars_of(subject.asset)
+    scalars = components_of(subject.asset)
     ranks = np.arange(1, len(spectrum.values) + 1)
     relative = spectrum.values / max(float(spectrum.values[0]), 1e-30)
     kept = (relative > FLOOR) & (ranks <= SHOWN * len(ranks))
@@ -45,7 +45,7 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     reach = f", which the best {planes_words(int(np.argmax(enough)))} would reach too" if enough.any() else ""
     caption = (
         f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular values "
-        f"are of the answers of {findings.texels} texels to all train lights and colours, less their mean texel; every light weighs "
+        f"are of the answers of {findings.texels} texels to all train lights and colors, less their mean texel; every light weighs "
         "alike. The curve on the right bounds any one linear model of so many planes on these very answers, not on unseen light; clusters "
         "of texels with planes of their own may pass it."
     )

@@ -66,7 +66,7 @@ def r_curve(subject: Subject, folder: Path) -> Picture:
         760,
         576,
         "R: one dot product, one lookup",
-        f"Spread {np.degrees(spread):.2f}° ({spread:.4f} rad); table of {n} entries, texel centres, linear interpolation.",
+        f"Spread {np.degrees(spread):.2f}° ({spread:.4f} rad); table of {n} entries, texel centers, linear interpolation.",
     )
     x = np.unique(np.concatenate([np.linspace(-1, 1, 4001), 1 - np.geomspace(1e-6, 2 / (n - 1), 200)]))
     entries = np.linspace(-1, 1, n)

@@ -14,7 +14,7 @@ from srbf.io.files import atomic_path
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import relight
 from srbf.report.canvas import MARGIN, SOFT, Sheet, box_for, gain_text, place_text, shown
-from srbf.report.lamps import moving_point
+from srbf.report.point_lights import moving_point
 from srbf.report.subject import Picture, Subject
 
 POINTS, SPOTS, ANIMATION = "point_strip.png", "spot_strip.png", "animation.webp"
@@ -34,13 +34,13 @@ def spot_strip(subject: Subject, folder: Path) -> Picture:
     return _strip(subject, folder / SPOTS, subject.spots, "A spot light that swings", "Spot lights")
 
 
-def _strip(subject: Subject, path: Path, lamps: Sequence[PointLight], heading: str, title: str) -> Picture:
+def _strip(subject: Subject, path: Path, point_lights: Sequence[PointLight], heading: str, title: str) -> Picture:
     asset, gain = subject.asset, subject.gain
-    columns = min(3, len(lamps))
-    rows = -(-len(lamps) // columns)
+    columns = min(3, len(point_lights))
+    rows = -(-len(point_lights) // columns)
     w, h = box_for(asset.width, asset.height, area=330 * 220, widest=430, tallest=340)
     top, legend, gap = 84, 62, 16
-    first = lamps[0]
+    first = point_lights[0]
     fall = "a0/|L|" if first.falloff == "linear" else "(a0/|L|)²"
     sheet = Sheet(
         2 * MARGIN + columns * (w + gap) - gap,
@@ -48,36 +48,36 @@ def _strip(subject: Subject, path: Path, lamps: Sequence[PointLight], heading: s
         heading,
         f"White, attenuation {fall}; {gain_text(gain)}. Plan: the receivers from above, x right, y up, lamp in yellow.",
     )
-    for n, lamp in enumerate(lamps):
+    for n, point_light in enumerate(point_lights):
         x, y = MARGIN + n % columns * (w + gap), top + n // columns * (h + legend)
-        sheet.image(x, y, w, h, shown(relight(asset, [lamp]), gain, subject.covered))
-        _plan(sheet, subject, lamp, x, y + h + 6, min(64, 0.3 * w), 44)
+        sheet.image(x, y, w, h, shown(relight(asset, [point_light]), gain, subject.covered))
+        _plan(sheet, subject, point_light, x, y + h + 6, min(64, 0.3 * w), 44)
         sheet.text(
             x + min(64, 0.3 * w) + 10,
             y + h + 28,
-            f"{place_text(lamp.position)} m\n$a_0$ {lamp.a0:.2f} m",
+            f"{place_text(point_light.position)} m\n$a_0$ {point_light.a0:.2f} m",
             size=8,
             color=SOFT,
             va="center",
         )
     sheet.save(path)
-    caption = f"{title} relit from the maps, none of which was captured: {len(lamps)} of them, all under the exposure of the contact sheet."
+    caption = f"{title} relit from the maps, none of which was captured: {len(point_lights)} of them, all at the contact sheet's exposure."
     return Picture(path.name, title, caption)
 
 
-def _plan(sheet: Sheet, subject: Subject, lamp: PointLight, x: float, y: float, width: float, height: float) -> None:
-    """Receivers (a thinned cloud) and lamp from above, in world metres."""
+def _plan(sheet: Sheet, subject: Subject, point_light: PointLight, x: float, y: float, width: float, height: float) -> None:
+    """Receivers (a thinned cloud) and lamp from above, in world meters."""
     positions = subject.asset.images["position"][subject.covered]
     positions = positions[:: max(1, len(positions) // 600)].astype(np.float64)
     inverse = np.linalg.inv(subject.asset.asset_from_world)
     positions = positions @ inverse[:3, :3].T + inverse[:3, 3]
-    low, high = np.minimum(positions.min(axis=0), lamp.position)[:2], np.maximum(positions.max(axis=0), lamp.position)[:2]
-    scale = 0.86 * min(width, height) / max(float((high - low).max()), 1e-3) * np.array([1, -1])  # sheet units a metre; y is down there
+    low, high = np.minimum(positions.min(axis=0), point_light.position)[:2], np.maximum(positions.max(axis=0), point_light.position)[:2]
+    scale = 0.86 * min(width, height) / max(float((high - low).max()), 1e-3) * np.array([1, -1])  # sheet units a meter; y is down there
     corner = np.array([x, y]) + [0.07 * width, 0.5 * height]
     middle = np.array([low[0], (low[1] + high[1]) / 2])
     sheet.dots(corner + (positions[:, :2] - middle) * scale)
-    at = corner + (np.array(lamp.position[:2]) - middle) * scale
-    sheet.lamp(at[0], at[1], size=4.5)
+    at = corner + (np.array(point_light.position[:2]) - middle) * scale
+    sheet.point_light(at[0], at[1], size=4.5)
 
 
 def animation(subject: Subject, folder: Path) -> Picture:

@@ -15,7 +15,7 @@ from srbf.capture import ROLES, Capture, Role
 from srbf.evaluation.errors_by_role import COVERED, psnr
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import directional_responses
-from srbf.report.lamps import demonstration_lamps
+from srbf.report.point_lights import demonstration_point_lights
 from srbf.sphere import farthest_points
 
 SHOWN = 6  # unseen directions compared
@@ -80,5 +80,5 @@ def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_ligh
     relit = np.maximum(directional_responses(asset, capture.directions(chosen)), 0)
     level = float(np.quantile(references[:, covered], EXPOSURE_QUANTILE)) if covered.any() else 0.0
     gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
-    points, spots = demonstration_lamps(asset, covered, demo_lights)
+    points, spots = demonstration_point_lights(asset, covered, demo_lights)
     return Subject(asset, capture, evaluation, covered, role, tuple(chosen), references, relit, gain, points, spots)

@@ -60,7 +60,7 @@ def how_measured(unseen: Unseen) -> str:
     counts = {e.flip_pictures for e in unseen.errors if e.flip is not None}
     flip = f" FLIP is of {max(counts)} pictures of each row at most, the one of lowest PSNR among them." if counts else f" {WITHOUT_FLIP}"
     return paragraphs(
-        "Light adds up, so two and eight lights are sums of unseen references, drawn at random (seeded), with random colours between "
+        "Light adds up, so two and eight lights are sums of unseen references, drawn at random (seeded), with random colors between "
         f"{DIMMEST:g} and 1, scaled to be together as bright as one white light; relit and reference are clamped at 0 after the sum. "
         f"Shadow edges are the {EDGES:.0%} of the covered texels where the reference, divided by the mean picture, changes most from one "
         f"texel to the next.{flip}"

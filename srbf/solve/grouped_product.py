@@ -9,7 +9,7 @@ from srbf.arrays import Float, Float32, Int
 from srbf.compute.threads import each, one_blas_thread
 from srbf.io.float16 import finite_to_float32
 
-COLUMNS_AT_A_TIME = 1 << 12
+COLUMN_BATCH = 1 << 12
 
 
 class GroupedProduct:
@@ -25,9 +25,9 @@ class GroupedProduct:
         sizes = np.bincount(groups, minlength=len(weights))
         starts = np.concatenate([[0], np.cumsum(sizes)])
         self._pieces = [
-            (group, first, min(first + COLUMNS_AT_A_TIME, int(starts[group + 1])))
+            (group, first, min(first + COLUMN_BATCH, int(starts[group + 1])))
             for group in range(len(weights))
-            for first in range(int(starts[group]), int(starts[group + 1]), COLUMNS_AT_A_TIME)
+            for first in range(int(starts[group]), int(starts[group + 1]), COLUMN_BATCH)
         ]
         self._sorted = np.zeros((weights.shape[1], len(groups)), np.float32)
 

@@ -22,7 +22,7 @@ class LeastSquaresReport:
 
 @dataclass(eq=False)
 class StreamedLeastSquares:
-    """Minimise |A X - B|^2 + ridge |X|^2 over X, for a (L, K) matrix A and a (L, M) right-hand side B fed row block by row block.
+    """Minimize |A X - B|^2 + ridge |X|^2 over X, for a (L, K) matrix A and a (L, M) right-hand side B fed row block by row block.
 
     With A = U S V^T, the stream accumulates only U^T B, (K, M): U is orthonormal, so this sum is as well conditioned in
     float32 as the data are, whatever the condition of A. The answer X = V diag(s / (s^2 + ridge)) U^T B is formed once, in
@@ -47,7 +47,7 @@ class StreamedLeastSquares:
 
     @property
     def solution_operator(self) -> Float64[ndarray, "K L"]:
-        """The (K, L) matrix W with X = W B: the ridge-regularised pseudo-inverse of A."""
+        """The (K, L) matrix W with X = W B: the ridge-regularized pseudo-inverse of A."""
         return (self._vt.T * self._filter()) @ self._u.T
 
     def add(self, first_row: int, block: Float[ndarray, "*block"]) -> None:

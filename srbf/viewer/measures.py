@@ -14,7 +14,7 @@ from srbf.arrays import Float64, Int
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, psnr, squared_errors
-from srbf.evaluation.rate_distortion import scalars_of, singular_values, spectrum
+from srbf.evaluation.rate_distortion import components_of, singular_values, spectrum
 from srbf.evaluation.temporal_stability import sampled_texels
 from srbf.methods import directional_responses
 from srbf.sphere import point_set
@@ -62,23 +62,23 @@ class Measures:
         sample, asset = self._sample, self._assets[index].at(self._texels)
         floor = -np.inf if sample.transport == "indirect" else 0.0
         every = range(len(sample.lights))
-        answers = sample.sample(sample.indices("train") or every, np.arange(len(self._texels)))
-        peak = 1.0 if sample.source_bits == 8 else float(np.quantile(np.maximum(answers, 0), PEAK_QUANTILE))
+        responses = sample.sample(sample.indices("train") or every, np.arange(len(self._texels)))
+        peak = 1.0 if sample.source_bits == 8 else float(np.quantile(np.maximum(responses, 0), PEAK_QUANTILE))
         errors = []
         for first, block in sample.blocks(every):
             relit = directional_responses(asset, sample.directions(every[first : first + len(block)]))
-            for answer, true in zip(relit.reshape(block.shape), block, strict=True):
-                errors.append(float(np.sqrt(squared_errors(answer, true, floor)[0] / true.size)))
+            for response, true in zip(relit.reshape(block.shape), block, strict=True):
+                errors.append(float(np.sqrt(squared_errors(response, true, floor)[0] / true.size)))
         return {"texels": len(self._texels), "peak": peak, "rmse": errors, "psnr": [psnr(peak, error) for error in errors]}
 
     def _spectrum(self, index: int) -> dict[str, object]:
         asset = self._assets[index].at(self._texels)
-        answers = directional_responses(asset, point_set("fibonacci", DIRECTIONS, asset.domain))[:, 0]  # (b, n, 3)
-        own = singular_values(answers.transpose(1, 0, 2).reshape(len(self._texels), -1)) / np.sqrt(answers.size)
+        responses = directional_responses(asset, point_set("fibonacci", DIRECTIONS, asset.domain))[:, 0]  # (b, n, 3)
+        own = singular_values(responses.transpose(1, 0, 2).reshape(len(self._texels), -1)) / np.sqrt(responses.size)
         captured = None
         if self._capture is not None:
             captured = spectrum(self._sample) / np.sqrt(len(self._texels) * 3 * len(self._sample.indices("train")))
-        return {"scalars": scalars_of(asset), "asset": _listed(own), "capture": None if captured is None else _listed(captured)}
+        return {"scalars": components_of(asset), "asset": _listed(own), "capture": None if captured is None else _listed(captured)}
 
 
 def _listed(values: Float64[ndarray, " r"]) -> list[float]:

@@ -61,12 +61,12 @@ class _Handler(BaseHTTPRequestHandler):
     sys_version = ""
 
     def do_GET(self) -> None:
-        self._answer(body=True)
+        self._response(body=True)
 
     def do_HEAD(self) -> None:
-        self._answer(body=False)
+        self._response(body=False)
 
-    def _answer(self, body: bool) -> None:
+    def _response(self, body: bool) -> None:
         if self.headers.get("Host") not in (f"{HOST}:{self.server.server_port}", f"localhost:{self.server.server_port}"):
             return self._send(HTTPStatus.FORBIDDEN, b"expected this machine's own address\n", ".txt", body)
         name = unquote(urlsplit(self.path).path, errors="replace").removeprefix("/")

@@ -15,14 +15,14 @@ from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, S
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, disc_points, hashed, pixel_filter, spread_points
-from srbf.visibility.shadow import wall_tint
+from srbf.visibility.shadow import transmittance
 from srbf.visibility.surface import surface_at
 
 FIRST = 4  # samples of every texel
 SAMPLES = 32  # of a texel whose first ones differ
 MOST = 512  # of a texel whose samples still differ, at a shadow's edge above all
 BUDGET = 64  # samples that edges may take, for each texel of the picture: where everything is an edge, each gets fewer
-DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbours
+DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbors
 JUMP = 0.2  # between neighbors: a shadow's edge may cross a corner that no sample has met
 EDGE = 0.03  # likewise between samples of a texel: it takes up to MOST, as where a shadow's edge crosses it
 KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
@@ -31,7 +31,7 @@ LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off i
 MOST_WALLS = 32
 TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
 TINY = 1e-12  # a share below which nothing is diffuse
-NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbours of a pixel
+NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbors of a pixel
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class RayTracer:
         if receivers.camera is None:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
 
-    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+    def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; environments add nothing."""
         height, width = self._receivers.height, self._receivers.width
         total = np.zeros((height * width, 3), np.float32)
@@ -87,7 +87,7 @@ class RayTracer:
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`answer` to a white light from each of many directions."""
-        return np.stack([self.answer([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
+        return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
     def _irradiance(self, light: DirectionalLight | PointLight) -> Float32[ndarray, "P 3"]:
         texels = self._receivers.height * self._receivers.width
@@ -114,7 +114,7 @@ class RayTracer:
             sums.add(samples, self._lit(samples, light, numbers))
 
     def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
-        """Texels whose samples differ, or that differ from a neighbour."""
+        """Texels whose samples differ, or that differ from a neighbor."""
         beside = self._steps(mean) > DIFFERENT
         within = ((high - low).max(axis=1) > DIFFERENT) | ((weight > 0) & (weight < FIRST))
         chosen = (beside | within)[self._texels]
@@ -198,7 +198,7 @@ class RayTracer:
         """What one wall passes at the angle of each ray."""
         normal = np.einsum("nk,nkc->nc", bary, self._filter_normals[wall])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        return wall_tint(self._tints[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
+        return transmittance(self._tints[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Points `numbers` of each texel, sample by sample."""

@@ -15,9 +15,9 @@ from srbf.capture import Capture, Quantity
 from srbf.errors import InputError
 from srbf.io.scene_glb import Triangles, read_triangles
 
-SAME_SURFACE_COS = 0.9  # of the normals of two neighbours that lie on one smooth surface
-OFF_PLANE = 0.2  # of their distance: how far a neighbour may lie off the tangent plane
-LONGER = 2.0  # a neighbour farther off than this many times the other side's lies across a seam
+SAME_SURFACE_COS = 0.9  # of the normals of two neighbors that lie on one smooth surface
+OFF_PLANE = 0.2  # of their distance: how far a neighbor may lie off the tangent plane
+LONGER = 2.0  # a neighbor farther off than this many times the other side's lies across a seam
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Receivers:
         return 1.0 if self.quantity == "irradiance" else self.images["albedo"] / np.float32(np.pi)
 
     def gradients(self, name: str) -> tuple[Float32[ndarray, "H W 3"], Float32[ndarray, "H W 3"]]:
-        """Change of position or normal a texel to the right, and a texel down; 0 where no neighbour lies on the same surface."""
+        """Change of position or normal a texel to the right, and a texel down; 0 where no neighbor lies on the same surface."""
         along = []
         for axis in (1, 0):
             ahead, behind = self._step(name, axis, 1), self._step(name, axis, -1)
@@ -94,8 +94,8 @@ class Receivers:
         flat = np.abs((step * normal).sum(axis=2)) <= OFF_PLANE * length
         covered = self.images.get("coverage")
         real = np.ones(length.shape, bool) if covered is None else (covered > 0)
-        neighbour = np.roll(real, -sign, axis)
-        return flat & ((turned * normal).sum(axis=2) >= SAME_SURFACE_COS) & (length > 0) & real & neighbour
+        neighbor = np.roll(real, -sign, axis)
+        return flat & ((turned * normal).sum(axis=2) >= SAME_SURFACE_COS) & (length > 0) & real & neighbor
 
 
 def spread_points(count: int) -> Float64[ndarray, "S 4"]:
@@ -130,5 +130,5 @@ def pixel_filter(kind: str, width: float, square: Float64[ndarray, "S 2"]) -> Fl
 
 
 def hashed(height: int, width: int, channels: int) -> Float64[ndarray, "H W c"]:
-    """A fixed random number in [0, 1) a texel and channel, to turn its points so that neighbours do not band."""
+    """A fixed random number in [0, 1) a texel and channel, to turn its points so that neighbors do not band."""
     return np.random.default_rng(0).random((height, width, channels))

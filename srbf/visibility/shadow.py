@@ -13,7 +13,7 @@ from srbf.io.scene_glb import KNOTS
 
 @dataclass(frozen=True)
 class SunFrame:
-    """An orthographic shadow map's frame: three orthonormal axes, and the square (low, extent; metres) that it covers."""
+    """An orthographic shadow map's frame: three orthonormal axes, and the square (low, extent; meters) that it covers."""
 
     across: tuple[float, float, float]
     up: tuple[float, float, float]
@@ -66,7 +66,7 @@ def fraction(
     return lit / 9
 
 
-def wall_tint(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n"]) -> Float[ndarray, "n 3"]:
+def transmittance(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n"]) -> Float[ndarray, "n 3"]:
     """What one wall lets through at the cosine at which light meets its normal, from either side."""
     at = np.minimum(np.abs(cosine), 1) * (KNOTS - 1)
     knot = np.minimum(at.astype(int), KNOTS - 2)

@@ -60,7 +60,7 @@ class ShadowMapper:
         if self._owned:
             self._context.release()
 
-    def answer(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+    def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; environments add nothing."""
         total = np.zeros((self._receivers.height, self._receivers.width, 3), np.float32)
         for light in lights:
@@ -73,7 +73,7 @@ class ShadowMapper:
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`answer` to a white light from each of many directions."""
-        return np.stack([self.answer([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
+        return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
     def _irradiance(self, direction: Float64[ndarray, " 3"]) -> Float32[ndarray, "H W 3"]:
         suns = list(_suns(direction, self._receivers.sun_angle))
@@ -101,7 +101,7 @@ class ShadowMapper:
         covered = np.ones(position.shape[:2], bool) if coverage is None else coverage > 0
         if not covered.any():
             covered[:] = True
-        centre = position[covered].mean(axis=0, dtype=np.float64)  # single precision is finest about the origin
+        center = position[covered].mean(axis=0, dtype=np.float64)  # single precision is finest about the origin
         by_rays = has_embree() and receivers.camera is None and receivers.triangles.lightmap is None
         places = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit if by_rays else None)
         shape, every = position.shape[:2], np.arange(covered.size)
@@ -111,20 +111,20 @@ class ShadowMapper:
         total = np.sum([points.weight for points in found], axis=0)
         self._places = []
         for points in found:
-            point = np.concatenate([points.point - centre, (points.weight / total)[:, None]], axis=1)
+            point = np.concatenate([points.point - center, (points.weight / total)[:, None]], axis=1)
             height = np.einsum("nc,nc->n", points.lift, points.normal)
             normals = np.concatenate([points.normal, height[:, None]], axis=1)
             self._places.append(tuple(self._texture(image.reshape(*shape, -1)) for image in (point, normals, points.face)))
-        self._points = np.concatenate([points.point[covered.ravel()] - centre for points in found]).astype(np.float64)
+        self._points = np.concatenate([points.point[covered.ravel()] - center for points in found]).astype(np.float64)
         triangles = receivers.triangles
-        vertices = np.concatenate([triangles.corners - centre, triangles.normals], axis=2).astype(np.float32)  # (T, 3, 6)
+        vertices = np.concatenate([triangles.corners - center, triangles.normals], axis=2).astype(np.float32)  # (T, 3, 6)
         square = (self._size, self._size)
         self._maps = {name: self._target(square, 1, "f4") for name in ("heights", "wallHeights")}
         self._maps["tints"] = self._target(square, 4, "f2")
         self._maps["tints"][0].filter = (gl.LINEAR, gl.LINEAR)
         self._sum_texture, self._sum = self._target((receivers.width, receivers.height), 4, "f4")
         height = self._program("shadow.vert", "shadow_height.frag")
-        tint = self._program("shadow.vert", "shadow_tint.frag")
+        tint = self._program("shadow.vert", "shadow_transmittance.frag")
         self._occluders = self._mesh(height, vertices[triangles.occluders])
         self._walls = []
         for material in np.unique(triangles.material[triangles.filters]):

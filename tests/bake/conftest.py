@@ -33,8 +33,8 @@ def built(script: str, folder: Path) -> Callable[[str], Path]:
 
 @pytest.fixture(scope="session")
 def blend(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    """The .blend of a named scene of known_answers.py."""
-    return built("known_answers.py", tmp_path_factory.mktemp("scenes"))
+    """The .blend of a named scene of closed_form_scenes.py."""
+    return built("closed_form_scenes.py", tmp_path_factory.mktemp("scenes"))
 
 
 @pytest.fixture(scope="session")

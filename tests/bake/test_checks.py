@@ -16,7 +16,7 @@ from srbf.errors import BakeError
 from srbf.io.files import WriteError
 
 BLACK = np.zeros((4, 5, 3), np.float32)
-GREY = np.full((4, 5, 3), 0.5, np.float32)
+GRAY = np.full((4, 5, 3), 0.5, np.float32)
 
 
 def looking(lights: int) -> tuple[FirstLights, list[str]]:
@@ -36,7 +36,7 @@ def test_black_lights_are_said_at_once_and_end_the_bake_soon() -> None:
 def test_one_lit_light_among_black_ones_is_enough() -> None:
     first, _ = looking(400)
     for i in range(FIRST_LIGHTS):
-        first.look(GREY if i == FIRST_LIGHTS - 1 else BLACK)
+        first.look(GRAY if i == FIRST_LIGHTS - 1 else BLACK)
     assert first.lit and not first.looking
     first.look(BLACK)  # no longer looked at
 
@@ -44,15 +44,15 @@ def test_one_lit_light_among_black_ones_is_enough() -> None:
 def test_images_that_light_does_not_change_end_the_bake() -> None:
     first, _ = looking(400)
     for _ in range(FIRST_LIGHTS - 1):
-        first.look(GREY)
+        first.look(GRAY)
     with pytest.raises(BakeError, match="all hold 0.5.*does not answer to light"):
-        first.look(GREY)
+        first.look(GRAY)
 
 
 def test_a_plane_is_constant_under_each_light_and_answers_all_the_same() -> None:
     first, said = looking(400)
     for i in range(FIRST_LIGHTS):
-        first.look(GREY * np.float32(i + 1))
+        first.look(GRAY * np.float32(i + 1))
     assert not said
 
 
@@ -64,7 +64,7 @@ def test_a_few_black_lights_are_all_there_is() -> None:
         first.look(BLACK)
     alike, _ = looking(3)
     for _ in range(3):
-        alike.look(GREY)  # too few to tell
+        alike.look(GRAY)  # too few to tell
 
 
 @pytest.mark.parametrize(

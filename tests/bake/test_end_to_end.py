@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from srbf.asset import Asset
-from srbf.bake.point_reference import compare_with_lamps
+from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
 from srbf.io.image import read_image
 from srbf.sphere import mean_spacing
@@ -75,19 +75,19 @@ def test_a_sun_as_large_as_the_spacing_of_the_lights(blend, tmp_path: Path) -> N
         lit = capture.image(0)[..., 0] / np.sqrt(0.5)
         partly_lit[angle] = int(((lit > 0.2) & (lit < 0.8)).sum())
         assert capture.manifest["source"]["settings"]["sun_angle"] == (mean_spacing(capture.directions()) if angle == "auto" else 0)
-    # The disc of 0.09 rad smears the top of the wall over 0.5 * 2 * 0.09 = 0.09 m, three texels, for its metre of width: 32 rows.
+    # The disc of 0.09 rad smears the top of the wall over 0.5 * 2 * 0.09 = 0.09 m, three texels, for its meter of width: 32 rows.
     assert partly_lit["auto"] > partly_lit["0"] + 32
     again = srbf("bake", blend("occluder"), "-o", tmp_path / "auto", *common, "--sun-angle", "auto")
     assert again.returncode == 0 and "complete already" in again.stderr
 
 
-def test_true_lamps_over_an_empty_plane(blend, bake, tmp_path: Path) -> None:
+def test_true_point_lights_over_an_empty_plane(blend, bake, tmp_path: Path) -> None:
     """With nothing to cast a shadow, the point relighter is the truth up to the fit: inverse-square at a0 = 1."""
     from srbf.methods.relighting_map import RelightingMap
 
     asset = RelightingMap(k=60).encode(bake("plane", "lightmap:Plane", lights=300).capture)
     # Samples are spread over the texel; their mean is near enough to what the relighter says of its center, close to a lamp too.
-    result = compare_with_lamps(asset, blend("plane"), count=3, samples=16)
+    result = compare_with_point_lights(asset, blend("plane"), count=3, samples=16)
     assert result["all"]["inverse-square"]["relative_rmse"] < 0.03
     assert result["best_scale"]["inverse-square"] == pytest.approx(1, abs=0.01)
     assert result["all"]["linear"]["relative_rmse"] > result["all"]["inverse-square"]["relative_rmse"]
@@ -99,7 +99,7 @@ def test_point_reference_command(blend, bake, tmp_path: Path) -> None:
     assert srbf("fit", folder, "-o", tmp_path / "asset", "-k", 9).returncode == 0
     done = srbf("evaluate", tmp_path / "asset", blend("occluder"), "--point-reference", 2, "--samples", 4, "--json")
     assert done.returncode == 0, done.stderr
-    assert len(json.loads(done.stdout)["lamps"]) == 2
+    assert len(json.loads(done.stdout)["point_lights"]) == 2
     assert "distance" in srbf("evaluate", tmp_path / "asset", blend("occluder"), "--point-reference", 1, "--samples", 4).stdout
 
 

@@ -18,7 +18,6 @@ from faults import contents
 from test_resume import wait_for_lights
 
 from srbf.asset import Asset
-from srbf.bake.crew import Answer, CrewSettings, Task
 from srbf.bake.folder import hold, hold_part
 from srbf.bake.images import CaptureImages
 from srbf.bake.light_pass import add_pass
@@ -29,6 +28,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.schedule import render_order
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.sums import Sums
+from srbf.bake.worker_pool import Response, Task, WorkerPoolSettings
 from srbf.capture import Capture
 from srbf.cli.fit import fit
 from srbf.compute.dask_client import Cluster, ClusterError, checked
@@ -40,7 +40,7 @@ pytest.importorskip("distributed")
 FLAGS = ["--receiver", "lightmap:Plane", "--size", "24", "--lights", "20", "--samples", "8"]
 FLAGS += ["--validation", "1", "--holdout", "1", "--holdout-samples", "8"]
 FIT = ["-k", "6", "--spread", "mean", "--ridge", "0.1"]
-HALF = 2.0**-10  # of the maps' range: two values that float32 rounds apart may be neighbours as half floats
+HALF = 2.0**-10  # of the maps' range: two values that float32 rounds apart may be neighbors as half floats
 LIGHTS = 22
 
 
@@ -171,11 +171,11 @@ def test_an_openjd_job_bakes_the_same_bits_and_fits(blend, plain: Path, tmp_path
     assert evaluate(asset, capture, roles=["holdout"])["holdout"]["relative_rmse"] < 1
 
 
-def bake_of(folder: Path, seconds: float | None = None, crew: CrewSettings | None = None, **settings: object) -> Bake:
+def bake_of(folder: Path, seconds: float | None = None, crew: WorkerPoolSettings | None = None, **settings: object) -> Bake:
     scene = folder / "scene.blend"
     scene.write_bytes(b"never opened")
     return Bake(
-        scene, folder / "capture", BakeSettings(Receiver("lightmap", "A b"), 8, 8, **settings), None, crew or CrewSettings(), seconds
+        scene, folder / "capture", BakeSettings(Receiver("lightmap", "A b"), 8, 8, **settings), None, crew or WorkerPoolSettings(), seconds
     )
 
 
@@ -214,14 +214,14 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
         images.take(name, np.ones((2, 3, 3), np.float32))
     images.prepare({"blender": "4.5"}, {}, None)
     first, second = (Task(light, 2, 5 + i, i, keep=True) for i in range(2))
-    one, three = (Answer(np.full((2, 3, 3), value, np.float32), None, 0.1) for value in (1.0, 3.0))
+    one, three = (Response(np.full((2, 3, 3), value, np.float32), None, 0.1) for value in (1.0, 3.0))
     assert add_pass(images, sums, second, three) is None  # the first is not in
     np.testing.assert_array_equal(add_pass(images, sums, first, one), one.whole)
     assert add_pass(images, sums, first, three) is None
     np.testing.assert_array_equal(add_pass(images, sums, second, three), 2 * one.whole)
     assert (sums.passes(light), sums.samples(light)) == (2, 4)
     with pytest.raises(BakeError, match="values of light 0"):
-        add_pass(images, sums, Task(light, 2, 7, 2), Answer(np.ones((3, 3, 3), np.float32), None, 0.1))
+        add_pass(images, sums, Task(light, 2, 7, 2), Response(np.ones((3, 3, 3), np.float32), None, 0.1))
     assert Sums(tmp_path, [light]).refresh(light, 2) and not sums.refresh(light, 3)
 
 
@@ -254,13 +254,20 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
         "samples": 3,
         "seed": 5,
         "sun_angle": 0.1 + 0.2,
-        "keep_lamps": True,
+        "keep_scene_lights": True,
         "no_shadow": ("Roof",),
         "scene": "Night shot",
         "quantity": "radiance",
     }
     flags = arguments(BakeSettings(Receiver("lightmap", "A b", "UV 2"), **settings))
-    for flag in ("--receiver=lightmap:A b", "--uv-layer=UV 2", "--size=8x9", f"--sun-angle={0.1 + 0.2!r}", "--keep-lamps", "--samples=3"):
+    for flag in (
+        "--receiver=lightmap:A b",
+        "--uv-layer=UV 2",
+        "--size=8x9",
+        f"--sun-angle={0.1 + 0.2!r}",
+        "--keep-scene-lights",
+        "--samples=3",
+    ):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
     missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise"}
@@ -268,11 +275,11 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
     assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))
-    lamps = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
-    flags = arguments(BakeSettings(Receiver("view"), points=lamps))
+    point_lights = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
+    flags = arguments(BakeSettings(Receiver("view"), points=point_lights))
     (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
     (light_box,) = (flag.removeprefix("--light-box=") for flag in flags if flag.startswith("--light-box="))
-    assert PointGrid.parse(light_set, light_box) == PointGrid(lamps.spacing, lamps.box)
+    assert PointGrid.parse(light_set, light_box) == PointGrid(point_lights.spacing, point_lights.box)
     job = template(bake_of(tmp_path, lights=77), None)
     assert [step["name"] for step in job["steps"]] == ["Prepare", "Bake", "Finish", "Fit"]
     assert job["steps"][1]["parameterSpace"]["taskParameterDefinitions"][0]["range"] == "1-4"  # 125 lights

@@ -50,8 +50,8 @@ def floor_of(capture: Capture) -> np.ndarray:
     return (capture.geometry("normal")[..., 2] > 0.99) & (np.abs(capture.geometry("position")[..., 2]) < 1e-3)
 
 
-def test_walls_colour_the_floor_before_them(bake) -> None:
-    capture = bake("coloured_room", "view", [LEFT, RIGHT])
+def test_walls_color_the_floor_before_them(bake) -> None:
+    capture = bake("colored_room", "view", [LEFT, RIGHT])
     assert capture.coverage().min() > SEALED
     x, normal = capture.geometry("position")[..., 0], capture.geometry("normal")
     from_left, from_right = capture.image(0), capture.image(1)

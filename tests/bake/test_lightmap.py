@@ -18,7 +18,7 @@ from srbf.methods.relighting_map import RelightingMap, relight
 pytestmark = pytest.mark.blender
 
 HALF = 2.0**-11  # relative rounding of a stored half float
-TEXEL_CENTRE = 0.01  # texels: the first sample of a bake stands this near to the centre
+TEXEL_CENTER = 0.01  # texels: the first sample of a bake stands this near to the center
 
 
 @pytest.mark.parametrize(("quantity", "scale"), [("irradiance", 1.0), ("radiance", 1 / np.pi)])
@@ -36,8 +36,8 @@ def test_texels_stand_at_their_world_points(bake) -> None:
     assert position is not None
     x = 10 - 1 + 2 * (np.arange(16) + 0.5) / 16  # u along +x
     y = 5 + 1 - 2 * (np.arange(8) + 0.5) / 8  # row 0 is the top, v = 1, +y
-    np.testing.assert_allclose(position[..., 0], np.broadcast_to(x, (8, 16)), atol=TEXEL_CENTRE * 2 / 16)
-    np.testing.assert_allclose(position[..., 1], np.broadcast_to(y[:, None], (8, 16)), atol=TEXEL_CENTRE * 2 / 8)
+    np.testing.assert_allclose(position[..., 0], np.broadcast_to(x, (8, 16)), atol=TEXEL_CENTER * 2 / 16)
+    np.testing.assert_allclose(position[..., 1], np.broadcast_to(y[:, None], (8, 16)), atol=TEXEL_CENTER * 2 / 8)
     np.testing.assert_allclose(capture.geometry("normal"), np.broadcast_to([0, 0, 1], (8, 16, 3)), atol=1e-3)
     np.testing.assert_allclose(capture.geometry("albedo"), 1, atol=1e-3)
     assert (capture.coverage() == 1).all()
@@ -87,7 +87,7 @@ def test_cycles_under_a_sky_equals_the_environment_relight(bake, blend, tmp_path
     sky[3:5, 20:23] = [8, 6, 4]
     sky[8:] = 0  # below the horizon nothing was captured
     write_image(tmp_path / "sky.exr", sky, "float")
-    scenes = Path(__file__).parents[2] / "data" / "scenes" / "known_answers.py"
+    scenes = Path(__file__).parents[2] / "data" / "scenes" / "closed_form_scenes.py"
     scene = blend("occluder")
     subprocess.run(
         [sys.executable, str(scenes), "hdri", str(scene), str(tmp_path / "sky.exr"), str(tmp_path / "e.npy")],
@@ -111,8 +111,8 @@ def test_what_the_scene_emits_becomes_ambient(bake) -> None:
     ambient = capture.ambient()
     assert ambient is not None
     # A lambert emitter of radiance 5 and 0.16 m2, 1 m above: E = 5 * 0.16 at the point below it, less off axis.
-    centre = ambient[15:17, 15:17].mean(axis=(0, 1))
-    np.testing.assert_allclose(centre, np.array([1, 0.5, 0.25]) * 5 * 0.16 / 1.07, rtol=0.1)
+    center = ambient[15:17, 15:17].mean(axis=(0, 1))
+    np.testing.assert_allclose(center, np.array([1, 0.5, 0.25]) * 5 * 0.16 / 1.07, rtol=0.1)
     for index, light in enumerate(capture.lights):
         corner = capture.image(index)[0, 0]  # far from the glowing square: the sun alone
         np.testing.assert_allclose(corner, light.direction[2], rtol=HALF)  # and free of the glow's noise
@@ -120,9 +120,9 @@ def test_what_the_scene_emits_becomes_ambient(bake) -> None:
     np.testing.assert_array_equal(relight(asset, []), asset.images["ambient"])
 
 
-def test_kept_lamps_are_ambient_and_only_there(bake) -> None:
+def test_kept_point_lights_are_ambient_and_only_there(bake) -> None:
     plain = bake("emissive", "lightmap:Plane", name="plain", samples=4, holdout_samples=16).capture
-    kept = bake("emissive", "lightmap:Plane", name="kept", samples=4, holdout_samples=16, keep_lamps=True).capture
+    kept = bake("emissive", "lightmap:Plane", name="kept", samples=4, holdout_samples=16, keep_scene_lights=True).capture
     assert kept.ambient().mean() > 1.5 * plain.ambient().mean()
     for index in range(len(plain.lights)):
         np.testing.assert_array_equal(kept.image(index), plain.image(index))

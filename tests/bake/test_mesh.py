@@ -27,7 +27,7 @@ from srbf.methods.relighting_map import RelightingMap
 
 pytestmark = pytest.mark.blender
 
-FLOAT32 = 1e-5  # of metres and UVs a few units large
+FLOAT32 = 1e-5  # of meters and UVs a few units large
 SMALL = {"width": 64, "height": 64, "lights": 4, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 1}
 BYTE = 0.5 / 255 * 2.4  # half a step of a byte where the sRGB curve is flattest, in linear light
 
@@ -62,7 +62,7 @@ class Scene:
         return primitive["material"]
 
     def picture(self, folder: Path, material: dict[str, Any]) -> np.ndarray:
-        """(H, W, 3) linear base colour."""
+        """(H, W, 3) linear base color."""
         texture = self.json["textures"][material["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
         view = self.json["bufferViews"][self.json["images"][texture["source"]]["bufferView"]]
         (folder / "picture.png").write_bytes(self.document.body[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
@@ -158,7 +158,7 @@ def test_an_export_relights_the_receiver_alone(surroundings: Scene, folder: Path
     np.testing.assert_array_equal(relit.primitives("Ground")[0]["TEXCOORD_1"], surroundings.primitives("Ground")[0]["TEXCOORD_1"])
 
 
-def test_colours_of_networks_are_baked_to_vertices(surroundings: Scene) -> None:
+def test_colors_of_networks_are_baked_to_vertices(surroundings: Scene) -> None:
     (wall,) = surroundings.primitives("Wall")
     place = (wall["POSITION"][..., :2] - [-1, 5]) / [2, 0.5]
     np.testing.assert_allclose(wall["COLOR_0"][..., :2], place, atol=0.01)

@@ -70,7 +70,7 @@ def direct(capture: Capture) -> ndarray:
     return values(capture.combined()) - values(capture)
 
 
-@pytest.mark.parametrize(("scene", "receiver"), [("torus", "lightmap:Torus"), ("folded", "lightmap:Strip")])
+@pytest.mark.parametrize(("scene", "receiver"), [("torus", "lightmap:Torus"), ("projected", "lightmap:Strip")])
 def test_the_mean_of_passes_has_no_bias_at_chart_borders(bake, tmp_path: Path, scene: str, receiver: str) -> None:
     """Every pass has a value wherever a texel's center is covered, and all together are one bake of many samples."""
     sun = (0.35, 0.25, 0.9)

@@ -1,4 +1,4 @@
-"""Captures under point lights: which places are free, what lamps of unit irradiance at a metre give, and assets measured against them."""
+"""Captures under point lights: which places are free, what lamps of unit irradiance at a meter give, and assets measured against them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
-from srbf.bake.survey import with_free_lamps
+from srbf.bake.survey import with_free_point_lights
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.evaluation.errors_by_role import evaluate
@@ -58,7 +58,7 @@ def test_settings_that_point_lights_cannot_have(changes: dict, words: str) -> No
         settings_with(PointGrid(1.0), **changes)
 
 
-def test_planned_lamps_have_their_roles_and_places() -> None:
+def test_planned_point_lights_have_their_roles_and_places() -> None:
     points = PointGrid(1.0, BOX, ((0, 0, 1), (1, 0, 1)), ((0.1, 0, 1), (0.2, 0, 1), (0.3, 0, 1), (0.4, 0, 1), (0.5, 0, 1)))
     settings = settings_with(points)
     lights = plan_lights(settings)
@@ -81,7 +81,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
     """The block's inside is not free, the open crate's is, the room's air is, and nothing is nearer than a tenth of the spacing."""
     settings = settings_with(PointGrid(0.25, (-2.0, -2.0, 0.0, 2.0, 2.0, 3.0)), validation=20, holdout=30)
     said: list[str] = []
-    found = with_free_lamps(Bake(blend("blocks"), tmp_path, settings), said.append).settings
+    found = with_free_point_lights(Bake(blend("blocks"), tmp_path, settings), said.append).settings
     assert found.points is not None
     train, validation, holdout = found.points.places(20, 30)
     axes = [np.arange(n) * 0.25 + low for n, low in ((16, -1.875), (16, -1.875), (12, 0.125))]
@@ -94,7 +94,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
     for point in np.concatenate([validation, holdout]):
         outside = np.abs(point - [-1, 0, 1]).max() - 0.5  # the block's distance, in its own norm
         assert outside > 0.025 / np.sqrt(3) and point[2] > 0.025 and (np.abs(point[:2]) <= 2).all()
-    again = with_free_lamps(Bake(blend("blocks"), tmp_path, settings)).settings
+    again = with_free_point_lights(Bake(blend("blocks"), tmp_path, settings)).settings
     assert again == found
 
 
@@ -102,29 +102,29 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
 def test_no_room_is_said(blend, tmp_path: Path) -> None:
     settings = settings_with(PointGrid(0.2, (-1.2, -0.2, 0.8, -0.8, 0.2, 1.2)))
     with pytest.raises(BakeError, match="--light-box"):
-        with_free_lamps(Bake(blend("blocks"), tmp_path, settings))
+        with_free_point_lights(Bake(blend("blocks"), tmp_path, settings))
     settings = settings_with(PointGrid(0.001))
     with pytest.raises(BakeError, match="larger spacing"):
-        with_free_lamps(Bake(blend("blocks"), tmp_path, settings))
+        with_free_point_lights(Bake(blend("blocks"), tmp_path, settings))
 
 
 @pytest.mark.blender
-def test_a_white_plane_under_lamps(blend, tmp_path: Path) -> None:
+def test_a_white_plane_under_point_lights(blend, tmp_path: Path) -> None:
     """cos / d^2 of irradiance, through the command; and a directional asset of the plane foretells it, since nothing casts a shadow."""
     flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 64, "--holdout-samples", 64]
     points = ["--light-set", "point:0.8", "--light-box", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
     done = subprocess.run(
-        [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "lamps", *map(str, flags + points)],
+        [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "point_lights", *map(str, flags + points)],
         capture_output=True,
         text=True,
         timeout=120,
     )
     assert done.returncode == 0 and "8 point lights" in done.stderr, done.stderr
-    capture = Capture.open(tmp_path / "lamps")
+    capture = Capture.open(tmp_path / "point_lights")
     assert capture.kind == "point" and [len(capture.indices(role)) for role in ("train", "validation", "holdout")] == [8, 2, 3]
     position = capture.geometry("position")
-    for index, lamp in enumerate(capture.positions()):
-        vectors = lamp - position
+    for index, point_light in enumerate(capture.positions()):
+        vectors = point_light - position
         distance = np.linalg.norm(vectors, axis=2)
         expected = vectors[..., 2] / distance**3
         apart = np.abs(capture.image(index)[..., 0] / expected - 1)
@@ -135,13 +135,13 @@ def test_a_white_plane_under_lamps(blend, tmp_path: Path) -> None:
 
 
 @pytest.mark.blender
-def test_a_directional_asset_against_lamps(bake) -> None:
+def test_a_directional_asset_against_point_lights(bake) -> None:
     asset = RelightingMap(k=30).encode(bake("plane", "lightmap:Plane", name="suns", lights=50).capture)
     grid = ((9.5, 4.5, 0.8), (10.5, 5.5, 1.6))
     random = ((10.0, 5.2, 1.0), (9.2, 5.9, 2.0))
     points = PointGrid(1.0, (9, 4, 0, 11, 6, 2), grid, random)
-    lamps = bake("plane", "lightmap:Plane", name="lamps", points=points, validation=1, holdout=1).capture
-    errors = evaluate(asset, lamps)
+    point_lights = bake("plane", "lightmap:Plane", name="point_lights", points=points, validation=1, holdout=1).capture
+    errors = evaluate(asset, point_lights)
     assert [light["role"] for light in errors["lights"]] == ["train", "train", "validation", "holdout"]
     for role in ("train", "validation", "holdout"):
         assert errors[role]["relative_rmse"] < 0.05, errors[role]  # the fit's own error

@@ -29,7 +29,7 @@ from srbf.visibility.receivers import Receivers
 pytestmark = pytest.mark.blender
 
 HALF = 2.0**-10  # of a half float, and Cycles' own rounding of a cosine
-FAR = 100.0  # metres between objects of a scene that must not shade each other
+FAR = 100.0  # meters between objects of a scene that must not shade each other
 SMALL = {"width": 48, "height": 48, "lights": 6, "samples": 1, "validation": 0, "holdout": 1, "holdout_samples": 4}
 
 
@@ -46,7 +46,7 @@ def bake(scene: Callable[[str], Path], tmp_path: Path) -> Callable[..., Baked]:
     return run
 
 
-def answers_cosines(capture: Capture, where: np.ndarray, normal: tuple[float, float, float]) -> None:
+def responses_cosines(capture: Capture, where: np.ndarray, normal: tuple[float, float, float]) -> None:
     """Every image of the capture is max(0, N·L) at the texels `where`, and the normal map says N."""
     assert where.any()
     np.testing.assert_allclose(capture.geometry("normal")[where], np.broadcast_to(normal, (where.sum(), 3)), atol=1e-3)
@@ -68,7 +68,7 @@ def test_objects_of_one_mesh_get_texels_of_their_own(bake) -> None:
     counts = []
     for place, normal in enumerate([(0, 0, 1), TILTED, (np.sin(0.7), 0, np.cos(0.7))]):
         mine = covered & (np.abs(x - place * FAR) < FAR / 2)
-        answers_cosines(capture, mine, normal)
+        responses_cosines(capture, mine, normal)
         along = (capture.geometry("position")[mine].astype(np.float64) - [place * FAR, 0, 0]) @ normal
         np.testing.assert_allclose(along, 0, atol=1e-3)
         counts.append(mine.sum())
@@ -90,7 +90,7 @@ def test_layers_that_lie_side_by_side_are_used(bake) -> None:
     covered, position = capture.coverage() > 0, capture.geometry("position")
     columns = np.broadcast_to((np.arange(48) + 0.5) / 48, (48, 48))
     assert (position[..., 0][covered & (columns < 0.5)] < 2).all() and (position[..., 0][covered & (columns > 0.5)] > FAR - 2).all()
-    answers_cosines(capture, covered, (0, 0, 1))
+    responses_cosines(capture, covered, (0, 0, 1))
     albedo = capture.geometry("albedo")
     for x, color in ((-1.0, (1, 1, 1)), (FAR - 0.5, (0.5, 0.25, 0.125)), (FAR + 0.5, (0.1, 0.8, 0.1))):
         near = covered & (np.abs(position[..., 0] - x) < 0.4)
@@ -114,10 +114,10 @@ def check_kit(capture: Capture) -> None:
     covered, position = capture.coverage() > 0, capture.geometry("position")
     for x, y in ((0, 0), (FAR, 0), (FAR, FAR), (2 * FAR, 0)):
         ground = covered & (np.hypot(position[..., 0] - x, position[..., 1] - y) < 2)
-        answers_cosines(capture, ground, (0, 0, 1))
+        responses_cosines(capture, ground, (0, 0, 1))
         raised = (x, -3 * FAR + y * np.cos(0.5), 10 + y * np.sin(0.5))
         shown = covered & (np.linalg.norm(position - np.array(raised), axis=2) < 2)
-        answers_cosines(capture, shown, TILTED)
+        responses_cosines(capture, shown, TILTED)
 
 
 def test_what_a_library_holds_bakes_alike(bake) -> None:
@@ -130,22 +130,22 @@ def test_what_a_library_holds_bakes_alike(bake) -> None:
 
 
 @pytest.mark.parametrize("unwrap", ["smart", "lightmap-pack"])
-def test_texels_per_metre(bake, scene, tmp_path: Path, unwrap: str) -> None:
+def test_texels_per_meter(bake, scene, tmp_path: Path, unwrap: str) -> None:
     said: list[str] = []
     receiver = Receiver("lightmap", "Flat", also=("Tilted", "Mirrored"), unwrap=unwrap)
     planned = Bake(scene("shared"), tmp_path / "dense", BakeSettings(receiver, **SMALL))
     planned = with_size(planned, 12.0, said.append)
     size = planned.settings.width
-    assert size == planned.settings.height and size % 4 == 0 and any("12 a metre" in line for line in said)
+    assert size == planned.settings.height and size % 4 == 0 and any("12 a meter" in line for line in said)
     planned.run(Reporter())
     capture = Capture.open(planned.folder)
-    area = 4 + 8 + 4  # square metres of the three
+    area = 4 + 8 + 4  # square meters of the three
     assert np.sqrt((capture.coverage() > 0).sum() / area) == pytest.approx(12 * size / (size - 2), rel=0.04)
 
 
 def test_a_density_that_no_lightmap_can_have(scene, tmp_path: Path) -> None:
     planned = Bake(scene("shared"), tmp_path / "dense", BakeSettings(Receiver("lightmap", "Tilted"), **SMALL))
-    with pytest.raises(InputError, match=r"at most 16384 .* found \d+ at 1e\+06 texels a metre on 8 square.*--texels-per-metre 5792.61 or"):
+    with pytest.raises(InputError, match=r"at most 16384 .* found \d+ at 1e\+06 texels a meter on 8 square.*--texels-per-meter 5792.61 or"):
         with_size(planned, 1e6)
     with pytest.raises(InputError, match="above 0"):
         with_size(planned, -1.0)
@@ -156,7 +156,7 @@ def test_lightmap_pack_and_keep(bake) -> None:
     covered, normal = capture.coverage() > 0, capture.geometry("normal")
     assert covered.mean() > 0.3
     for axis in np.concatenate([np.eye(3), -np.eye(3)]):
-        answers_cosines(capture, covered & (normal @ axis > 0.9), tuple(axis))
+        responses_cosines(capture, covered & (normal @ axis > 0.9), tuple(axis))
     with pytest.raises(BakeError, match="Stacked.*overlaps itself on about 50%.*--unwrap smart"):
         bake("overlapping", "lightmap:Stacked", unwrap="keep", folder="refused")
     with pytest.raises(BakeError, match="3 objects.*about 67%.*--unwrap smart"):
@@ -170,7 +170,7 @@ def test_layers_that_do_not_fit_are_reported_with_numbers(bake, name: str, words
     baked = bake("overlapping", f"lightmap:{name}", lights=2)
     line = next(line for line in baked.said if "made a lightmap UV layer" in line)
     assert re.search(words, line)
-    answers_cosines(baked.capture, baked.capture.coverage() > 0, (0, 0, 1))
+    responses_cosines(baked.capture, baked.capture.coverage() > 0, (0, 0, 1))
     kept = bake("overlapping", f"lightmap:{name}", uv_layer="UV", folder="kept", lights=2)
     assert any("used because it was asked for" in line for line in kept.said)
 
@@ -215,8 +215,8 @@ def test_vertices_are_fitted_relit_and_evaluated(bake) -> None:
     asset = RelightingMap(k=25).encode(capture)
     report = evaluate(asset, capture)
     assert report["holdout"]["relative_rmse"] < 0.12  # 25 Gaussians of three clamped cosines
-    lamp = (0.0, 0.0, 500.0)  # so far above that it is a sun: the four upper corners see a third of it each
-    relit = listed(capture, relight(asset, [PointLight(lamp, a0=498.0, falloff="inverse-square")]))
+    point_light = (0.0, 0.0, 500.0)  # so far above that it is a sun: the four upper corners see a third of it each
+    relit = listed(capture, relight(asset, [PointLight(point_light, a0=498.0, falloff="inverse-square")]))
     ringing = 0.07  # of 25 Gaussians at the kink where a face turns away
     np.testing.assert_allclose(relit[[1, 3, 5, 7]], 1 / 3, atol=ringing)
     np.testing.assert_allclose(relit[[0, 2, 4, 6]], 0, atol=ringing)
@@ -312,7 +312,7 @@ def test_a_moved_asset_answers_as_the_bake_of_the_moved_object(bake) -> None:
 
 @pytest.mark.parametrize("name", ["Straight", "Shifted", "Flat"])
 def test_cameras_reproject_within_a_hundredth_of_a_pixel(bake, name: str) -> None:
-    """Through the recorded frame alone: the corners of the picture at one metre, in the camera's own axes."""
+    """Through the recorded frame alone: the corners of the picture at one meter, in the camera's own axes."""
     width, height = 60, 40
     capture = bake("views", f"view:{name}", width=width, height=height, lights=2, holdout=0).capture
     camera = capture.manifest["source"]["camera"]
@@ -355,7 +355,7 @@ def srbf(*arguments: object) -> Result:
 
 
 def test_the_command_bakes_a_collection_at_a_density(scene, tmp_path: Path) -> None:
-    done = srbf("bake", scene("kit"), "-o", tmp_path / "kit", "--collection", "Kit", "--texels-per-metre", 8, *QUICK)
+    done = srbf("bake", scene("kit"), "-o", tmp_path / "kit", "--collection", "Kit", "--texels-per-meter", 8, *QUICK)
     assert done.exit_code == 0, done.output
     capture = Capture.open(tmp_path / "kit")
     assert [one["object"] for one in capture.manifest["receivers"]] == ["Deep", "Doubled", "Plate"]

@@ -91,7 +91,7 @@ def test_a_dead_worker_is_replaced(blend, tmp_path: Path, uninterrupted: dict[st
     assert contents(folder) == uninterrupted
 
 
-@pytest.mark.parametrize("flags", [["--workers", "3"], ["--lights-a-worker", "25"]])
+@pytest.mark.parametrize("flags", [["--workers", "3"], ["--lights-per-worker", "25"]])
 def test_any_crew_gives_the_same_bits(blend, tmp_path: Path, uninterrupted: dict[str, bytes], flags: list[str]) -> None:
     folder = tmp_path / "capture"
     subprocess.run([*command(blend("emissive"), folder), *flags], check=True, capture_output=True)

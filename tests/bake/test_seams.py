@@ -58,18 +58,18 @@ def test_both_sides_of_every_seam_are_the_same_places(handed_over: Seams) -> Non
 
 def test_only_smooth_edges_are_seams(handed_over: Seams) -> None:
     """The strip's vertices are split: its flat joint is a seam, its fold is none; for radiance neither, since the albedo jumps there."""
-    edges = handed_over("folded", "Strip")
+    edges = handed_over("projected", "Strip")
     assert edges is not None
     np.testing.assert_allclose(np.sort(edges.reshape(2, 2, 2), axis=1)[:, :, 0], [[0.4, 0.4], [0.6, 0.6]], atol=1e-6)
-    assert handed_over("folded", "Strip", "radiance") is None
+    assert handed_over("projected", "Strip", "radiance") is None
 
 
 def test_a_torus_looks_whole(bake) -> None:
     capture = bake("torus", "lightmap:Torus", width=64, height=64, lights=40, domain="sphere", samples=2, holdout=6).capture
     assert len(capture.seam_edges()) == 4 * 24 + 48
     for method in (RelightingMap(k=25), EigenMap(scalars=12)):
-        plain, sewn = encode(method, capture, stitched=False), encode(method, capture)
-        seams = sewn.manifest["seams"]
+        plain, stitched = encode(method, capture, stitched=False), encode(method, capture)
+        seams = stitched.manifest["seams"]
         assert seams["before"] > 0.1 and seams["after"] < 0.05 * seams["before"], seams
-        errors = [evaluate(asset, capture, roles=("holdout",))["holdout"]["rmse"] for asset in (plain, sewn)]
+        errors = [evaluate(asset, capture, roles=("holdout",))["holdout"]["rmse"] for asset in (plain, stitched)]
         assert errors[1] <= 1.001 * errors[0]

@@ -24,7 +24,7 @@ def noisy(make_capture: Callable[..., Capture], samples: int) -> tuple[Capture, 
     sums: list[Sum] = []
     seen = 0
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         nonlocal seen
         seen += 1
         truth = np.repeat(np.maximum(normals @ direction, 0)[:, :, None], 3, axis=2)
@@ -36,7 +36,7 @@ def noisy(make_capture: Callable[..., Capture], samples: int) -> tuple[Capture, 
         sums.append(total)
         return total.mean
 
-    return make_capture(answer, lights=200, validation=12, holdout=0, name=f"capture{samples}"), sums
+    return make_capture(response, lights=200, validation=12, holdout=0, name=f"capture{samples}"), sums
 
 
 def test_validation_noise_is_not_taken_for_error(make_capture: Callable[..., Capture]) -> None:

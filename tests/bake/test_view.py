@@ -36,7 +36,7 @@ def test_irradiance_of_a_view_has_no_albedo(bake) -> None:
 
 
 def reproject(kind: str, points: np.ndarray, camera: dict, width: int, height: int) -> np.ndarray:
-    """(column, row) of world points, pixel centres at +1/2, for Blender's camera of each kind."""
+    """(column, row) of world points, pixel centers at +1/2, for Blender's camera of each kind."""
     view = np.linalg.inv(np.array(camera["matrix_world"]))
     p = points @ view[:3, :3].T + view[:3, 3]  # camera looks down -z, y up
     if kind == "pano":

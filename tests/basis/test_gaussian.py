@@ -9,7 +9,7 @@ import pytest
 
 from srbf.basis.gaussian import TABLE_TOLERANCE, GaussianBasis, interpolation_error, lookup, r_table, spread_of, weight
 from srbf.errors import InputError
-from srbf.sphere import nearest_neighbour_angles, point_set
+from srbf.sphere import nearest_neighbor_angles, point_set
 
 ROUNDING = 1e-12
 
@@ -31,7 +31,7 @@ def test_basis_is_symmetric_and_rotation_invariant() -> None:
 
 def test_spread_rules() -> None:
     centers = point_set("hammersley", 35, "sphere")
-    angles = nearest_neighbour_angles(centers)
+    angles = nearest_neighbor_angles(centers)
     assert spread_of(centers, "min") == angles.min()
     assert spread_of(centers, "mean") == angles.mean()
     assert spread_of(centers, 0.48) == 0.48

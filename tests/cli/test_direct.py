@@ -73,9 +73,9 @@ def test_relight_adds_direct_light_and_says_so(asset: Path, tmp_path: Path, dire
     np.testing.assert_allclose(read_image(tmp_path / "lit.exr", 3), alone + added, rtol=1e-4, atol=1e-5)
 
 
-def test_frames_and_lamps_take_rays(asset: Path, tmp_path: Path) -> None:
-    lamp = {"kind": "point", "position": [0, 0, 1]}
-    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [lamp]}, {"lights": []}]}))
+def test_frames_and_point_lights_take_rays(asset: Path, tmp_path: Path) -> None:
+    point_light = {"kind": "point", "position": [0, 0, 1]}
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [point_light]}, {"lights": []}]}))
     done = srbf("relight", asset, "-o", tmp_path / "frames", "--lights", tmp_path / "frames.json")
     assert done.exit_code == 0 and "exact direct light by rays" in done.stderr
     position = Asset.open(asset).images["position"]

@@ -46,8 +46,8 @@ def view(make_capture, tmp_path: Path) -> Path:
     """A disc of one color, its pixels unpremultiplied and spread outside, as a bake writes it; fitted."""
     share = disc()
     assert ((share > 0) & (share < 1)).sum() > 20 and (share == 0).mean() > 0.5
-    answer = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32) * COLOR  # noqa: E731
-    capture = described(make_capture(answer, coverage=share), receiver={"kind": "view", "camera": "Camera"}, quantity="radiance")
+    response = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32) * COLOR  # noqa: E731
+    capture = described(make_capture(response, coverage=share), receiver={"kind": "view", "camera": "Camera"}, quantity="radiance")
     run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9)
     return tmp_path / "asset"
 
@@ -107,8 +107,8 @@ def test_every_frame_of_a_sequence_has_its_alpha(view: Path, tmp_path: Path) -> 
     ],
 )
 def test_textures_have_no_alpha_and_pictures_have(make_capture, tmp_path: Path, facts: dict, channels: int) -> None:
-    answer = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32)  # noqa: E731
-    capture = described(make_capture(answer, lights=20, coverage=(disc() > 0.5).astype(np.float32)), **facts)
+    response = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32)  # noqa: E731
+    capture = described(make_capture(response, lights=20, coverage=(disc() > 0.5).astype(np.float32)), **facts)
     run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 4)
     run("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", *FLAGS)
     run("relight", tmp_path / "asset", "-o", tmp_path / "x.png", *FLAGS)
@@ -121,8 +121,8 @@ def test_textures_have_no_alpha_and_pictures_have(make_capture, tmp_path: Path, 
 
 
 def test_a_view_that_fills_its_picture_stays_rgb(make_capture, tmp_path: Path) -> None:
-    answer = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32)  # noqa: E731
-    capture = described(make_capture(answer, lights=20, coverage=np.ones((SIZE, SIZE), np.float32)), receiver={"kind": "view"})
+    response = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32)  # noqa: E731
+    capture = described(make_capture(response, lights=20, coverage=np.ones((SIZE, SIZE), np.float32)), receiver={"kind": "view"})
     run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 4)
     run("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", *FLAGS)
     assert read_image(tmp_path / "x.exr").shape[2] == 3

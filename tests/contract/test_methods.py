@@ -9,7 +9,7 @@ import pytest
 
 from srbf.asset import Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, environment_samples
-from srbf.methods import directional_responses, folded_weights, linear_response, relight
+from srbf.methods import directional_responses, linear_response, projected_weights, relight
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -32,7 +32,7 @@ FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
 
 
 def lambert(shape: tuple[int, int]):
-    """A coloured plane facing up."""
+    """A colored plane facing up."""
     return lambda direction: np.broadcast_to(max(0.0, direction[2]) * np.array([0.8, 0.5, 0.2]), (*shape, 3))
 
 
@@ -72,7 +72,7 @@ def asymmetric(make_capture, plane_positions, method) -> Asset:
 
 
 @pytest.mark.parametrize("light", LIGHTS)
-def test_response_is_linear_in_colour_and_additive(asymmetric: Asset, light) -> None:
+def test_response_is_linear_in_color_and_additive(asymmetric: Asset, light) -> None:
     one = linear_response(asymmetric, [light])
     twice = linear_response(asymmetric, [replace(light, color=tuple(2 * c for c in light.color))])
     scale = np.abs(one).max()
@@ -105,8 +105,8 @@ def test_an_environment_is_the_sum_of_its_texels(asymmetric: Asset) -> None:
         DirectionalLight(tuple(directions[i, j]), tuple(sky.image[i, j].astype(np.float64) * solid_angle[i, j] * sky.color))
         for i, j in np.argwhere(solid_angle > 0)
     ]
-    expected = folded_weights(asymmetric, suns)
-    np.testing.assert_allclose(folded_weights(asymmetric, [sky]), expected, atol=1e-9 * np.abs(expected).max())
+    expected = projected_weights(asymmetric, suns)
+    np.testing.assert_allclose(projected_weights(asymmetric, [sky]), expected, atol=1e-9 * np.abs(expected).max())
     np.testing.assert_array_equal(linear_response(asymmetric, [sky]).any(), True)
 
 
@@ -125,14 +125,14 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
     to_asset = np.eye(4)
     to_asset[:3, :3], to_asset[:3, 3] = turn.T / size, -turn.T @ at / size
     instance = replace(asymmetric, manifest={**asymmetric.manifest, "asset_from_world": to_asset.tolist()})
-    sun, lamp, spot, sky = LIGHTS
+    sun, point_light, spot, sky = LIGHTS
 
     def placed(light: PointLight) -> PointLight:
         return replace(light, position=tuple(size * turn @ light.position + at), a0=size * light.a0, radius=size * light.radius)
 
     moved: list[Light] = [
         replace(sun, direction=tuple(turn @ sun.direction)),
-        placed(lamp),
+        placed(point_light),
         replace(placed(spot), direction=tuple(turn @ spot.direction)),
         replace(sky, image=np.roll(sky.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
     ]
@@ -154,12 +154,12 @@ def test_permuting_receivers_permutes_the_picture(make_capture, method) -> None:
         np.testing.assert_allclose(two.stored.reshape(-1, 30, 3), one.stored.reshape(-1, 30, 3)[:, order], rtol=0, atol=atol)
         return
     directions = random_directions(5, "hemisphere", rng)
-    answers = directional_responses(one, directions).reshape(5, 30, 3)[:, order]
+    responses = directional_responses(one, directions).reshape(5, 30, 3)[:, order]
     step = {"half": 2.0**-11, "float": 1e-4, "uint8": 1 / 255}[method.encoding]  # axes turn by rounding, and planes with them
-    np.testing.assert_allclose(directional_responses(two, directions).reshape(5, 30, 3), answers, atol=4 * step * np.abs(answers).max())
+    np.testing.assert_allclose(directional_responses(two, directions).reshape(5, 30, 3), responses, atol=4 * step * np.abs(responses).max())
 
 
-def test_uncovered_texels_hold_their_nearest_covered_neighbour(asymmetric: Asset) -> None:
+def test_uncovered_texels_hold_their_nearest_covered_neighbor(asymmetric: Asset) -> None:
     covered = np.argwhere(asymmetric.covered)
     for row, column in np.argwhere(~asymmetric.covered)[:20]:
         nearest = np.linalg.norm(covered - [row, column], axis=1)

@@ -39,7 +39,7 @@ SHORTER = {
     "python benchmarks/fit.py *": "--lights 12 --side 16 -k 4 --rounds 1",
     "python benchmarks/motion.py *": "--lights 26",
     "python benchmarks/pipeline.py *": "--lights 30 --side 16",
-    "python benchmarks/shader.py *": "--sides 16 --runs 1 --lamps 1",
+    "python benchmarks/shader.py *": "--sides 16 --runs 1 --point-lights 1",
 }
 
 # The test, or fixture, that runs the same. Flags of our own scripts and commands are checked all the same.

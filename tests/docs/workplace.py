@@ -59,7 +59,7 @@ def prepare(folder: Path) -> None:
         place.python("data/scenes/caustics.py", str(scene))
         if receiver != "Table":
             place.process([sys.executable, "-c", RENAME, str(scene), receiver, str(scene)])
-    place.python("data/scenes/known_answers.py", "torus", "torus.blend")
+    place.python("data/scenes/closed_form_scenes.py", "torus", "torus.blend")
     for text in (
         "srbf bake scene.blend -o capture --receiver lightmap:Table",
         "srbf bake scene.blend -o indirect --receiver lightmap:Table --transport indirect",
@@ -136,8 +136,8 @@ class Workplace:
         def visited(server: ViewerServer, *_args: Any, **_named: Any) -> None:
             thread = Thread(target=serve, args=(server, 0.02), daemon=True)
             thread.start()
-            with urllib.request.urlopen(server.url, timeout=20) as answer:
-                fetched.append(answer.read())
+            with urllib.request.urlopen(server.url, timeout=20) as response:
+                fetched.append(response.read())
             server.shutdown()
             thread.join()
             raise KeyboardInterrupt
@@ -216,8 +216,8 @@ def fetched(url: str, server: subprocess.Popen[bytes]) -> bytes:
     until = time.monotonic() + 30
     while time.monotonic() < until and server.poll() is None:
         try:
-            with urllib.request.urlopen(url, timeout=5) as answer:
-                return answer.read()
+            with urllib.request.urlopen(url, timeout=5) as response:
+                return response.read()
         except OSError:
             time.sleep(0.1)
     return b""

@@ -53,7 +53,7 @@ def test_what_is_given_is_kept() -> None:
 
 def test_given_pair_is_ridge_regression_on_the_centers() -> None:
     sample, centers, _ = planted(0.1)
-    values = sample.answers.transpose(1, 0, 2).astype(np.float64)
+    values = sample.responses.transpose(1, 0, 2).astype(np.float64)
     found = fit_functions(sample, values, choose_functions(sample, centers, 0.5, 0.02), centers, "hemisphere")
     basis = weight(sample.directions @ centers.T, 0.5)
     expected = np.linalg.solve(basis.T @ basis + 0.02 * np.eye(len(centers)), basis.T @ values.reshape(60, -1))

@@ -25,9 +25,9 @@ def sample(noise: float, validated: bool, spread: float = 0.5, seed: int = 0) ->
     centers = point_set("fibonacci", 12, "hemisphere")
     directions = np.concatenate([point_set("hammersley", TRAIN, "hemisphere"), random_directions(VALIDATION, "hemisphere", rng)])
     directions = directions if validated else directions[:TRAIN]
-    answers = np.einsum("lk,nkc->nlc", weight(directions @ centers.T, spread), rng.normal(size=(30, 12, 3)))
-    answers += noise * rng.normal(size=answers.shape)
-    return TexelSample(np.arange(30), answers.astype(np.float32), directions, TRAIN), centers
+    responses = np.einsum("lk,nkc->nlc", weight(directions @ centers.T, spread), rng.normal(size=(30, 12, 3)))
+    responses += noise * rng.normal(size=responses.shape)
+    return TexelSample(np.arange(30), responses.astype(np.float32), directions, TRAIN), centers
 
 
 def candidates(of: TexelSample, centers: np.ndarray) -> list[tuple[float, np.ndarray]]:
@@ -42,7 +42,7 @@ def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
 @pytest.mark.parametrize("noise", [0.0, 0.3, 2.0])
 def test_choice_equals_the_slow_twin(validated: bool, noise: float) -> None:
     given, centers = sample(noise, validated)
-    values = given.answers.transpose(1, 0, 2).reshape(len(given.directions), -1).astype(np.float64)
+    values = given.responses.transpose(1, 0, 2).reshape(len(given.directions), -1).astype(np.float64)
     groups = [group for array in bands(given.directions[:TRAIN]) for group in array]
     held_out = HeldOut.of(given.gram, given.directions, TRAIN)
     scores: dict[tuple[float, float], tuple[float, float]] = {}
@@ -105,7 +105,7 @@ def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeyp
         assert {begin // STRIP for begin, _ in rows} == touched and len(touched) <= 3  # of nine strips, a quarter
     lights = [*capture.indices("train"), *capture.indices("validation")]
     images = np.stack([capture.image(i).reshape(-1, 3) for i in lights], axis=1)
-    np.testing.assert_array_equal(sampled.answers, images[sampled.texels])
+    np.testing.assert_array_equal(sampled.responses, images[sampled.texels])
     np.testing.assert_array_equal(sampled.directions, capture.directions(lights))
 
 
@@ -120,7 +120,7 @@ def test_a_sample_is_of_covered_texels(make_capture) -> None:
 
 def test_gram_is_the_images_mean_products() -> None:
     given, _ = sample(0.5, True)
-    images = given.answers.transpose(1, 0, 2).reshape(TRAIN + VALIDATION, -1).astype(np.float64)
+    images = given.responses.transpose(1, 0, 2).reshape(TRAIN + VALIDATION, -1).astype(np.float64)
     np.testing.assert_allclose(given.gram, images @ images.T / 90, rtol=FLOAT32, atol=1e-5)
 
 
@@ -140,9 +140,9 @@ def test_light_space_and_back(weighting: str) -> None:
     given, _ = sample(0.5, False)
     space = LightSpace.of(given, weighting)
     axes = np.linalg.svd(space.centered, full_matrices=False)[2].astype(np.float32)
-    planes = np.einsum("slc,nlc->sn", space.weights(axes), given.answers) - space.offsets(axes)[:, None]
+    planes = np.einsum("slc,nlc->sn", space.weights(axes), given.responses) - space.offsets(axes)[:, None]
     ones = np.concatenate([np.ones((1, planes.shape[1])), planes])
-    np.testing.assert_allclose(np.einsum("fn,lfc->nlc", ones, space.functions(axes)), given.answers, atol=1e-4)
+    np.testing.assert_allclose(np.einsum("fn,lfc->nlc", ones, space.functions(axes)), given.responses, atol=1e-4)
     assert (space.row_weights**2).mean() == pytest.approx(1, rel=1e-5)
 
 

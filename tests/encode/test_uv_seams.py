@@ -57,10 +57,10 @@ def cut(make_capture) -> Capture:
     nearest = nearest_covered(covered.astype(np.float32))
     waves, shifts = np.random.default_rng(5).normal(scale=8, size=(2, 3)), np.random.default_rng(6).normal(size=(3, 3))
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         return dilate((max(0, direction[2]) * (1.2 + np.sin(world @ waves + shifts @ direction))).astype(np.float32), nearest)
 
-    capture = make_capture(answer, lights=80, holdout=12, coverage=covered.astype(np.float32))
+    capture = make_capture(response, lights=80, holdout=12, coverage=covered.astype(np.float32))
     write_image(capture.folder / "seams.exr", edges[None], "float")
     manifest = {**files.read_json(capture.folder / "capture.json"), "seams": "seams.exr"}
     files.write_json(capture.folder / "capture.json", manifest)
@@ -105,13 +105,13 @@ def test_it_is_linear_keeps_what_agrees_and_touches_seams_alone() -> None:
     stitch = Stitch.along(edges, covered)
     rng = np.random.default_rng(2)
     maps = rng.normal(size=(2, SIZE, SIZE, 3)).astype(np.float32)
-    sewn, both = maps.copy(), (2 * maps[:1] - 3 * maps[1:]).copy()
-    stitch.apply(sewn)
+    stitched, both = maps.copy(), (2 * maps[:1] - 3 * maps[1:]).copy()
+    stitch.apply(stitched)
     stitch.apply(both)
-    np.testing.assert_allclose(both[0], 2 * sewn[0] - 3 * sewn[1], atol=1e-4)
+    np.testing.assert_allclose(both[0], 2 * stitched[0] - 3 * stitched[1], atol=1e-4)
     far = np.ones(SIZE * SIZE, bool)
     far[stitch.texels] = False
-    np.testing.assert_array_equal(sewn.reshape(2, -1, 3)[:, far], maps.reshape(2, -1, 3)[:, far])
+    np.testing.assert_array_equal(stitched.reshape(2, -1, 3)[:, far], maps.reshape(2, -1, 3)[:, far])
     even = np.full((1, SIZE, SIZE, 1), 0.7, np.float32)
     stitch.apply(even)
     np.testing.assert_allclose(even, 0.7, rtol=1e-6)
@@ -121,13 +121,13 @@ def test_it_is_linear_keeps_what_agrees_and_touches_seams_alone() -> None:
 @pytest.mark.parametrize("method", [RelightingMap(k=30), EigenMap(scalars=16)], ids=["relighting-map", "eigen-map"])
 def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap | EigenMap, encoding: str) -> None:
     method = type(method)(**{**method.__dict__, "encoding": encoding})
-    plain, sewn = encode(method, cut, stitched=False), encode(method, cut)
+    plain, stitched = encode(method, cut, stitched=False), encode(method, cut)
     assert "seams" not in plain.manifest
-    seams = sewn.manifest["seams"]
+    seams = stitched.manifest["seams"]
     assert seams["edges"] == PIECES and seams["samples"] == len(edge_points(cut.seam_edges(), SIZE, SIZE)[0])
     assert seams["before"] > 0.05
     assert seams["after"] < 0.06 * seams["before"]  # 2 to 4 % were measured
-    before, after = (evaluate(asset, cut)["holdout"]["rmse"] for asset in (plain, sewn))
+    before, after = (evaluate(asset, cut)["holdout"]["rmse"] for asset in (plain, stitched))
     # The waves are sampled without noise, so that a fit is nearly exact: what covered texels give way by is far below the gap closed.
     mean = float(np.mean([cut.image(i)[cut.coverage() > 0].mean() for i in cut.indices("train")]))
     assert after**2 <= before**2 + (0.05 * seams["before"] * mean) ** 2
@@ -136,8 +136,8 @@ def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap 
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_clusters_agree_as_well_as_they_hold_the_images(cut: Capture, encoding: str) -> None:
     method = ClusteredEigenMap(clusters=3, scalars=12, encoding=encoding)
-    plain, sewn = encode(method, cut, stitched=False), encode(method, cut)
-    seams = sewn.manifest["seams"]
+    plain, stitched = encode(method, cut, stitched=False), encode(method, cut)
+    seams = stitched.manifest["seams"]
     assert seams["before"] > 0.05 and seams["after"] < CLUSTERS_LEAVE * seams["before"]
     stitch = Stitch.of(cut)
     assert stitch is not None
@@ -147,7 +147,7 @@ def test_clusters_agree_as_well_as_they_hold_the_images(cut: Capture, encoding: 
     mean = np.abs(relit[:, (cut.coverage() > 0).ravel()]).mean()
     gap = stitch.difference(relit[:, stitch.texels].transpose(1, 0, 2).reshape(len(stitch.texels), -1)) / mean
     assert seams["before"] == pytest.approx(gap, rel=0.1)  # the two fits share their clusters, and their ranges nearly
-    before, after = (evaluate(asset, cut)["holdout"]["rmse"] for asset in (plain, sewn))
+    before, after = (evaluate(asset, cut)["holdout"]["rmse"] for asset in (plain, stitched))
     assert after**2 <= before**2 + (0.05 * seams["before"] * mean) ** 2
 
 

@@ -19,10 +19,10 @@ def capture(make_capture, request: pytest.FixtureRequest) -> Capture:
     rng = np.random.default_rng(1)
     covered = rng.random((HEIGHT, WIDTH)) > 0.3
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         return np.where(covered[:, :, None], max(0, direction[2]) * rng.gamma(2, 0.3, (HEIGHT, WIDTH, 3)) - 0.05, 100)
 
-    return make_capture(answer, lights=40, encoding=request.param, coverage=covered.astype(np.float32))
+    return make_capture(response, lights=40, encoding=request.param, coverage=covered.astype(np.float32))
 
 
 @pytest.mark.parametrize("encoding", ["half", "uint8"])

@@ -32,10 +32,10 @@ def test_a_sum_is_linear_and_as_bright_as_one_light(lights: int, count: int) -> 
     ramp = np.arange(count, dtype=np.float32)[:, None, None, None] * flat
     ones, weighed = sums_of_lights((flat, ramp), lights, np.random.default_rng(0))
     assert len(ones) == SUMS
-    assert np.allclose(ones.mean(axis=(1, 2, 3)), 1, atol=1e-6)  # colours add up to one white light, whichever lights were drawn
+    assert np.allclose(ones.mean(axis=(1, 2, 3)), 1, atol=1e-6)  # colors add up to one white light, whichever lights were drawn
     again, doubled = sums_of_lights((flat, 2 * ramp), lights, np.random.default_rng(0))
     assert np.allclose(doubled, 2 * weighed) and (again == ones).all()
-    assert ones.std(axis=3).max() > 0.01 and ones.min() > DIMMEST / 2  # coloured, none extinguished
+    assert ones.std(axis=3).max() > 0.01 and ones.min() > DIMMEST / 2  # colored, none extinguished
 
 
 def test_errors_of_independent_lights_average_out() -> None:

@@ -48,8 +48,8 @@ def test_hard_suns_are_jumped_and_soft_ones_not(make_capture, domain: str, light
 def test_lambert_surfaces_have_no_edges(lights: int) -> None:
     directions = point_set("fibonacci", lights, "sphere")
     normals = normalize(np.random.default_rng(2).normal(size=(500, 3)))
-    answers = np.maximum(0, directions @ normals.T).astype(np.float32)
-    edges, jumped, looked = count_edges(directions, answers)
+    responses = np.maximum(0, directions @ normals.T).astype(np.float32)
+    edges, jumped, looked = count_edges(directions, responses)
     assert edges == jumped == 0
     assert looked > 500
 

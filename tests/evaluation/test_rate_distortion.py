@@ -13,11 +13,11 @@ from srbf.evaluation.rate_distortion import (
     ALL,
     IMAGE_BYTES,
     NEAREST,
+    components_of,
     contest,
     error_of,
     nearest_image,
     planes_bound,
-    scalars_of,
     score_asset,
     spectrum,
 )
@@ -57,7 +57,7 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
         assert score.psnr == pytest.approx(whole["psnr"], abs=0.01)  # sums in another order, float32
         assert score.relative_rmse == pytest.approx(whole["relative_rmse"], rel=1e-3)
         assert (score.family, score.name, score.bytes_per_texel) == ("relighting map", "12 maps, float", 12 * 16)
-    assert scalars_of(asset) == 36
+    assert components_of(asset) == 36
 
 
 def test_every_family_is_told_apart(capture: Capture) -> None:
@@ -91,17 +91,17 @@ def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
 def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Capture) -> None:
     sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
     train = sample.indices("train")
-    answers = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)
+    responses = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)
     values = spectrum(sample)
-    exact = np.linalg.svd(answers - answers.mean(axis=0), compute_uv=False)
+    exact = np.linalg.svd(responses - responses.mean(axis=0), compute_uv=False)
     assert np.allclose(values[: len(exact)], exact, atol=2e-3 * exact[0])  # float32 sums; small values lose the most
     assert float((values**2).sum()) == pytest.approx(float((exact**2).sum()), rel=1e-4)
-    bound = planes_bound(values, answers.size, 1.0)
+    bound = planes_bound(values, responses.size, 1.0)
     assert (np.diff(bound) >= 0).all()
-    assert bound[0] == pytest.approx(-10 * np.log10(((answers - answers.mean(axis=0)) ** 2).mean()), abs=0.01)
+    assert bound[0] == pytest.approx(-10 * np.log10(((responses - responses.mean(axis=0)) ** 2).mean()), abs=0.01)
     for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(scalars=3, encoding="float")):
         asset = method.encode(sample)
         fitted = np.concatenate(list(directional_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
-        reached = -10 * np.log10(((fitted - answers) ** 2).mean())
-        assert reached <= bound[scalars_of(asset)] + 0.01
+        reached = -10 * np.log10(((fitted - responses) ** 2).mean())
+        assert reached <= bound[components_of(asset)] + 0.01
     assert reached > bound[1]  # the eigen map comes near it

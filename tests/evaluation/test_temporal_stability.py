@@ -14,13 +14,13 @@ from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
-ROUNDING = 1e-5  # float32 answers, differences of neighbouring frames
+ROUNDING = 1e-5  # float32 answers, differences of neighboring frames
 PATH = great_circles("hemisphere", 300, 3)  # (3, 100, 3)
 STEPS = 99
 
 
 def curve(values: np.ndarray, texels: int = 5) -> np.ndarray:
-    """(C, F) or (F,) values as answers of grey texels."""
+    """(C, F) or (F,) values as answers of gray texels."""
     values = np.broadcast_to(values, PATH.shape[:2])
     return np.repeat(np.repeat(values[:, :, None, None], texels, axis=2), 3, axis=3).astype(np.float32)
 

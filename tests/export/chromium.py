@@ -33,7 +33,7 @@ def encoded(values: np.ndarray) -> str:
 
 def ask(cases: dict[str, Any]) -> dict[str, Any]:
     """What the page answers to `cases`: by name the pixels of `pictures`, the errors of `modules`."""
-    answers: list[dict[str, Any]] = []
+    responses: list[dict[str, Any]] = []
     answered = threading.Event()
 
     class Handler(BaseHTTPRequestHandler):
@@ -45,7 +45,7 @@ def ask(cases: dict[str, Any]) -> dict[str, Any]:
             self.wfile.write(body)
 
         def do_POST(self) -> None:
-            answers.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            responses.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
             self.send_response(204)
             self.end_headers()
             answered.set()
@@ -67,5 +67,5 @@ def ask(cases: dict[str, Any]) -> dict[str, Any]:
             process.wait(10)
             server.shutdown()
             server.server_close()
-    assert "error" not in answers[0], answers[0]["error"]
-    return answers[0]
+    assert "error" not in responses[0], responses[0]["error"]
+    return responses[0]

@@ -15,7 +15,7 @@ from srbf.basis.octahedral_table import lookup
 from srbf.export import spirv
 from srbf.gl.context import create_context
 from srbf.gl.textures import AssetTextures, Limits
-from srbf.gl.uniforms import lamp_uniforms, padded
+from srbf.gl.uniforms import padded, point_light_uniforms
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation
 from srbf.methods.coefficient_maps import first_function, planes_of
 from srbf.methods.receivers import light_vectors
@@ -46,7 +46,7 @@ def corner_shader() -> str:
 
 def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
     """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of scalar planes, float32."""
-    weights = padded(methods.folded_weights(asset, lights).astype(np.float32))
+    weights = padded(methods.projected_weights(asset, lights).astype(np.float32))
     return weights if asset.method == "relighting-map" else weights.reshape(asset.clusters, asset.scalars + 1, 4)
 
 
@@ -54,22 +54,22 @@ def magnitude(asset: Asset, light: Light) -> np.ndarray:
     """The sum of the magnitudes of a picture's terms, decoding included, (H, W, 3): what the tolerance is relative to."""
     bias = asset.bias[:, None, None]
     layers = np.abs(asset.coefficients() - bias) + np.abs(bias)  # (N, H, W, C)
-    lamp = isinstance(light, PointLight)
+    point_light = isinstance(light, PointLight)
     color = np.broadcast_to(np.array(light.color), (asset.height, asset.width, 3))
     if isinstance(light, PointLight):
         unit, _ = light_vectors(light, asset.images["position"])
         reach = attenuation(np.linalg.norm(np.array(light.position) - asset.images["position"], axis=-1), light)
         color = color * reach[..., None]  # without the cone, whose own rounding is relative to 1
     if asset.method == "relighting-map":
-        if lamp:
+        if point_light:
             return np.einsum("khwc,hwk->hwc", layers, basis_weights(asset, unit)) * color
-        return np.einsum("khwc,kc->hwc", layers, np.abs(methods.folded_weights(asset, [light])))
+        return np.einsum("khwc,kc->hwc", layers, np.abs(methods.projected_weights(asset, [light])))
     first, entry = first_function(asset, slice(None)), asset.manifest["w_table"]
     table = np.abs(asset.tables["w_table"].astype(np.float32))
-    weights = np.abs(methods.folded_weights(asset, [light]))
+    weights = np.abs(methods.projected_weights(asset, [light]))
 
     def function(j: int) -> np.ndarray:
-        return lookup(table, entry["size"], entry["columns"], first + j, unit) * color if lamp else weights[first + j]
+        return lookup(table, entry["size"], entry["columns"], first + j, unit) * color if point_light else weights[first + j]
 
     planes = planes_of(layers, asset.scalars)
     return function(0) + sum(plane[..., None] * function(j) for j, plane in enumerate(planes, start=1))
@@ -121,5 +121,5 @@ def images_of(asset: Asset) -> dict[str, np.ndarray]:
     return images
 
 
-def lamp_members(light: PointLight) -> dict[str, Any]:
-    return {f"lamp.{name}": value for name, value in lamp_uniforms(light).items()}
+def point_light_members(light: PointLight) -> dict[str, Any]:
+    return {f"pointLight.{name}": value for name, value in point_light_uniforms(light).items()}

@@ -118,7 +118,7 @@ def made_glb(path: Path, uv_sets: int, name: str = "Bowl") -> None:
         primitives = [{"attributes": attributes, "indices": document.accessor(np.arange(3, dtype=np.uint32)), "material": 0}]
         meshes.append(document.add("meshes", {"primitives": primitives}))
     document.add("materials", {"name": "clay", "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0.2, 1]}})
-    nodes = [document.add("nodes", {"name": n, "mesh": m}) for n, m in zip((name, "Lamp"), meshes, strict=True)]
+    nodes = [document.add("nodes", {"name": n, "mesh": m}) for n, m in zip((name, "PointLight"), meshes, strict=True)]
     document.json["scenes"] = [{"nodes": nodes}]
     path.write_bytes(document.pack())
 
@@ -161,7 +161,7 @@ def test_what_cannot_be_written_is_refused(make_asset: Callable[..., Asset], tmp
         export(bare, "gltf", out)
     lonely = np.zeros_like(asset.images["coverage"])
     lonely[::3, ::3] = 1
-    with pytest.raises(InputError, match="neighbours"):
+    with pytest.raises(InputError, match="neighbors"):
         export(replace(asset, images={**asset.images, "coverage": lonely}), "gltf", out)
     vertices = replace(asset, manifest={**asset.manifest, "source": {"receiver": {"kind": "vertices", "object": "Bowl"}}})
     with pytest.raises(InputError, match="vertices"):

@@ -82,7 +82,7 @@ def test_glass_is_solid_or_a_thin_wall() -> None:
     assert (solid["doubleSided"], wall["doubleSided"]) == (False, True)
     assert solid["extensions"]["KHR_materials_volume"] == {
         "thicknessFactor": 0.3,
-        "attenuationColor": [0.5, 0.25, 0.125],  # after the base colour once, as at the second wall
+        "attenuationColor": [0.5, 0.25, 0.125],  # after the base color once, as at the second wall
         "attenuationDistance": 0.3,
     }
     assert wall["extensions"] == {"KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": 1.33}}

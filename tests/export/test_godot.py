@@ -76,7 +76,7 @@ def test_an_include_is_functions_alone(name: str) -> None:
     text = method_include(name)
     code = re.sub(r"/\*.*?\*/|//[^\n]*", "", text, flags=re.DOTALL)
     assert not re.search(r"#version|#line|#include|\bprecision\b|\bhighp\b|\bgl_|\bmain\b", code)
-    assert "struct SrbfLamp" in text
+    assert "struct SrbfPointLight" in text
     assert text.count("vec3 srbfFinish(vec3 sum, vec3 ambient) {") == 1
 
 
@@ -134,10 +134,10 @@ def test_script_and_shaders_name_the_same_uniforms(projects: dict[str, Path]) ->
 def test_the_shaders_are_sound(method: str, stage: str, projects: dict[str, Path], tmp_path: Path) -> None:
     defines = {
         "relighting-map": "#define SRBF_RELIGHTING_MAP\n#define SRBF_K 7\n#define SRBF_LAYERS 7\n",
-        "eigen-map": "#define SRBF_EIGEN_MAP\n#define SRBF_SCALARS 9\n#define SRBF_LAYERS 3\n",
-        "clustered-eigen-map": "#define SRBF_CLUSTERED_EIGEN_MAP\n#define SRBF_SCALARS 6\n#define SRBF_LAYERS 2\n",
+        "eigen-map": "#define SRBF_EIGEN_MAP\n#define SRBF_COMPONENTS 9\n#define SRBF_LAYERS 3\n",
+        "clustered-eigen-map": "#define SRBF_CLUSTERED_EIGEN_MAP\n#define SRBF_COMPONENTS 6\n#define SRBF_LAYERS 2\n",
     }[method]
-    text = f'{defines}#define SRBF_LAMPS 4\n#define SRBF_IRRADIANCE\n#include "res://addons/srbf/shaders/{stage}.gdshaderinc"\n'
+    text = f'{defines}#define SRBF_POINT_LIGHTS 4\n#define SRBF_IRRADIANCE\n#include "res://addons/srbf/shaders/{stage}.gdshaderinc"\n'
     path = tmp_path / "shader.frag"
     path.write_text(as_glsl(text, projects[method]))
     result = subprocess.run(["glslangValidator", str(path)], capture_output=True, text=True)

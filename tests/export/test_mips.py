@@ -70,9 +70,9 @@ def test_a_level_relit_is_the_picture_filtered(method: str, make_asset: Callable
     full = directional_responses(asset, DIRECTIONS)
     for level, layers in enumerate(smaller_levels(asset.coefficients(), coverage, 4)):
         relit = directional_responses(as_level(asset, layers), DIRECTIONS)
-        for answer, picture in zip(relit, full, strict=True):
+        for response, picture in zip(relit, full, strict=True):
             mean, area = slow_mean(picture, coverage, level)
-            np.testing.assert_allclose(answer[area > 1e-9], mean[area > 1e-9], atol=FLOAT32 * np.abs(picture[coverage > 0]).max())
+            np.testing.assert_allclose(response[area > 1e-9], mean[area > 1e-9], atol=FLOAT32 * np.abs(picture[coverage > 0]).max())
 
 
 @pytest.mark.parametrize("form", ["half", "uint8", "bc7"])
@@ -89,14 +89,14 @@ def test_chart_edges_of_the_file(form: str, make_asset: Callable[..., Asset], tm
         layers = texels * out.scale[:, None, None] + out.bias[:, None, None]
         relit = directional_responses(as_level(asset, layers), DIRECTIONS)
         squares = []
-        for answer, picture in zip(relit, full, strict=True):
+        for response, picture in zip(relit, full, strict=True):
             mean, area = slow_mean(picture, coverage, level)
             inside = area > 1e-9
             edge = inside & ~ndimage.binary_erosion(inside)
-            squares.append(np.square(answer[edge] - mean[edge]).mean())
+            squares.append(np.square(response[edge] - mean[edge]).mean())
             if level:
                 nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-                outside = answer[~inside] - mean[tuple(nearest)][~inside]
+                outside = response[~inside] - mean[tuple(nearest)][~inside]
                 squares.append(np.square(outside).mean())
         assert 20 * np.log10(peak / np.sqrt(np.mean(squares))) > EDGE_PSNR[form], level
 

@@ -23,7 +23,7 @@ from srbf.methods import relight
 
 LIGHTS = [DirectionalLight((0.3, -0.4, 1), (1, 0.7, 0.4)), PointLight((0.2, 0.1, 0.9))]
 ARRAYS = ("dds", "ktx2")
-LEAST = {"half": 60.0, "uint8": 30.0, "bc7": 8.0}  # dB on random maps, where nothing is like its neighbour
+LEAST = {"half": 60.0, "uint8": 30.0, "bc7": 8.0}  # dB on random maps, where nothing is like its neighbor
 
 
 @pytest.fixture(params=["maps", "planes", "clusters"])

@@ -9,21 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pixels import ALL, FLOAT, LIGHTS, images_of, lamp_members, magnitude, run, weights_of
+from pixels import ALL, FLOAT, LIGHTS, images_of, magnitude, point_light_members, run, weights_of
 
 from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import hlsl, spirv
-from srbf.export.asset_shader import MOST_LAMPS
+from srbf.export.asset_shader import MOST_POINT_LIGHTS
 from srbf.export.translation import library_paths, pack_files, parse, render_plain, tokens
 from srbf.gl.includes import shader_root
-from srbf.gl.uniforms import packed_lamps
+from srbf.gl.uniforms import packed_point_lights
 from srbf.lights import PointLight
 
 pytestmark = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 
-COUNTS = "#define SRBF_K 25\n#define SRBF_SCALARS 9\n#define SRBF_LAMPS 4\n"
+COUNTS = "#define SRBF_K 25\n#define SRBF_COMPONENTS 9\n#define SRBF_POINT_LIGHTS 4\n"
 ENTRY = "\nfloat4 main() : SV_Target { return 0.0; }\n"
 SPIRV = bytes.fromhex("03022307")  # the magic number, little-endian
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
@@ -33,8 +33,8 @@ SamplerState layersSampler;
 Texture2D clusters, positions, table, weightRows;
 cbuffer Values {
     float4 weights[COUNT];
-    SrbfLamp lamp;
-    float4 lamps[4 * SRBF_LAMPS];
+    SrbfPointLight pointLight;
+    float4 pointLights[4 * SRBF_POINT_LIGHTS];
 };
 
 float4 main(float4 at : SV_Position) : SV_Target {
@@ -47,12 +47,12 @@ CALLS = {
     ("relighting-map", False): "srbfAssetDirectional(layers, layersSampler, uv, weights)",
     ("eigen-map", False): "srbfAssetDirectional(layers, layersSampler, uv, weightRows)",
     ("clustered-eigen-map", False): "srbfAssetDirectional(layers, layersSampler, clusters, uv, weightRows)",
-    ("relighting-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
-    ("eigen-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, lamp)",
-    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weights, table, receiver, lamps, 3)",
-    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weightRows, table, receiver, lamps, 3)",
-    ("clustered-eigen-map", None): "srbfAssetLights(layers, layersSampler, clusters, uv, weightRows, table, receiver, lamps, 3)",
-    ("clustered-eigen-map", True): "srbfAssetPoint(layers, layersSampler, clusters, uv, table, receiver, lamp)",
+    ("relighting-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, pointLight)",
+    ("eigen-map", True): "srbfAssetPoint(layers, layersSampler, uv, table, receiver, pointLight)",
+    ("relighting-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weights, table, receiver, pointLights, 3)",
+    ("eigen-map", None): "srbfAssetLights(layers, layersSampler, uv, 0.0, weightRows, table, receiver, pointLights, 3)",
+    ("clustered-eigen-map", None): "srbfAssetLights(layers, layersSampler, clusters, uv, weightRows, table, receiver, pointLights, 3)",
+    ("clustered-eigen-map", True): "srbfAssetPoint(layers, layersSampler, clusters, uv, table, receiver, pointLight)",
 }
 
 
@@ -139,11 +139,11 @@ def test_words_that_hlsl_keeps_to_itself_are_renamed() -> None:
 @pytest.mark.parametrize("encoding", ["float", "uint8"])
 def test_hlsl_gives_the_pixels_of_numpy(make: Callable[..., Asset], method: str, light: str, encoding: str) -> None:
     asset, chosen = make(method, encoding), LIGHTS[light]
-    lamp = isinstance(chosen, PointLight)
-    stage = STAGE.replace("COUNT", str(asset.k)).replace("CALL", CALLS[method, lamp])
+    point_light = isinstance(chosen, PointLight)
+    stage = STAGE.replace("COUNT", str(asset.k)).replace("CALL", CALLS[method, point_light])
     text = hlsl.asset_include(asset) + stage
-    if lamp:
-        uniforms = lamp_members(chosen)
+    if point_light:
+        uniforms = point_light_members(chosen)
         images = images_of(asset)
     else:
         weights = weights_of(asset, [chosen])
@@ -160,7 +160,9 @@ def test_hlsl_gives_the_pixels_of_all_lights_at_once(make: Callable[..., Asset],
     asset = make(method, "half")
     text = hlsl.asset_include(asset) + STAGE.replace("COUNT", str(asset.k)).replace("CALL", CALLS[method, None])
     weights = weights_of(asset, ALL[:1])
-    uniforms = {"lamps": packed_lamps(ALL[1:], MOST_LAMPS)} | ({"weights": weights} if method == "relighting-map" else {})  # type: ignore[arg-type]
+    uniforms = {"pointLights": packed_point_lights(ALL[1:], MOST_POINT_LIGHTS)} | (
+        {"weights": weights} if method == "relighting-map" else {}
+    )  # type: ignore[arg-type]
     found = run(spirv.cross_compile(spirv.compile_hlsl(text), "glsl"), asset, images_of(asset) | {"weightRows": weights}, uniforms)
     expected = methods.linear_response(asset, ALL)
     assert (np.abs(found[..., :3] - expected) <= FLOAT * sum(magnitude(asset, light) for light in ALL)).all()
@@ -168,7 +170,7 @@ def test_hlsl_gives_the_pixels_of_all_lights_at_once(make: Callable[..., Asset],
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (shader_root() / "stages").iterdir()))
 def test_every_stage_crosses_to_every_language(name: str, tmp_path: Path) -> None:
-    code = spirv.compile_stage(name, {"SRBF_K": 25, "SRBF_SCALARS": 9, "SRBF_LAMPS": 4})
+    code = spirv.compile_stage(name, {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4})
     texts = {language: spirv.cross_compile(code, language) for language in spirv.ARGUMENTS}
     assert texts["es"].startswith("#version 300 es") and texts["glsl"].startswith("#version 330")
     assert "main0" in texts["metal"]  # no Metal compiler runs outside a Mac

@@ -19,13 +19,13 @@ from srbf.export.translation import (
     library_paths,
     parse,
 )
-from srbf.gl.uniforms import lamp_uniforms, packed_lamps
+from srbf.gl.uniforms import packed_point_lights, point_light_uniforms
 from srbf.lights import PointLight
 
 needs_chromium = pytest.mark.skipif(browser() is None, reason="needs chromium (Debian)")
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
-COUNTS = {"SRBF_K": 25, "SRBF_SCALARS": 9, "SRBF_LAMPS": 4}
+COUNTS = {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4}
 STAGE = """
 @group(0) @binding(0) var layers: texture_2d_array<f32>;
 @group(0) @binding(1) var positions: texture_2d<f32>;
@@ -45,22 +45,22 @@ STAGE = """
     BODY
 }
 """
-LAMP = """let lamp = SrbfLamp(values[0].xyz, values[1].xyz, values[2].xyz, values[3].xyz,
+POINT_LIGHT = """let pointLight = SrbfPointLight(values[0].xyz, values[1].xyz, values[2].xyz, values[3].xyz,
                         values[4].x, values[4].y, values[4].z, values[4].w, i32(values[5].x));
-    return vec4f(srbfAssetPoint(layers, nearest, CLUSTERS uv, table, receiver, lamp), 1.0);"""
+    return vec4f(srbfAssetPoint(layers, nearest, CLUSTERS uv, table, receiver, pointLight), 1.0);"""
 
-MANY = """var lamps: array<vec4f, 4 * SRBF_LAMPS>;
-    for (var i = 0; i < 12; i++) { lamps[i] = values[i]; }
+MANY = """var pointLights: array<vec4f, 4 * SRBF_POINT_LIGHTS>;
+    for (var i = 0; i < 12; i++) { pointLights[i] = values[i]; }
     var weights: array<vec4f, WEIGHTS>;
     for (var i = 0; i < WEIGHTS; i++) { weights[i] = values[12 + i]; }
-    return vec4f(srbfAssetLights(layers, nearest, CLUSTERS uv, LEVEL CHOSEN, table, receiver, lamps, 3), 1.0);"""
+    return vec4f(srbfAssetLights(layers, nearest, CLUSTERS uv, LEVEL CHOSEN, table, receiver, pointLights, 3), 1.0);"""
 
 
 def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
     """A case of the page: textures in the order of their bindings, and the uniforms as vec4s."""
     clusters = "clusters," if method == "clustered-eigen-map" else ""
     images = images_of(asset)
-    values, body = np.zeros((6, 4), np.float32), LAMP.replace("CLUSTERS", clusters)
+    values, body = np.zeros((6, 4), np.float32), POINT_LIGHT.replace("CLUSTERS", clusters)
     rows = np.zeros((1, 1, 4), np.float32)
     if light is ALL:
         rows = weights = weights_of(asset, ALL[:1])
@@ -71,14 +71,14 @@ def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
             .replace("CHOSEN", chosen)
             .replace("WEIGHTS", str(len(weights)))
         )
-        values = np.concatenate([packed_lamps(ALL[1:], 3), weights.reshape(-1, 4)])  # type: ignore[arg-type]
+        values = np.concatenate([packed_point_lights(ALL[1:], 3), weights.reshape(-1, 4)])  # type: ignore[arg-type]
         rows = np.zeros((1, 1, 4), np.float32) if chosen == "weights" else rows
     elif isinstance(light, PointLight):
-        lamp = lamp_uniforms(light)
+        point_light = point_light_uniforms(light)
         for i, name in enumerate(("position", "positionLow", "color", "axis")):
-            values[i, :3] = lamp[name]
-        values[4] = [lamp[name] for name in ("a0", "radius", "versineInner", "versineOuter")]
-        values[5, 0] = lamp["falloff"]
+            values[i, :3] = point_light[name]
+        values[4] = [point_light[name] for name in ("a0", "radius", "versineInner", "versineOuter")]
+        values[5, 0] = point_light["falloff"]
     elif method == "relighting-map":
         values = weights_of(asset, [light])
         body = "return vec4f(srbfAssetDirectional(layers, nearest, uv, values), 1.0);"
@@ -112,7 +112,7 @@ def assets(make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) 
 
 
 @pytest.fixture(scope="module")
-def answers(assets: dict[str, Asset]) -> dict[str, Any]:
+def responses(assets: dict[str, Asset]) -> dict[str, Any]:
     """Everything that the tests ask of Chromium, in one start of it."""
     pictures = {f"{method} {light}": picture(assets[method], method, LIGHTS[light]) for method in NAMES for light in LIGHTS}
     pictures |= {f"{method} all": picture(assets[method], method, ALL) for method in NAMES}
@@ -123,22 +123,22 @@ def answers(assets: dict[str, Asset]) -> dict[str, Any]:
 
 @needs_chromium
 @pytest.mark.parametrize("path", [*library_paths(), "all"])
-def test_every_file_of_the_pack_compiles_as_wgsl(answers: dict[str, Any], path: str) -> None:
-    assert answers[path]["errors"] == []
+def test_every_file_of_the_pack_compiles_as_wgsl(responses: dict[str, Any], path: str) -> None:
+    assert responses[path]["errors"] == []
 
 
 @needs_chromium
-def test_chromium_tells_of_errors(answers: dict[str, Any]) -> None:
-    assert answers["broken"]["errors"]
+def test_chromium_tells_of_errors(responses: dict[str, Any]) -> None:
+    assert responses["broken"]["errors"]
 
 
 @needs_chromium
 @pytest.mark.parametrize("light", [*LIGHTS, "all"])
 @pytest.mark.parametrize("method", NAMES)
-def test_wgsl_gives_the_pixels_of_numpy(assets: dict[str, Asset], answers: dict[str, Any], method: str, light: str) -> None:
-    asset, answer = assets[method], answers[f"{method} {light}"]
-    assert "error" not in answer, answer["error"]
-    found = np.array(answer["pixels"], np.float32).reshape(asset.height, asset.width, 4)[..., :3]
+def test_wgsl_gives_the_pixels_of_numpy(assets: dict[str, Asset], responses: dict[str, Any], method: str, light: str) -> None:
+    asset, response = assets[method], responses[f"{method} {light}"]
+    assert "error" not in response, response["error"]
+    found = np.array(response["pixels"], np.float32).reshape(asset.height, asset.width, 4)[..., :3]
     lights = ALL if light == "all" else [LIGHTS[light]]
     expected = methods.linear_response(asset, lights)
     assert np.abs(expected).max() > 0.1
@@ -159,13 +159,13 @@ def test_glsl_that_wgsl_has_no_form_for_is_refused(text: str, complaint: str) ->
         writer.file(writer.files[0])
 
 
-@pytest.mark.parametrize(("known", "answer"), [({}, "3"), ({"A"}, "1"), ({"B"}, "2"), ({"A", "B"}, "1")])
-def test_conditions_are_taken_as_a_compiler_takes_them(known: set[str], answer: str) -> None:
+@pytest.mark.parametrize(("known", "response"), [({}, "3"), ({"A"}, "1"), ({"B"}, "2"), ({"A", "B"}, "1")])
+def test_conditions_are_taken_as_a_compiler_takes_them(known: set[str], response: str) -> None:
     text = "#ifdef A\n1\n#elif defined(B)\n2\n#else\n3\n#ifndef A\n#define C 4\n#endif\n#endif\n"
     seen = set(known)
-    expected = [answer] + (["C is 4"] if answer == "3" else [])
+    expected = [response] + (["C is 4"] if response == "3" else [])
     assert preprocess(text, "mine.glsl", seen, "{} is {}".format).split("\n")[:-1] == expected
-    assert ("C" in seen) == (answer == "3")
+    assert ("C" in seen) == (response == "3")
 
 
 def test_a_missing_count_is_told_of_as_the_pack_does() -> None:

@@ -17,11 +17,11 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 from srbf import methods
 from srbf.asset import Asset
 from srbf.export import spirv, unity
-from srbf.export.asset_shader import MOST_LAMPS
+from srbf.export.asset_shader import MOST_POINT_LIGHTS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
 from srbf.gl.textures import pairs_of
-from srbf.gl.uniforms import packed_lamps
+from srbf.gl.uniforms import packed_point_lights
 from srbf.io.containers import read_texture_array
 from srbf.io.containers.dds_header import DXGI
 from srbf.lights import DirectionalLight, PointLight, SpotLight
@@ -119,9 +119,14 @@ def test_the_custom_function_gives_numpys_pixels(assets: dict[str, Asset], folde
 
 def uniforms_of(lights: list[Any], weights: np.ndarray, matrix: np.ndarray) -> dict[str, Any]:
     """What SrbfRelitRenderer sets, by its own layout; the matrix by rows, as spirv-cross hands HLSL's to GLSL."""
-    lamps = [light for light in lights if isinstance(light, PointLight)]
-    packed = packed_lamps(lamps, MOST_LAMPS)
-    return {"_SrbfWeights": weights, "_SrbfLampCount": len(lamps), "_SrbfLamps": packed, "_SrbfAssetFromWorld": matrix.astype(np.float32)}
+    point_lights = [light for light in lights if isinstance(light, PointLight)]
+    packed = packed_point_lights(point_lights, MOST_POINT_LIGHTS)
+    return {
+        "_SrbfWeights": weights,
+        "_SrbfPointLightCount": len(point_lights),
+        "_SrbfPointLights": packed,
+        "_SrbfAssetFromWorld": matrix.astype(np.float32),
+    }
 
 
 @needs_spirv
@@ -146,12 +151,12 @@ def test_the_graph_version_takes_a_texture_array_and_a_sampler(folders: dict[str
 
 
 @pytest.fixture(scope="module")
-def answers(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], dict[str, list[list[float]]]]:
+def responses(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], dict[str, list[list[float]]]]:
     """What the engine-free C# says of an exported folder, rows of numbers by name."""
-    program = tmp_path_factory.mktemp("mono") / "answers.exe"
+    program = tmp_path_factory.mktemp("mono") / "responses.exe"
     sources = [engine_root("unity") / "Srbf" / "Runtime" / f"{name}.cs" for name in ENGINE_FREE]
     done = subprocess.run(
-        ["mcs", "-langversion:7", f"-out:{program}", *map(str, sources), str(HERE / "Answers.cs")], capture_output=True, text=True
+        ["mcs", "-langversion:7", f"-out:{program}", *map(str, sources), str(HERE / "Responses.cs")], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -172,8 +177,8 @@ def answers(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
 
 @needs_mono
 @pytest.mark.parametrize("method", NAMES)
-def test_c_sharp_reads_the_files_and_weighs_lights_as_numpy(folders: dict[str, Path], answers: Callable[..., Any], method: str) -> None:
-    asset, said = Asset.open(folders[method]), answers(folders[method])
+def test_c_sharp_reads_the_files_and_weighs_lights_as_numpy(folders: dict[str, Path], responses: Callable[..., Any], method: str) -> None:
+    asset, said = Asset.open(folders[method]), responses(folders[method])
     maps = method == "relighting-map"
     size = asset.manifest["r_table" if maps else "w_table"]["size"]
     assert said["size"] == [[asset.width, asset.height, len(asset.stored), 0 if maps else 9, asset.clusters, size]]
@@ -186,15 +191,15 @@ def test_c_sharp_reads_the_files_and_weighs_lights_as_numpy(folders: dict[str, P
         np.testing.assert_array_equal(np.array(said["pairs"][0]).reshape(-1, 2).astype(np.float32), pairs_of(asset.table))
     if asset.clusters > 1:
         np.testing.assert_array_equal(np.array(said["clusters"][0]).reshape(asset.height, asset.width), asset.tables["cluster_index"])
-    expected = methods.folded_weights(asset, FARS)
+    expected = methods.projected_weights(asset, FARS)
     found = np.array(said["weights"][0]).reshape(-1, 4)
     np.testing.assert_allclose(found[:, :3], expected, atol=2e-6 * np.abs(expected).max())
     assert (found[:, 3] == 1).all()
 
 
 @needs_mono
-def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], answers: Callable[..., Any]) -> None:
-    said = answers(folders["eigen-map"])
+def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], responses: Callable[..., Any]) -> None:
+    said = responses(folders["eigen-map"])
     axes = np.array(said["axis"])
     np.testing.assert_array_equal(axes[:, :3].T, AXES)
     np.testing.assert_array_equal(axes[:, 3:], np.eye(3))
@@ -206,7 +211,7 @@ def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], answers:
         inner=math.radians(20), outer=math.radians(35),
     )  # fmt: skip
     point = PointLight((0.4, -0.3, 1.1), (0.5, 1, 2), a0=0.7, radius=0.01)
-    np.testing.assert_allclose(np.reshape(said["lamp"], (8, 4)), packed_lamps([spot, point], 2), rtol=2e-7)
+    np.testing.assert_allclose(np.reshape(said["pointLight"], (8, 4)), packed_point_lights([spot, point], 2), rtol=2e-7)
     assert said["wronghalves"] == [[]]
     values = np.array([1.00048828125, 1.0009766, -0.3333333, 65519, 65520, 3e-8, 0.99999], np.float32)
     with np.errstate(over="ignore"):
@@ -216,35 +221,35 @@ def test_c_sharp_turns_axes_and_rounds_halves(folders: dict[str, Path], answers:
 @needs_mono
 @pytest.mark.parametrize("encoding", ["float", "half"])
 def test_c_sharp_reads_large_images_of_either_kind(
-    make_asset: Callable[..., Asset], answers: Callable[..., Any], encoding: Any, tmp_path: Path
+    make_asset: Callable[..., Asset], responses: Callable[..., Any], encoding: Any, tmp_path: Path
 ) -> None:
     asset = make_asset(2, "float", height=70, width=33)  # several blocks of scan lines
     unity.write(asset, tmp_path, Settings(encoding=encoding))
     layer = Asset.open(tmp_path).stored[1]
-    found = np.array(answers(tmp_path)["layer1"][0]).reshape(layer.shape)
+    found = np.array(responses(tmp_path)["layer1"][0]).reshape(layer.shape)
     np.testing.assert_array_equal(found.astype(np.float32), layer.astype(np.float32))
 
 
 @needs_mono
 @pytest.mark.parametrize("encoding", ["bc7", "bc1", "uint8"])
 def test_c_sharp_reads_texture_arrays_level_by_level(
-    make_asset: Callable[..., Asset], answers: Callable[..., Any], encoding: Any, tmp_path: Path
+    make_asset: Callable[..., Asset], responses: Callable[..., Any], encoding: Any, tmp_path: Path
 ) -> None:
     unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding=encoding, levels=3))
     texture = read_texture_array(tmp_path / "images~" / "maps.dds")
-    said = answers(tmp_path)
+    said = responses(tmp_path)
     assert said["blocks"] == [[36, 20, 3, 3, DXGI[encoding]]]
     for level, data in enumerate(texture.levels):
         np.testing.assert_array_equal(said[f"level{level}"], data)
 
 
 @needs_mono
-def test_c_sharp_tells_of_a_file_that_is_cut_short(make_asset: Callable[..., Asset], answers: Callable[..., Any], tmp_path: Path) -> None:
+def test_c_sharp_tells_of_a_file_that_is_cut_short(make_asset: Callable[..., Asset], responses: Callable[..., Any], tmp_path: Path) -> None:
     unity.write(make_asset(3, "float", height=20, width=36), tmp_path, Settings(encoding="bc7"))
     path = tmp_path / "images~" / "maps.dds"
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(AssertionError, match=r"expected \d+ bytes in .*maps.dds, found \d+"):
-        answers(tmp_path)
+        responses(tmp_path)
 
 
 @needs_mono
@@ -257,12 +262,12 @@ def test_c_sharp_tells_of_a_file_that_is_cut_short(make_asset: Callable[..., Ass
     ],
 )
 def test_c_sharp_says_what_is_wrong_with_a_manifest(
-    folders: dict[str, Path], answers: Callable[..., Any], change: dict[str, Any], complaint: str, tmp_path: Path
+    folders: dict[str, Path], responses: Callable[..., Any], change: dict[str, Any], complaint: str, tmp_path: Path
 ) -> None:
     manifest = json.loads((folders["relighting-map"] / "asset.json").read_text())
     (tmp_path / "asset.json").write_text(json.dumps(manifest | change))
     with pytest.raises(ValueError, match=complaint):
-        answers(tmp_path)
+        responses(tmp_path)
 
 
 @needs_mono
@@ -281,6 +286,6 @@ def test_the_files_that_use_unity_compile_against_its_interfaces(tmp_path: Path)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_the_component_sets_as_many_lamps_as_the_shader_has() -> None:
+def test_the_component_sets_as_many_point_lights_as_the_shader_has() -> None:
     code = (engine_root("unity") / "Srbf" / "Runtime/SrbfRelitRenderer.cs").read_text()
-    assert f"MostLamps = {MOST_LAMPS};" in code
+    assert f"MostPointLights = {MOST_POINT_LIGHTS};" in code

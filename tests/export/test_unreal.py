@@ -23,7 +23,7 @@ from srbf.lights import DirectionalLight, PointLight, SpotLight
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 SUN = DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3))
-LAMP = SpotLight(
+POINT_LIGHT = SpotLight(
     (0.4, -0.3, 1.1), (0.5, 1.0, 2.0), a0=1.0, falloff="inverse-square", radius=0.05, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.6
 )
 # What Unreal writes about a Custom node's code: a function whose inputs are its arguments, a texture's followed by its sampler.
@@ -80,7 +80,7 @@ def shader_of(folder: Path) -> str:
             arguments.append(f"float{2 if name == 'UV' else 3} {name}")
             values.append(name)
         else:
-            four = name == "LampShape"
+            four = name == "PointLightShape"
             arguments.append(f"float{4 if four else 3} {name}")
             values.append(f"Set{name}" + ("" if four else ".xyz"))
     text = CUSTOM.replace("FLOAT4S", "\n    ".join(f"float4 Set{name};" for name in node["lights"])).replace(
@@ -112,21 +112,23 @@ def test_the_custom_node_gives_numpys_pixels(folders: dict[str, Path], method: s
     uniforms = {
         "SetSunDirection": (*in_unreal(SUN.direction, 1), 0),
         "SetSunColor": (*SUN.color, 0),
-        "SetLampPosition": (*in_unreal(LAMP.position, 100), 0),
-        "SetLampColor": (*LAMP.color, 0),
-        "SetLampAxis": (*in_unreal(LAMP.direction, 1), 0),
-        "SetLampShape": (LAMP.a0, LAMP.radius, versine(LAMP.inner), versine(LAMP.outer)),
+        "SetPointLightPosition": (*in_unreal(POINT_LIGHT.position, 100), 0),
+        "SetPointLightColor": (*POINT_LIGHT.color, 0),
+        "SetPointLightAxis": (*in_unreal(POINT_LIGHT.direction, 1), 0),
+        "SetPointLightShape": (POINT_LIGHT.a0, POINT_LIGHT.radius, versine(POINT_LIGHT.inner), versine(POINT_LIGHT.outer)),
     }
     given = {"MaterialTable": images["table"], "positions": in_unreal(placed, 100).astype(np.float32)}
     given |= {"MaterialClusters": images["clusters"]} if "clusters" in images else {}
     given |= {"MaterialAmbient": asset.images["ambient"]} if "ambient" in asset.images else {}
     found = run(spirv.cross_compile(spirv.compile_hlsl(shader_of(tmp_path)), "glsl"), asset, given, uniforms)[..., :3]
-    expected = by_table(asset) + methods.linear_response(asset, [LAMP])
+    expected = by_table(asset) + methods.linear_response(asset, [POINT_LIGHT])
     scale = 1 if quantity == "radiance" else 1 / math.pi
     expected = (np.maximum(expected, 0) + asset.images.get("ambient", 0)) * scale
     # the receiver's place rounds twice more on its way through Unreal's space, which the weights follow
     asset.manifest["asset_from_world"] = np.eye(4).tolist()  # magnitudes are those of lamps near the asset
-    allowed = scale * (4 * FLOAT * (magnitude(asset, SUN) + magnitude(asset, LIGHTS["inverse-square"]) + magnitude(asset, LAMP)) + 1e-6)
+    allowed = scale * (
+        4 * FLOAT * (magnitude(asset, SUN) + magnitude(asset, LIGHTS["inverse-square"]) + magnitude(asset, POINT_LIGHT)) + 1e-6
+    )
     assert expected.max() > 0.2
     assert (np.abs(found - expected) <= allowed).all()
 
@@ -141,7 +143,7 @@ def by_table(asset: Asset) -> np.ndarray:
 @pytest.mark.parametrize("method", NAMES)
 def test_an_export_is_an_asset(assets: dict[str, Asset], folders: dict[str, Path], method: str) -> None:
     again = Asset.open(folders[method])
-    np.testing.assert_allclose(methods.relight(again, [SUN, LAMP]), methods.relight(assets[method], [SUN, LAMP]), atol=1e-6)
+    np.testing.assert_allclose(methods.relight(again, [SUN, POINT_LIGHT]), methods.relight(assets[method], [SUN, POINT_LIGHT]), atol=1e-6)
     node = json.loads((folders[method] / "node.json").read_text())
     assert all((folders[method] / file).is_file() for file in (*node["layers"], *node["textures"].values()))
 
@@ -285,6 +287,6 @@ def test_the_script_copies_a_levels_lights(folders: dict[str, Path], stand_in: S
     values = {vector.properties["parameter_name"]: vector.properties["default_value"] for vector in vectors}
     assert values["SunDirection"] == (-0.6, 0, 0.8, 0)
     assert values["SunColor"] == (8, 4, 2, 0)
-    assert values["LampPosition"] == (10, 20, 30, 0) and values["LampAxis"] == (0, 1, 0, 0)
-    assert values["LampColor"] == (1, 2, 5, 0)
-    np.testing.assert_allclose(values["LampShape"], [1, 0.05, versine(math.radians(20)), versine(math.radians(35))])
+    assert values["PointLightPosition"] == (10, 20, 30, 0) and values["PointLightAxis"] == (0, 1, 0, 0)
+    assert values["PointLightColor"] == (1, 2, 5, 0)
+    np.testing.assert_allclose(values["PointLightShape"], [1, 0.05, versine(math.radians(20)), versine(math.radians(35))])

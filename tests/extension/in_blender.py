@@ -40,7 +40,7 @@ def material(color: tuple[float, float, float], kind: str = "ShaderNodeBsdfPrinc
     return made
 
 
-def lamp(kind: str, name: str, energy: float, color: list[float], location: list[float], axis: list[float] | None = None) -> None:
+def point_light(kind: str, name: str, energy: float, color: list[float], location: list[float], axis: list[float] | None = None) -> None:
     from mathutils import Vector
 
     light = bpy.data.lights.new(name, kind)
@@ -53,7 +53,7 @@ def lamp(kind: str, name: str, energy: float, color: list[float], location: list
 
 
 def emitted(obj: bpy.types.Object, width: int, height: int) -> np.ndarray:
-    """(H, W, 3), row 0 at the top: what the object emits at its texels' centres, baked by Cycles with one sample."""
+    """(H, W, 3), row 0 at the top: what the object emits at its texels' centers, baked by Cycles with one sample."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.samples = 1
@@ -79,12 +79,12 @@ def relit(case: dict) -> dict:
     scene = bpy.context.scene
     scene.srbf.falloff, scene.srbf.a0 = case.get("falloff", "INVERSE_SQUARE"), case.get("a0", 1.0)
     for light in case["lights"]:
-        lamp(**light)
+        point_light(**light)
     scene.render.engine = case.get("engine", "CYCLES")
     capture = Path(case["capture"]) if "capture" in case else None
     notes = show.show(scene, obj, Path(case["asset"]), capture, case.get("layout", "IMAGES"), bool(case.get("albedo")))
     for light in case.get("later", []):
-        lamp(**light)
+        point_light(**light)
     bpy.context.view_layer.update()
     np.save(case["out"], emitted(obj, case["width"], case["height"]))
     return {"notes": notes}

@@ -115,7 +115,7 @@ def test_show_and_hide_leave_nothing_behind(in_blender, make_asset, tmp_path) ->
 def test_the_command_bakes_the_open_file(in_blender, tmp_path) -> None:
     scene = tmp_path / "scene.blend"
     subprocess.run(
-        [sys.executable, str(ROOT / "data" / "scenes" / "known_answers.py"), "plane", str(scene)],
+        [sys.executable, str(ROOT / "data" / "scenes" / "closed_form_scenes.py"), "plane", str(scene)],
         check=True,
         capture_output=True,
         timeout=60,

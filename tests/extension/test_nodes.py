@@ -15,18 +15,18 @@ pytestmark = pytest.mark.blender
 
 # The library looks R up in its table, the nodes compute it: off by TABLE_TOLERANCE of each |c_i| times the light. The maps are the same.
 FLOAT32 = 2e-5  # relative to the same sum: a k-term sum, arccosine and exponential in Cycles' single precision
-TEXEL = 2e-3  # of the step to a neighbour: Cycles' first sample stands within 0.001 texel of the centre, along either axis
+TEXEL = 2e-3  # of the step to a neighbor: Cycles' first sample stands within 0.001 texel of the center, along either axis
 SUN = {"kind": "SUN", "name": "Sun", "energy": 2.0, "color": [1.0, 0.5, 0.25], "location": [0, 0, 0], "axis": [0.4, -0.3, 0.8]}
 SECOND = {"kind": "SUN", "name": "Sky", "energy": 0.5, "color": [0.1, 0.2, 0.9], "location": [0, 0, 5], "axis": [-0.7, 0.1, 0.3]}
 POINT = {"kind": "POINT", "name": "Bulb", "energy": 30.0, "color": [1.0, 0.8, 0.6], "location": [0.3, -0.4, 0.7]}
 LOW = {"kind": "POINT", "name": "Candle", "energy": 4.0, "color": [0.9, 0.3, 0.1], "location": [-0.8, 0.5, 0.2]}
 
 
-def light_of(lamp, a0=1.0, falloff="inverse-square"):
-    if lamp["kind"] == "SUN":
-        return DirectionalLight(tuple(lamp["axis"]), tuple(lamp["energy"] * c for c in lamp["color"]))
-    color = tuple(lamp["energy"] / (4 * np.pi * a0**2) * c for c in lamp["color"])
-    return PointLight(tuple(lamp["location"]), color, a0, falloff)
+def light_of(point_light, a0=1.0, falloff="inverse-square"):
+    if point_light["kind"] == "SUN":
+        return DirectionalLight(tuple(point_light["axis"]), tuple(point_light["energy"] * c for c in point_light["color"]))
+    color = tuple(point_light["energy"] / (4 * np.pi * a0**2) * c for c in point_light["color"])
+    return PointLight(tuple(point_light["location"]), color, a0, falloff)
 
 
 def tolerance(asset, lights):
@@ -44,7 +44,7 @@ def tolerance(asset, lights):
 
 
 def largest_step(picture):
-    """The largest difference to one of the four neighbours, (H, W, 3)."""
+    """The largest difference to one of the four neighbors, (H, W, 3)."""
     step = np.zeros_like(picture)
     for axis in (0, 1):
         difference = np.abs(np.diff(picture, axis=axis))
@@ -57,10 +57,12 @@ def largest_step(picture):
 
 @pytest.fixture
 def emitted(in_blender, tmp_path):
-    def render(asset, lamps, name="asset", **case):
+    def render(asset, point_lights, name="asset", **case):
         out = tmp_path / "emitted.npy"
-        answer = in_blender("relit", asset=str(tmp_path / name), lights=lamps, out=str(out), width=asset.width, height=asset.height, **case)
-        return np.load(out), answer
+        response = in_blender(
+            "relit", asset=str(tmp_path / name), lights=point_lights, out=str(out), width=asset.width, height=asset.height, **case
+        )
+        return np.load(out), response
 
     return render
 
@@ -78,30 +80,30 @@ def test_suns_as_numpy_has_them(make_asset, emitted, layout, encoding) -> None:
 
 
 @pytest.mark.parametrize(("falloff", "a0"), [("inverse-square", 1.0), ("linear", 0.5)])
-def test_lamps_as_numpy_has_them(make_asset, emitted, falloff, a0) -> None:
+def test_point_lights_as_numpy_has_them(make_asset, emitted, falloff, a0) -> None:
     asset = make_asset()
     found, _ = emitted(asset, [POINT, LOW, SUN], falloff=falloff.upper().replace("-", "_"), a0=a0)
-    lights = [light_of(lamp, a0, falloff) for lamp in (POINT, LOW, SUN)]
+    lights = [light_of(point_light, a0, falloff) for point_light in (POINT, LOW, SUN)]
     assert (np.abs(found - relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
 def test_albedo_over_pi(make_asset, emitted) -> None:
     asset = make_asset(ambient=False)
     color = np.array([0.8, 0.5, 0.1])
-    found, answer = emitted(asset, [SUN], albedo=[color.tolist()])
+    found, response = emitted(asset, [SUN], albedo=[color.tolist()])
     lights = [light_of(SUN)]
     assert (np.abs(found * np.pi / color - relight(asset, lights)) <= tolerance(asset, lights)).all()
-    assert answer["notes"] == []
+    assert response["notes"] == []
 
 
 def test_lights_that_come_later(make_asset, emitted) -> None:
     """A lamp and a sun added after Show: the handler sees to the weights, and to the nodes of one lamp more."""
     asset = make_asset()
     spot = {**POINT, "kind": "SPOT", "name": "Spot"}
-    found, answer = emitted(asset, [SUN, spot], later=[SECOND, POINT])
-    lights = [light_of(lamp) for lamp in (SUN, SECOND, POINT)]
+    found, response = emitted(asset, [SUN, spot], later=[SECOND, POINT])
+    lights = [light_of(point_light) for point_light in (SUN, SECOND, POINT)]
     assert (np.abs(found - relight(asset, lights)) <= tolerance(asset, lights)).all()
-    assert answer["notes"] == ["not shown: light of Spot (suns and points are)"]
+    assert response["notes"] == ["not shown: light of Spot (suns and points are)"]
 
 
 def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:
@@ -119,5 +121,5 @@ def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:
 @pytest.mark.parametrize(("layout", "warned"), [("IMAGES", True), ("ATLAS", False)])
 def test_many_maps_in_eevee_are_warned_of(make_asset, emitted, layout, warned) -> None:
     asset = make_asset(k=20, size=(4, 4))
-    _, answer = emitted(asset, [SUN], layout=layout, engine="BLENDER_EEVEE_NEXT")
-    assert [("Atlas" in note) for note in answer["notes"]] == [True] * warned
+    _, response = emitted(asset, [SUN], layout=layout, engine="BLENDER_EEVEE_NEXT")
+    assert [("Atlas" in note) for note in response["notes"]] == [True] * warned

@@ -23,12 +23,12 @@ def shadowed(rng: np.random.Generator):
     labels = (np.arange(HEIGHT) * 6 // HEIGHT)[:, None] * 6 + (np.arange(WIDTH) * 6 // WIDTH)[None]
     level = rng.uniform(0.3, 1, (HEIGHT, WIDTH))
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         angle = np.arccos(np.clip(balls @ direction, -1, 1))
         seen = np.clip((angle - 0.3) / 0.25, 0, 1).prod(axis=1)
         return (seen[labels] * direction[2] * level)[..., None] * [1, 0.8, 0.6]
 
-    return answer
+    return response
 
 
 def smooth(bumps: np.random.Generator):
@@ -70,7 +70,7 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
     low, high = (size(within_budget(shadows, psnr=dB, say=said.append, **settings), shadows) for dB in (15.0, 25.0))
     assert low < high
     assert not any("at most" in line for line in said)
-    monkeypatch.setattr("srbf.fitting.auto_method.MOST_SCALARS", 4)
+    monkeypatch.setattr("srbf.fitting.auto_method.MOST_COMPONENTS", 4)
     within_budget(shadows, psnr=90.0, say=said.append, **settings)
     assert "expected 90 dB" in said[-2] and said[-1].startswith("chose")
 

@@ -105,7 +105,7 @@ def _(evaluate: Evaluate) -> None:
         world = view @ turn.T + pose[:3, 3]
         stored = stored_depth(view, matrix, from_zero)
         np.testing.assert_allclose(depth.receivers(stored, place, camera), world, atol=1e-9)
-        vectors = (camera.eye, camera.forward, camera.centre, camera.across, camera.up)
+        vectors = (camera.eye, camera.forward, camera.center, camera.across, camera.up)
         members = [f"vec3({', '.join(map(repr, vector.tolist()))})" for vector in vectors]
         members += [f"vec4({', '.join(map(repr, camera.depth_terms.tolist()))})", repr(float(camera.orthographic))]
         expression = f"vec4(srbfReceiverFromDepth(b.x, a.xy, SrbfCamera({', '.join(members)})), 0.0)"

@@ -11,25 +11,25 @@ from twins import EPS, POINT, SPOT, SUM, UNIT, Evaluate, K, M, N, twin, units, v
 
 from srbf.asset import Asset
 from srbf.basis import gaussian, octahedral_table
-from srbf.gl.scalar_planes import folded_rows
+from srbf.gl.coefficient_maps import projected_rows
 from srbf.gl.textures import pairs_of
-from srbf.gl.uniforms import lamp_uniforms, packed_lamps, padded
+from srbf.gl.uniforms import packed_point_lights, padded, point_light_uniforms
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
-from srbf.methods import coefficient_maps as scalar_planes
+from srbf.methods import coefficient_maps as coefficient_maps
 from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import basis_weights, folded_weights, linear_response
+from srbf.methods.relighting_map import basis_weights, linear_response, projected_weights
 from srbf.sphere import octahedral_encode
 
 SUNS: list[Light] = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
-LAMPS = [
+POINT_LIGHTS = [
     replace(POINT, position=(0.3, 0.2, -0.9)),
     SPOT,
     replace(SPOT, position=(0.0, 0.0, 50.0), inner=0.0, outer=1e-4),  # passes every receiver by
     replace(SPOT, falloff="linear", inner=0.2, outer=1.2),
 ]
 PLACES = 8  # more than there are lamps
-MANY = "lamps, lampCount"
-COUNT = {"lampCount": len(LAMPS)}
+MANY = "pointLights, pointLightCount"
+COUNT = {"pointLightCount": len(POINT_LIGHTS)}
 
 
 @twin("basis/weight_formula.glsl")
@@ -92,7 +92,7 @@ def _(evaluate: Evaluate) -> None:
 @twin("combine/center_weight.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(25)
-    directions = np.concatenate([units(N, 33), np.zeros((1, 3), np.float32)])  # the last receiver lies in the lamp
+    directions = np.concatenate([units(N, 33), np.zeros((1, 3), np.float32)])  # the last receiver lies in the light
     exact = {"table": basis_weights(asset, directions.astype(float)), "formula": asset.basis.evaluate(directions.astype(float))}
     centers = padded(asset.basis.centers)
     centers[:, 3] = 0.5 / asset.basis.spread**2
@@ -113,75 +113,78 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that each is told from the other
 
 
-@twin("lights/unpack_lamp.glsl")
+@twin("lights/unpack_point_light.glsl")
 def _(evaluate: Evaluate) -> None:
-    for light in (POINT, SPOT, *LAMPS):
-        rows = packed_lamps([light], 1)
-        u = lamp_uniforms(light)
+    for light in (POINT, SPOT, *POINT_LIGHTS):
+        rows = packed_point_lights([light], 1)
+        u = point_light_uniforms(light)
         at_one = light.a0 if light.falloff == "linear" else light.a0**2
         expected = {
-            "vec4(lamp.position, lamp.radius)": (*u["position"], u["radius"]),
-            "vec4(lamp.positionLow, float(lamp.falloff))": (*u["positionLow"], u["falloff"]),
-            "vec4(lamp.color, lamp.a0)": (*(at_one * c for c in light.color), 1),
-            "vec4(lamp.axis, 0.0)": (*u["axis"], 0),
-            "vec4(lamp.versineInner, lamp.versineOuter, 0.0, 0.0)": (u["versineInner"], u["versineOuter"], 0, 0),
+            "vec4(light.position, light.radius)": (*u["position"], u["radius"]),
+            "vec4(light.positionLow, float(light.falloff))": (*u["positionLow"], u["falloff"]),
+            "vec4(light.color, light.a0)": (*(at_one * c for c in light.color), 1),
+            "vec4(light.axis, 0.0)": (*u["axis"], 0),
+            "vec4(light.versineInner, light.versineOuter, 0.0, 0.0)": (u["versineInner"], u["versineOuter"], 0, 0),
         }
         for members, numbers in expected.items():
-            unpack = f"vec4 members(vec4 a, vec4 b, vec4 c, vec4 d) {{ SrbfLamp lamp = srbfUnpackLamp(a, b, c, d); return {members}; }}"
+            unpack = (
+                "vec4 members(vec4 a, vec4 b, vec4 c, vec4 d) "
+                f"{{ SrbfPointLight light = srbfUnpackPointLight(a, b, c, d); return {members}; }}"
+            )
             inputs = [np.broadcast_to(row, (2, 4)) for row in rows]
-            found = evaluate("lights/unpack_lamp.glsl", "members(a, b, c, d)", *inputs, declarations=unpack)[0]
+            found = evaluate("lights/unpack_point_light.glsl", "members(a, b, c, d)", *inputs, declarations=unpack)[0]
             np.testing.assert_allclose(found, np.float32(numbers), rtol=EPS)
 
 
-@twin("lights/lamps_at.glsl")
+@twin("lights/point_lights_at.glsl")
 def _(evaluate: Evaluate) -> None:
     positions = np.random.default_rng(34).uniform(-1, 1, (N, 3)).astype(np.float32)
     pick = """
-        uniform vec4 lamps[4 * SRBF_LAMPS];
-        uniform int lampCount;
+        uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS];
+        uniform int pointLightCount;
         vec4 pick(vec3 receiver, int j, int what) {
-            vec4 directions[SRBF_LAMPS];
-            vec4 colors[SRBF_LAMPS];
-            int shining = srbfLampsAt(lamps, lampCount, receiver, directions, colors);
+            vec4 directions[SRBF_POINT_LIGHTS];
+            vec4 colors[SRBF_POINT_LIGHTS];
+            int shining = srbfPointLightsAt(pointLights, pointLightCount, receiver, directions, colors);
             return what == 0 ? vec4(float(shining)) : (what == 1 ? directions[j] : colors[j]);
         }"""
 
     def run(j: int, what: int, count: int) -> np.ndarray:
         return evaluate(
-            "lights/lamps_at.glsl",
+            "lights/point_lights_at.glsl",
             f"pick(a.xyz, {j}, {what})",
             vec4(positions),
             declarations=pick,
-            arrays={"lamps": packed_lamps(LAMPS, PLACES)},
-            uniforms={"lampCount": count},
-            defines={"SRBF_LAMPS": PLACES},
+            arrays={"pointLights": packed_point_lights(POINT_LIGHTS, PLACES)},
+            uniforms={"pointLightCount": count},
+            defines={"SRBF_POINT_LIGHTS": PLACES},
         )
 
-    vectors = [light_vectors(light, positions) for light in LAMPS]
+    vectors = [light_vectors(light, positions) for light in POINT_LIGHTS]
     strengths = np.stack([strength for _, strength in vectors])  # (lamps, N)
     shines = strengths > 0
     edge = (shines & (strengths < 1e-5)).any(axis=0)  # a cone's edge: single precision may say otherwise
     assert edge.sum() < N / 10 and len({*shines.sum(axis=0)}) > 1
-    assert (run(0, 0, len(LAMPS))[~edge, 0] == shines.sum(axis=0)[~edge]).all()
+    assert (run(0, 0, len(POINT_LIGHTS))[~edge, 0] == shines.sum(axis=0)[~edge]).all()
     assert (run(0, 0, 0) == 0).all() and (run(0, 0, 1)[:, 0] == 1).all()
-    for j in range(len(LAMPS)):
+    for j in range(len(POINT_LIGHTS)):
         which = np.argsort(~shines, axis=0, kind="stable")[j]  # the j-th that shines on each receiver
         lit = (shines.sum(axis=0) > j) & ~edge
         unit = np.stack([unit for unit, _ in vectors])[which, np.arange(N)]
-        color = np.array([light.color for light in LAMPS])[which] * strengths[which, np.arange(N)][:, None]
-        np.testing.assert_allclose(run(j, 1, len(LAMPS))[lit, :3], unit[lit], atol=2 * UNIT)
-        np.testing.assert_allclose(run(j, 2, len(LAMPS))[lit, :3], color[lit], rtol=1e-5, atol=1e-5)
-        assert (run(j, 1, len(LAMPS))[(shines.sum(axis=0) <= j) & ~edge] == 0).all()
+        color = np.array([light.color for light in POINT_LIGHTS])[which] * strengths[which, np.arange(N)][:, None]
+        np.testing.assert_allclose(run(j, 1, len(POINT_LIGHTS))[lit, :3], unit[lit], atol=2 * UNIT)
+        np.testing.assert_allclose(run(j, 2, len(POINT_LIGHTS))[lit, :3], color[lit], rtol=1e-5, atol=1e-5)
+        assert (run(j, 1, len(POINT_LIGHTS))[(shines.sum(axis=0) <= j) & ~edge] == 0).all()
 
 
-def _far_and_lamps(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
+def _far_and_point_lights(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
     """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and LAMPS."""
-    weights = folded_weights(asset, SUNS)
+    weights = projected_weights(asset, SUNS)
     positions = asset.images["position"][0]
     bias = np.abs(asset.bias[:, None])
     sizes = np.abs(asset.coefficients()[:, 0] - asset.bias[:, None]) + bias  # what decoding may round
     bound = np.einsum("knc,kc->nc", sizes, weights)
-    for light in LAMPS:
+    for light in POINT_LIGHTS:
         unit, _ = light_vectors(light, positions)
         strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)  # without the cone
         bound += np.einsum("knc,nk->nc", sizes, basis_weights(asset, unit) * strength[:, None]) * light.color
@@ -189,49 +192,49 @@ def _far_and_lamps(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
     declared = [f"uniform vec4 {name}[SRBF_K];" for name in ("weights", *arrays)]
     return {
         "images": {"maps": asset.stored.astype(np.float32) / 255, "rTable": asset.table[None, :, None]},
-        "arrays": arrays | {"weights": padded(weights), "lamps": packed_lamps(LAMPS, PLACES)},
-        "defines": {"SRBF_K": asset.k, "SRBF_LAMPS": PLACES},
-        "declarations": " ".join([*declared, "uniform vec4 lamps[4 * SRBF_LAMPS]; uniform int lampCount;"]),
+        "arrays": arrays | {"weights": padded(weights), "pointLights": packed_point_lights(POINT_LIGHTS, PLACES)},
+        "defines": {"SRBF_K": asset.k, "SRBF_POINT_LIGHTS": PLACES},
+        "declarations": " ".join([*declared, "uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS]; uniform int pointLightCount;"]),
         "uniforms": COUNT,
     }, SUM * bound
 
 
 LIT = """
     vec3 lit(vec3 receiver, vec2 uv, int cluster) {
-        vec4 directions[SRBF_LAMPS];
-        vec4 colors[SRBF_LAMPS];
-        int shining = srbfLampsAt(%s, receiver, directions, colors);
+        vec4 directions[SRBF_POINT_LIGHTS];
+        vec4 colors[SRBF_POINT_LIGHTS];
+        int shining = srbfPointLightsAt(%s, receiver, directions, colors);
         return %s;
     }"""
 
 
-@twin("combine/lamps.glsl")
+@twin("combine/point_lights.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(K, "uint8", 1, N)
-    uploads, bound = _far_and_lamps(asset)
-    call = "srbfCombineLamps(maps, uv, 0.0, 0, weights, rTable, centers, scale, bias, directions, colors, shining)"
-    uploads["declarations"] = '#include "lights/lamps_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
-    found = evaluate("combine/lamps.glsl", "vec4(lit(a.xyz, uv, 0), 0.0)", vec4(asset.images["position"][0]), **uploads)[:, :3]
-    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *LAMPS])[0]), bound)
+    uploads, bound = _far_and_point_lights(asset)
+    call = "srbfCombinePointLights(maps, uv, 0.0, 0, weights, rTable, centers, scale, bias, directions, colors, shining)"
+    uploads["declarations"] = '#include "lights/point_lights_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
+    found = evaluate("combine/point_lights.glsl", "vec4(lit(a.xyz, uv, 0), 0.0)", vec4(asset.images["position"][0]), **uploads)[:, :3]
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *POINT_LIGHTS])[0]), bound)
 
 
 @twin("methods/relighting_map_lights.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(K, "uint8", 1, N)
-    uploads, bound = _far_and_lamps(asset)
+    uploads, bound = _far_and_point_lights(asset)
     call = f"srbfRelightLights(maps, uv, 0.0, 0, weights, rTable, centers, scale, bias, a.xyz, {MANY})"
     found = evaluate("methods/relighting_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)[:, :3]
-    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *LAMPS])[0]), bound)
+    np.testing.assert_array_less(np.abs(found - linear_response(asset, [*SUNS, *POINT_LIGHTS])[0]), bound)
 
 
-@twin("combine/folded.glsl")
+@twin("combine/projected.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(K, "uint8", 1, N)
-    weights = folded_weights(asset, SUNS)
+    weights = projected_weights(asset, SUNS)
     offset = ", ".join(map(repr, (weights * asset.bias).sum(axis=0).tolist()))
     found = evaluate(
-        "combine/folded.glsl",
-        f"vec4(srbfCombineFolded(maps, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
+        "combine/projected.glsl",
+        f"vec4(srbfCombineProjected(maps, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
         vec4(np.zeros(N)),
         images={"maps": asset.stored.astype(np.float32) / 255},
         arrays={"weights": padded(weights * asset.scale)},
@@ -245,7 +248,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
 @twin("combine/weighted.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(K, "uint8", 1, N)
-    weights = folded_weights(asset, SUNS)
+    weights = projected_weights(asset, SUNS)
     found = evaluate(
         "combine/weighted.glsl",
         "vec4(srbfCombineWeighted(maps, uv, 0.0, 0, weights, scale, bias), 0.0)",
@@ -308,7 +311,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
                     arrays={"assetFromMap": padded(turn)},
                     declarations="uniform vec4 assetFromMap[3];",
                 )[:, :3]
-                expected = folded_weights(asset, [ENVIRONMENT])[i]
+                expected = projected_weights(asset, [ENVIRONMENT])[i]
                 np.testing.assert_allclose(found.sum(axis=0), expected, atol=SUM * (expected.max() + 1))
 
 
@@ -330,19 +333,19 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
         images={"gaussians": np.pad(gaussians, ((0, 0), (0, 1)))[None], "coefficients": rows},
     )[:, :3]
     sizes = np.abs(functions.coefficients).sum(axis=1) * gaussians.max()
-    assert (np.abs(found - scalar_planes.folded_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
+    assert (np.abs(found - coefficient_maps.projected_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
 
 
-def _planes(asset: Asset, lamps: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
+def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
     """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `lamps`."""
-    weights = scalar_planes.folded_weights(asset, SUNS)
-    bias = scalar_planes.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
-    planes = np.abs(scalar_planes.planes_of(asset.coefficients(), asset.scalars)[:, 0]) + 2 * bias
+    weights = coefficient_maps.projected_weights(asset, SUNS)
+    bias = coefficient_maps.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
+    planes = np.abs(coefficient_maps.planes_of(asset.coefficients(), asset.scalars)[:, 0]) + 2 * bias
     terms = np.concatenate([np.ones((1, M)), planes])  # (S + 1, M)
-    function = scalar_planes.first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
+    function = coefficient_maps.first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
     bound = np.einsum("fn,nfc->nc", terms, np.abs(weights[function]))
     positions = asset.images["position"][0]
-    for light in lamps:
+    for light in point_lights:
         unit, _ = light_vectors(light, positions)
         strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)  # without the cone
         places = np.broadcast_to(unit[:, None], (*function.shape, 3))
@@ -356,82 +359,82 @@ def _planes(asset: Asset, lamps: list[PointLight]) -> tuple[dict[str, Any], np.n
             "wTable": asset.tables["w_table"].astype(np.float32),
             "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
         },
-        "arrays": {"scale": asset.scale, "bias": asset.bias, "lamps": packed_lamps(lamps, PLACES)},
-        "defines": {"SRBF_SCALARS": asset.scalars, "SRBF_LAMPS": PLACES},
-        "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS]; uniform vec4 lamps[4 * SRBF_LAMPS]; "
-        "uniform int lampCount;",
+        "arrays": {"scale": asset.scale, "bias": asset.bias, "pointLights": packed_point_lights(point_lights, PLACES)},
+        "defines": {"SRBF_COMPONENTS": asset.scalars, "SRBF_POINT_LIGHTS": PLACES},
+        "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS]; uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS]; "
+        "uniform int pointLightCount;",
         "uniforms": COUNT,
     }
     return uploads, SUM * bound
 
 
 def _equals_planes(found: np.ndarray, asset: Asset, lights: list[Any], bound: np.ndarray) -> None:
-    assert (np.abs(found[:, :3] - scalar_planes.linear_response(asset, lights)[0]) <= bound).all()
+    assert (np.abs(found[:, :3] - coefficient_maps.linear_response(asset, lights)[0]) <= bound).all()
     assert (np.abs(found[:, :3]) > bound).any()
 
 
-@twin("combine/planes_lamps.glsl")
+@twin("combine/components_point_lights.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, 7, "uint8", 1, M)
-    uploads, bound = _planes(asset, LAMPS)
-    call = "srbfCombinePlanesLamps(planes, uv, 0.0, 0, weights, cluster, wTable, 17, scale, bias, directions, colors, shining)"
-    uploads["declarations"] = '#include "lights/lamps_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
+    uploads, bound = _planes(asset, POINT_LIGHTS)
+    call = "srbfCombineComponentsPointLights(planes, uv, 0.0, 0, weights, cluster, wTable, 17, scale, bias, directions, colors, shining)"
+    uploads["declarations"] = '#include "lights/point_lights_at.glsl"\n' + uploads["declarations"] + LIT % (MANY, call)
     rows = vec4(asset.images["position"][0], asset.tables["cluster_index"][0])
-    found = evaluate("combine/planes_lamps.glsl", "vec4(lit(a.xyz, uv, int(a.w)), 0.0)", rows, **uploads)
-    _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+    found = evaluate("combine/components_point_lights.glsl", "vec4(lit(a.xyz, uv, int(a.w)), 0.0)", rows, **uploads)
+    _equals_planes(found, asset, [*SUNS, *POINT_LIGHTS], bound)
 
 
 @twin("methods/eigen_map_lights.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, None, "uint8", 1, M)
-    uploads, bound = _planes(asset, LAMPS)
+    uploads, bound = _planes(asset, POINT_LIGHTS)
     call = f"srbfEigenMapLights(planes, uv, 0.0, 0, weights, wTable, 17, scale, bias, a.xyz, {MANY})"
     found = evaluate("methods/eigen_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)
-    _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+    _equals_planes(found, asset, [*SUNS, *POINT_LIGHTS], bound)
 
 
 @twin("methods/clustered_eigen_map_lights.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
-    """By texel, and by the place of a texel's centre."""
+    """By texel, and by the place of a texel's center."""
     asset = make_planes(K, 7, "uint8", 1, M)
-    uploads, bound = _planes(asset, LAMPS)
+    uploads, bound = _planes(asset, POINT_LIGHTS)
     for name, place in (("", "at"), ("Filtered", "uv")):
         call = f"srbfClusteredLights{name}(planes, clusters, {place}, 0, weights, wTable, 17, scale, bias, a.xyz, {MANY})"
         found = evaluate("methods/clustered_eigen_map_lights.glsl", f"vec4({call}, 0.0)", vec4(asset.images["position"][0]), **uploads)
-        _equals_planes(found, asset, [*SUNS, *LAMPS], bound)
+        _equals_planes(found, asset, [*SUNS, *POINT_LIGHTS], bound)
 
 
-@twin("combine/planes_folded.glsl")
+@twin("combine/components_projected.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, None, "uint8", 1, M)
     uploads, bound = _planes(asset, [])
-    rows = folded_rows(asset, scalar_planes.folded_weights(asset, SUNS))[0]
+    rows = projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS))[0]
     offset = ", ".join(map(repr, rows[0, :3].tolist()))
     found = evaluate(
-        "combine/planes_folded.glsl",
-        f"vec4(srbfCombinePlanesFolded(planes, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
+        "combine/components_projected.glsl",
+        f"vec4(srbfCombineComponentsProjected(planes, uv, 0.0, 0, weights, vec3({offset})), 0.0)",
         vec4(np.zeros(M)),
         images={"planes": uploads["images"]["planes"]},
         arrays={"weights": rows[1:]},
-        defines={"SRBF_SCALARS": K},
+        defines={"SRBF_COMPONENTS": K},
         declarations="uniform vec4 weights[3 * SRBF_LAYERS];",
     )
     _equals_planes(found, asset, SUNS, bound)
 
 
-@twin("combine/planes_folded_cluster.glsl")
+@twin("combine/components_projected_cluster.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, 7, "uint8", 1, M)
     uploads, bound = _planes(asset, [])
     found = evaluate(
-        "combine/planes_folded_cluster.glsl",
-        "vec4(srbfCombinePlanesFoldedCluster(planes, uv, 0, weights, int(a.x)), 0.0)",
+        "combine/components_projected_cluster.glsl",
+        "vec4(srbfCombineComponentsProjectedCluster(planes, uv, 0, weights, int(a.x)), 0.0)",
         vec4(asset.tables["cluster_index"][0]),
         images={
             "planes": uploads["images"]["planes"],
-            "weights": folded_rows(asset, scalar_planes.folded_weights(asset, SUNS)),
+            "weights": projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS)),
         },
-        defines={"SRBF_SCALARS": K},
+        defines={"SRBF_COMPONENTS": K},
     )
     _equals_planes(found, asset, SUNS, bound)
 

@@ -46,9 +46,9 @@ def scene(kind: str) -> tuple[np.ndarray, DepthView]:
     else:
         ray = forward + right * (x + matrix[0, 2]) / matrix[0, 0] + up * (y + matrix[1, 2]) / matrix[1, 1]
         origin = np.broadcast_to(eye, ray.shape)
-    centre, radius = np.array([0.0, 0.0, 1.0]), 1.0
-    a, b = (ray**2).sum(axis=2), (ray * (origin - centre)).sum(axis=2)
-    inside = b**2 - a * (((origin - centre) ** 2).sum(axis=2) - radius**2)
+    center, radius = np.array([0.0, 0.0, 1.0]), 1.0
+    a, b = (ray**2).sum(axis=2), (ray * (origin - center)).sum(axis=2)
+    inside = b**2 - a * (((origin - center) ** 2).sum(axis=2) - radius**2)
     ball = (-b - np.sqrt(np.maximum(inside, 0))) / a
     floor = np.where(ray[..., 2] < -1e-3, -origin[..., 2] / np.minimum(ray[..., 2], -1e-3), 30.0)  # above the horizon a far wall
     floor = np.minimum(floor, 30.0)
@@ -78,7 +78,7 @@ def test_a_view_is_relit_by_its_depths(
         assert image[0, 0].max() > 0 or image[-1, -1].max() > 0  # corners are lit
     # Had depth along the axis been taken for the ray's length, the corners would be somewhere else
     if not view.camera.orthographic:
-        wrong = replace(view.camera, centre=view.camera.centre * 0.7)
+        wrong = replace(view.camera, center=view.camera.center * 0.7)
         with Relighter(replace(asset, images={}), context=context, view=replace(view, camera=wrong)) as relighter:
             assert np.abs(relighter.relight(LIGHTS) - methods.relight(asset, LIGHTS)).max() > 10 * ROUNDING[kind] * found.max()
 

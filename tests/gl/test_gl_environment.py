@@ -12,7 +12,7 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight
-from srbf.methods import folded_weights
+from srbf.methods import projected_weights
 from srbf.relighting.relighter import Relighter
 
 SUM = 1e-5  # the contract, of the sum of all terms' sizes
@@ -53,7 +53,7 @@ def test_the_weights_of_skies_are_numpys(context: Any, asset: Asset, domain: str
         assert relighter._sky is not None
         with context:
             found = relighter._sky.read()
-    expected = folded_weights(asset, lights)
+    expected = projected_weights(asset, lights)
     assert found.shape == expected.shape
     assert (np.abs(found - expected) <= SUM * (sizes(asset) + np.abs(expected))).all()
     assert np.abs(expected).max() > 100 * SUM * sizes(asset).max()

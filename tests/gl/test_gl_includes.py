@@ -82,7 +82,7 @@ def test_comments_are_not_directives(tree: Tree) -> None:
 
 
 def test_version_comes_first_then_defines(tree: Tree) -> None:
-    root = tree({"a.frag": "// licence\n#version 330 core\nvoid main() {}\n"})
+    root = tree({"a.frag": "// license\n#version 330 core\nvoid main() {}\n"})
     lines = resolve("a.frag", root=root, defines={"SRBF_K": 25, "FAST": True}).text.splitlines()
     assert lines[:4] == ["#version 330 core", "#define SRBF_K 25", "#define FAST 1", "#line 1 0"]
     assert lines[4 + 2] == "void main() {}"  # its third line, as the file has it

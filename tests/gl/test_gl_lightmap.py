@@ -14,9 +14,9 @@ from srbf.asset import Asset
 from srbf.gl.context import Limits, compile_program
 from srbf.gl.includes import ShaderSource, resolve
 from srbf.gl.textures import AssetTextures
-from srbf.gl.uniforms import packed_lamps, padded
+from srbf.gl.uniforms import packed_point_lights, padded
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, moved
-from srbf.methods import folded_weights
+from srbf.methods import projected_weights
 from srbf.methods.coefficient_maps import first_function
 
 SIDE = 48  # pixels of the picture
@@ -85,16 +85,16 @@ def draw(context: Any, asset: Asset, corners: np.ndarray = CORNERS) -> tuple[np.
     """Bottom row first: the picture, and of each fragment its receiver's position and its place on the lightmap."""
     maps = asset.method == "relighting-map"
     inside = [moved(light, asset.asset_from_world) for light in LIGHTS]
-    lamps = [light for light in inside if isinstance(light, PointLight)]
-    weights = folded_weights(asset, LIGHTS)
+    point_lights = [light for light in inside if isinstance(light, PointLight)]
+    weights = projected_weights(asset, LIGHTS)
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
-    defines = {"SRBF_LAMPS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_SCALARS": asset.scalars})
+    defines = {"SRBF_POINT_LIGHTS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars})
     with context, ExitStack() as resources:
         textures = AssetTextures(context, asset, Limits.of(context), resources)
         program = compile_program(context, resolve("stages/lightmap.vert"), telling(resolve(f"stages/{stage}", defines=defines)))
         resources.callback(program.release)
         used = {"maps" if maps else "planes": textures.layers(), "ambient": textures.ambient()}
-        arrays = {"lamps": packed_lamps(lamps, PLACES)}
+        arrays = {"pointLights": packed_point_lights(point_lights, PLACES)}
         if maps:
             used["rTable"] = textures.r_pairs()
             arrays |= {"weights": padded(weights), "centers": padded(asset.basis.centers)}
@@ -112,7 +112,7 @@ def draw(context: Any, asset: Asset, corners: np.ndarray = CORNERS) -> tuple[np.
             program[name].value = unit
         for name, array in arrays.items():
             program[name].write(np.ascontiguousarray(array, np.float32))
-        program["lampCount"].value = len(lamps)
+        program["pointLightCount"].value = len(point_lights)
         matrices = {"worldFromObject": WORLD_FROM_OBJECT, "assetFromWorld": ASSET_FROM_WORLD, "clipFromWorld": clip_from_world(corners)}
         for name, matrix in matrices.items():
             program[name].write(np.ascontiguousarray(matrix.T, np.float32))

@@ -15,10 +15,10 @@ from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
 from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import folded_weights, receiver_weights
+from srbf.methods.relighting_map import projected_weights, receiver_weights
 from srbf.relighting.relighter import Relighter, relight
 
-FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times colour and attenuation)
+FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times color and attenuation)
 HALF = 2 * 2.0**-10  # the contract: two steps of a half float
 HALF_TINY = 2.0**-24  # spacing of subnormal halves: what no relative bound covers
 # stored * scale + bias rounds three times, here and in numpy, whatever cancels: a bound by |c_i| alone would be one below rounding
@@ -53,9 +53,9 @@ LIGHTS: dict[str, list[Light]] = {
 
 
 def magnitude(asset: Asset, lights: Sequence[Light], of: np.ndarray | None = None) -> np.ndarray:
-    """Sum over lights of colour times attenuation times sum |c_i R_i|, (H, W, 3): what tolerances are relative to."""
+    """Sum over lights of color times attenuation times sum |c_i R_i|, (H, W, 3): what tolerances are relative to."""
     c = np.abs(asset.coefficients()) if of is None else of  # (K, H, W, 3)
-    total = np.einsum("khwc,kc->hwc", c, folded_weights(asset, lights))
+    total = np.einsum("khwc,kc->hwc", c, projected_weights(asset, lights))
     for light in (moved(light, asset.asset_from_world) for light in lights):
         if isinstance(light, PointLight):
             positions = asset.images["position"]
@@ -116,7 +116,7 @@ def test_half_target_is_within_two_half_steps(relighter_of: Callable[..., Any], 
     assert (np.abs(found - methods.relight(asset, lights)) <= tolerance(asset, lights, "half")).all()
 
 
-def lamps(count: int) -> list[Light]:
+def point_lights(count: int) -> list[Light]:
     """Points and spots of every kind, all over the receivers."""
     rng = np.random.default_rng(9)
     made: list[Light] = []
@@ -130,20 +130,20 @@ def lamps(count: int) -> list[Light]:
     return made
 
 
-@pytest.mark.parametrize("far", [False, True], ids=["lamps", "with-far"])
+@pytest.mark.parametrize("far", [False, True], ids=["point_lights", "with-far"])
 @pytest.mark.parametrize("count", [2, 5, 16, 19])
-def test_many_lamps_at_once_equal_numpy(relighter_of: Callable[..., Any], count: int, far: bool) -> None:
+def test_many_point_lights_at_once_equal_numpy(relighter_of: Callable[..., Any], count: int, far: bool) -> None:
     asset, relighter = relighter_of(25, "half", "float")
-    lights = lamps(count) + (LIGHTS["directional"] + LIGHTS["environment"] if far else [])
+    lights = point_lights(count) + (LIGHTS["directional"] + LIGHTS["environment"] if far else [])
     found = relighter.relight(lights)
     assert (np.abs(found - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
     assert (np.abs(relighter.relight(lights, multipass=True) - found) <= 2 * tolerance(asset, lights)).all()
 
 
-def test_lamps_by_formula_are_as_near_as_the_table_is(context: Any, make_asset: Callable[..., Asset]) -> None:
+def test_point_lights_by_formula_are_as_near_as_the_table_is(context: Any, make_asset: Callable[..., Asset]) -> None:
     """numpy reads the table, which is within 2^-12 of the formula; a sharper truth is R itself."""
     asset = make_asset(25, "float")
-    lights = lamps(3)
+    lights = point_lights(3)
     exact = np.zeros((asset.height, asset.width, 3))
     for light in lights:
         assert isinstance(light, PointLight)
@@ -180,7 +180,7 @@ def test_more_maps_than_uniforms_hold_take_several_passes(context: Any, make_ass
     asset = make_asset(25, "uint8")
     with Relighter(asset, context=context) as relighter:
         lights = LIGHTS["several"]
-        assert [relighter._passes.layers_a_pass(lamps) for lamps in (0, 1, 2)] == [30, 6, 5]
+        assert [relighter._passes.layers_per_pass(point_lights) for point_lights in (0, 1, 2)] == [30, 6, 5]
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
@@ -234,15 +234,15 @@ def test_positions_stay_in_their_row_and_column(context: Any, make_asset: Callab
     assert (np.abs(lit - methods.relight(asset, [near])) <= tolerance(asset, [near])).all()  # a receiver in the lamp included
 
 
-def test_a_lamp_far_from_the_origin_keeps_its_digits(context: Any, make_asset: Callable[..., Asset]) -> None:
+def test_a_point_light_far_from_the_origin_keeps_its_digits(context: Any, make_asset: Callable[..., Asset]) -> None:
     """Single precision would place this lamp to within 0.1 mm, 3e-4 of its distance."""
     asset = make_asset(25)
     offset = np.array([2000.0, -3000.0, 500.0])
     asset.images["position"] = (asset.images["position"] + offset).astype(np.float32)
-    lamp = PointLight(tuple(offset + np.array([0.40001, -0.2, 0.70003])))  # type: ignore[arg-type]
+    point_light = PointLight(tuple(offset + np.array([0.40001, -0.2, 0.70003])))  # type: ignore[arg-type]
     with Relighter(asset, context=context) as relighter:
-        found = relighter.relight([lamp])
-    assert (np.abs(found - methods.relight(asset, [lamp])) <= tolerance(asset, [lamp])).all()
+        found = relighter.relight([point_light])
+    assert (np.abs(found - methods.relight(asset, [point_light])) <= tolerance(asset, [point_light])).all()
 
 
 def test_a_moved_asset_carries_its_lights(context: Any, make_asset: Callable[..., Asset]) -> None:
@@ -257,8 +257,8 @@ def test_a_moved_asset_carries_its_lights(context: Any, make_asset: Callable[...
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["directional", "environment", "point-linear", "spot"])
-def test_linear_in_the_colour_of_a_light(relighter_of: Callable[..., Any], kind: str, seed: int) -> None:
-    """Equal before the clamp; clamping is monotone and 1-Lipschitz, so a scaled colour scales the clamped image too."""
+def test_linear_in_the_color_of_a_light(relighter_of: Callable[..., Any], kind: str, seed: int) -> None:
+    """Equal before the clamp; clamping is monotone and 1-Lipschitz, so a scaled color scales the clamped image too."""
     asset, relighter = relighter_of(25, "float", "float")
     light = LIGHTS[kind][0]
     factor = np.random.default_rng(seed).uniform(0.1, 9, 3)
@@ -274,7 +274,7 @@ def test_frames_do_not_leak_into_each_other(relighter_of: Callable[..., Any]) ->
     assert (relighter.relight(LIGHTS["several"]) == first).all()
 
 
-def test_lamps_need_positions(context: Any, make_asset: Callable[..., Asset]) -> None:
+def test_point_lights_need_positions(context: Any, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(position=False)
     with Relighter(asset, context=context) as relighter:
         assert relighter.relight(LIGHTS["directional"]).max() > 0
@@ -282,13 +282,13 @@ def test_lamps_need_positions(context: Any, make_asset: Callable[..., Asset]) ->
             relighter.relight(LIGHTS["spot"])
 
 
-def test_harmonics_relight_far_lights_and_refuse_lamps(context: Any, make_asset: Callable[..., Asset]) -> None:
+def test_harmonics_relight_far_lights_and_refuse_point_lights(context: Any, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(9)
     asset.manifest["basis"] = {"kind": "spherical-harmonics"}
     asset.tables.clear()
     lights = [*LIGHTS["directional"], *LIGHTS["environment"]]
     with Relighter(asset, context=context) as relighter:
-        bound = np.einsum("khwc,kc->hwc", np.abs(asset.coefficients()), np.abs(folded_weights(asset, lights)))
+        bound = np.einsum("khwc,kc->hwc", np.abs(asset.coefficients()), np.abs(projected_weights(asset, lights)))
         for multipass in (False, True):
             found = relighter.relight(lights, multipass=multipass)
             assert found.max() > 0

@@ -15,12 +15,12 @@ from srbf.basis.octahedral_table import lookup
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
-from srbf.methods import folded_weights, linear_response
+from srbf.methods import linear_response, projected_weights
 from srbf.methods.coefficient_maps import first_function, planes_of
 from srbf.methods.receivers import light_vectors
 from srbf.relighting.relighter import Relighter
 
-FLOAT = 1e-5  # the contract, of sum |a_j w_j| a texel (times colour and attenuation)
+FLOAT = 1e-5  # the contract, of sum |a_j w_j| a texel (times color and attenuation)
 HALF = 2 * 2.0**-10  # the contract: two steps of a half float
 HALF_TINY = 2.0**-24  # spacing of subnormal halves: what no relative bound covers
 FINAL = 2.0**-23  # one rounding each of the sum with ambient
@@ -55,11 +55,11 @@ LIGHTS: dict[str, list[Light]] = {
 
 
 def magnitude(asset: Asset, lights: Sequence[Light], of: np.ndarray | None = None) -> np.ndarray:
-    """Sum over lights of colour times attenuation times |w_0| + sum |a_j w_j|, (H, W, 3): what tolerances are relative to."""
+    """Sum over lights of color times attenuation times |w_0| + sum |a_j w_j|, (H, W, 3): what tolerances are relative to."""
     planes = np.abs(planes_of(asset.coefficients(), asset.scalars)) if of is None else of
     terms = np.concatenate([np.ones_like(planes[:1]), planes])  # (S + 1, H, W)
     function = first_function(asset, slice(None))[..., None] + np.arange(len(terms))  # (H, W, S + 1)
-    total = np.einsum("fhw,hwfc->hwc", terms, np.abs(folded_weights(asset, lights))[function])
+    total = np.einsum("fhw,hwfc->hwc", terms, np.abs(projected_weights(asset, lights))[function])
     entry = asset.manifest["w_table"]
     for light in (moved(light, asset.asset_from_world) for light in lights):
         if isinstance(light, PointLight):
@@ -119,10 +119,10 @@ def test_equals_numpy(relighter_of: Get, scalars: int, clusters: int | None, enc
     assert (np.abs(found - expected) <= tolerance(asset, lights)).all()
 
 
-@pytest.mark.parametrize("far", [False, True], ids=["lamps", "with-far"])
+@pytest.mark.parametrize("far", [False, True], ids=["point_lights", "with-far"])
 @pytest.mark.parametrize("count", [5, 19])
 @pytest.mark.parametrize("clusters", [None, 5])
-def test_many_lamps_at_once_equal_numpy(relighter_of: Get, clusters: int | None, count: int, far: bool) -> None:
+def test_many_point_lights_at_once_equal_numpy(relighter_of: Get, clusters: int | None, count: int, far: bool) -> None:
     asset, relighter = relighter_of(9, clusters, "half", "float")
     places = np.linspace(-1, 1, count).tolist()
     lights: list[Light] = [PointLight((x, -x, 0.9 + x), (0.1, 0.2, 0.15 + x / 9), a0=0.9) for x in places]
@@ -159,7 +159,7 @@ def test_more_layers_than_uniforms_hold_take_several_passes(
     asset = make_planes(18, clusters, "uint8")
     with Relighter(asset, context=context) as relighter:
         lights = LIGHTS["several"]
-        assert [relighter._passes.layers_a_pass(lamps) for lamps in (0, 1)] == [1, 1]
+        assert [relighter._passes.layers_per_pass(point_lights) for point_lights in (0, 1)] == [1, 1]
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
@@ -211,14 +211,14 @@ def test_a_moved_asset_carries_its_lights(context: Any, make_planes: Callable[..
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
-def test_a_receiver_in_the_lamp(context: Any, make_planes: Callable[..., Asset]) -> None:
+def test_a_receiver_in_the_point_light(context: Any, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(9, 5)
-    lamp = PointLight(tuple(asset.images["position"][1, 8].astype(float)), a0=0.1)  # type: ignore[arg-type]
+    point_light = PointLight(tuple(asset.images["position"][1, 8].astype(float)), a0=0.1)  # type: ignore[arg-type]
     with Relighter(asset, context=context) as relighter:
-        assert (np.abs(relighter.relight([lamp]) - methods.relight(asset, [lamp])) <= tolerance(asset, [lamp])).all()
+        assert (np.abs(relighter.relight([point_light]) - methods.relight(asset, [point_light])) <= tolerance(asset, [point_light])).all()
 
 
-def test_lamps_need_positions(context: Any, make_planes: Callable[..., Asset]) -> None:
+def test_point_lights_need_positions(context: Any, make_planes: Callable[..., Asset]) -> None:
     with Relighter(make_planes(position=False), context=context) as relighter:
         assert relighter.relight(LIGHTS["directional"]).max() > 0
         with pytest.raises(InputError, match="position map"):
@@ -241,10 +241,10 @@ def test_planes_too_many_for_the_gpu_are_refused(
 def test_filtering_comes_after_reconstruction_where_clusters_meet(make_planes: Callable[..., Asset], evaluate: Callable[..., Any]) -> None:
     """The four-texel function is numpy's picture, filtered; scalars filtered first agree with it inside a cluster and nowhere else."""
     asset, lights = make_planes(9, 5, height=8, width=16, patches=True), LIGHTS["directional"]
-    weights = folded_weights(asset, lights).reshape(asset.clusters, -1, 3)
+    weights = projected_weights(asset, lights).reshape(asset.clusters, -1, 3)
     rng = np.random.default_rng(8)
     uv = (rng.integers(0, 256, (300, 2)) + 0.5) / 256  # exact in float32
-    corners, shares = neighbours(uv, asset)
+    corners, shares = neighbors(uv, asset)
     scalars = planes_of(asset.coefficients(), asset.scalars)
     expected = np.einsum("nk,nkc->nc", shares, linear_response(asset, lights)[corners[..., 0], corners[..., 1]])
     size = np.einsum("nk,nkc->nc", shares, magnitude(asset, lights)[corners[..., 0], corners[..., 1]])
@@ -256,7 +256,7 @@ def test_filtering_comes_after_reconstruction_where_clusters_meet(make_planes: C
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS];",
-        "defines": {"SRBF_SCALARS": asset.scalars},
+        "defines": {"SRBF_COMPONENTS": asset.scalars},
     }
     call = "srbfClusteredDirectionalFiltered(planes, clusters, a.xy, 0, weights, scale, bias)"
     places = np.pad(uv, ((0, 0), (0, 2))).astype(np.float32)
@@ -275,7 +275,7 @@ def test_filtering_comes_after_reconstruction_where_clusters_meet(make_planes: C
     assert np.median(across) > 0.1
 
 
-def neighbours(uv: np.ndarray, asset: Asset) -> tuple[np.ndarray, np.ndarray]:
+def neighbors(uv: np.ndarray, asset: Asset) -> tuple[np.ndarray, np.ndarray]:
     """(row, column) of the four texels about places (u, v), (n, 4, 2), and their bilinear shares, (n, 4)."""
     place = uv * [asset.width, asset.height] - 0.5
     base = np.floor(place).astype(int)

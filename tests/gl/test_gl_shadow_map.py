@@ -48,7 +48,7 @@ def test_an_open_plane_never_shades_itself(context: Any) -> None:
         for z in (1.0, 0.5, 0.1):
             light = DirectionalLight((np.sqrt(1 - z * z), 0.0, z), (1.0, 2.0, 3.0))
             expected = np.broadcast_to(z * np.array([1, 2, 3]), (64, 64, 3))
-            np.testing.assert_allclose(mapper.answer([light]), expected, rtol=NEAR)
+            np.testing.assert_allclose(mapper.response([light]), expected, rtol=NEAR)
 
 
 def test_a_wide_sun_softens_it(context: Any) -> None:
@@ -60,11 +60,11 @@ def test_a_wide_sun_softens_it(context: Any) -> None:
     np.testing.assert_allclose(mapped.mean(axis=0), RayTracer(receivers).directional(up)[0, ..., 0].mean(axis=0), atol=0.05)
 
 
-def test_lamps_are_refused_and_environments_pass(context: Any) -> None:
+def test_point_lights_are_refused_and_environments_pass(context: Any) -> None:
     with ShadowMapper(build_plane(), context=context) as mapper:
         with pytest.raises(InputError, match="--direct ray"):
-            mapper.answer([PointLight((0.0, 0.0, 1.0))])
-        assert (mapper.answer([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
+            mapper.response([PointLight((0.0, 0.0, 1.0))])
+        assert (mapper.response([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
 
 
 @pytest.mark.parametrize("smooth", [False, True], ids=["flat", "smooth"])

@@ -18,14 +18,18 @@ ROOT = shader_root()
 STAGES = sorted(path.name for path in (ROOT / "stages").iterdir())
 FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if path.suffix in (".glsl", ".vert", ".frag"))
 # 384 scalars are 96 layers, 192 of the 224 vec4 that ES 3.00 promises; more take passes of some layers
-PLANES: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 384)] + [{"SRBF_SCALARS": 1024, "SRBF_LAYERS": 64}]
-FOLDED: list[dict[str, object]] = [{"SRBF_SCALARS": s} for s in (1, 9, 288)]  # three vec4 a layer
+PLANES: list[dict[str, object]] = [{"SRBF_COMPONENTS": s} for s in (1, 9, 384)] + [{"SRBF_COMPONENTS": 1024, "SRBF_LAYERS": 64}]
+PROJECTED: list[dict[str, object]] = [{"SRBF_COMPONENTS": s} for s in (1, 9, 288)]  # three vec4 a layer
 # 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
-LAMPS: list[dict[str, object]] = [{"SRBF_LAMPS": 1}, {"SRBF_LAMPS": 16}, {"SRBF_LAMPS": 16, "SRBF_DEPTH": 1}]
+POINT_LIGHTS: list[dict[str, object]] = [{"SRBF_POINT_LIGHTS": 1}, {"SRBF_POINT_LIGHTS": 16}, {"SRBF_POINT_LIGHTS": 16, "SRBF_DEPTH": 1}]
 SAMPLED: dict[str, object] = {"SRBF_PAIRS": 1, "SRBF_SAMPLED": 1}
-LIT_MAPS = [{"SRBF_K": k} | lamps for k in (1, 25, 32) for lamps in LAMPS] + [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_FORMULA": 1}]
-LIT_MAPS += [{"SRBF_K": 25, "SRBF_LAMPS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
-LIT_PLANES = [{"SRBF_SCALARS": s} | lamps for s in (9, 256) for lamps in LAMPS] + [{"SRBF_SCALARS": 9, "SRBF_LAMPS": 4, "SRBF_PLAIN": 1}]
+LIT_MAPS = [{"SRBF_K": k} | point_lights for k in (1, 25, 32) for point_lights in POINT_LIGHTS] + [
+    {"SRBF_K": 25, "SRBF_POINT_LIGHTS": 16, "SRBF_FORMULA": 1}
+]
+LIT_MAPS += [{"SRBF_K": 25, "SRBF_POINT_LIGHTS": 16, "SRBF_PAIRS": 1, "SRBF_PLAIN": 1}]
+LIT_PLANES = [{"SRBF_COMPONENTS": s} | point_lights for s in (9, 256) for point_lights in POINT_LIGHTS] + [
+    {"SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_PLAIN": 1}
+]
 UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range(1, 9))]
 METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
@@ -33,11 +37,11 @@ DEFINES: dict[str, list[dict[str, object]]] = {
     "point.frag": [
         {"SRBF_K": k} | by for k in (1, 25, 64) for by in ({}, {"SRBF_FORMULA": 1}, {"SRBF_PAIRS": 1, "SRBF_PLAIN": 1}, SAMPLED)
     ],
-    "folded.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
+    "projected.frag": [{"SRBF_K": k} for k in (1, 25, 192)],
     **{f"{method}_{lights}.frag": PLANES for method in ("eigen_map", "clustered_eigen_map") for lights in ("directional", "point")},
     "weighted.frag": [{"SRBF_K": k} for k in (1, 25, 64)],
     "environment_rows.frag": [{}, {"SRBF_FORMULA": 1}],
-    **{f"{method}folded.frag": FOLDED for method in METHODS[1:]},
+    **{f"{method}projected.frag": PROJECTED for method in METHODS[1:]},
     **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
     **{f"{method}accumulate.frag": UNITS for method in METHODS},
 }
@@ -47,9 +51,9 @@ VALIDATOR = {"330 core": [], "300 es": [], "450": ["-V", "-R", "--amb", "--aml"]
 
 
 def test_every_method_has_the_same_stages() -> None:
-    kinds = ["accumulate", "directional", "folded", "lightmap", "lights", "point"]
+    kinds = ["accumulate", "directional", "projected", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
-    shadows = ["direct.frag", "direct_on_mesh.frag", "shadow.vert", "shadow_height.frag", "shadow_tint.frag"]
+    shadows = ["direct.frag", "direct_on_mesh.frag", "shadow.vert", "shadow_height.frag", "shadow_transmittance.frag"]
     skies = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
     assert sorted([*methods, *shadows, *skies, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
@@ -91,7 +95,7 @@ def test_the_reference_compiler_accepts_every_stage(name: str, version: str, tmp
 
 
 @pytest.mark.parametrize("file", FILES)
-def test_every_file_states_its_licence_and_only_stages_have_a_main(file: str) -> None:
+def test_every_file_states_its_license_and_only_stages_have_a_main(file: str) -> None:
     text = (ROOT / file).read_text()
     assert text.splitlines()[0] == "// SPDX-License-Identifier: MIT"
     is_stage = file.startswith("stages/")
@@ -104,9 +108,9 @@ def test_every_file_states_its_licence_and_only_stages_have_a_main(file: str) ->
     ("stage", "complaint"),
     [
         ("directional", r"combine/directional\.glsl:\d+.*SRBF_K"),
-        ("eigen_map_point", r"combine/planes_directional\.glsl:\d+.*SRBF_SCALARS"),
-        ("lights", r"combine/lamps\.glsl:\d+.*SRBF_K"),
-        ("eigen_map_lights", r"combine/planes_lamps\.glsl:\d+.*SRBF_SCALARS"),
+        ("eigen_map_point", r"combine/components_directional\.glsl:\d+.*SRBF_COMPONENTS"),
+        ("lights", r"combine/point_lights\.glsl:\d+.*SRBF_K"),
+        ("eigen_map_lights", r"combine/components_point_lights\.glsl:\d+.*SRBF_COMPONENTS"),
     ],
 )
 def test_a_pass_without_its_count_says_which_define_is_missing(context: Any, stage: str, complaint: str) -> None:
@@ -124,7 +128,16 @@ def test_the_readme_says_what_every_stage_and_define_takes() -> None:
     after = text[text.index("## Defines") :]
     for name in STAGES:
         source = (ROOT / "stages" / name).read_text()
-        if name.split(".")[0] in ("direct", "direct_on_mesh", "shadow", "shadow_height", "shadow_tint", "add", "finish", "fullscreen"):
+        if name.split(".")[0] in (
+            "direct",
+            "direct_on_mesh",
+            "shadow",
+            "shadow_height",
+            "shadow_transmittance",
+            "add",
+            "finish",
+            "fullscreen",
+        ):
             continue
         kind = name.split("_")[-1]
         assert f"`{name}`" in after or (f"`…{kind}`" in after), name

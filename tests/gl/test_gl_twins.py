@@ -13,7 +13,7 @@ import depth_twins  # noqa: F401  registers its twins
 import many_lights_twins  # noqa: F401
 import numpy as np
 import pytest
-from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, lamp_expression, twin, units, vec4
+from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, point_light_expression, twin, units, vec4
 
 from srbf.asset import Asset
 from srbf.basis import octahedral_table
@@ -21,7 +21,7 @@ from srbf.basis.gaussian import lookup, r_table
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import padded
 from srbf.lights import DirectionalLight, PointLight, attenuation, spot_cone
-from srbf.methods import coefficient_maps as scalar_planes
+from srbf.methods import coefficient_maps as coefficient_maps
 from srbf.methods.coefficient_maps import first_function
 from srbf.methods.receivers import light_vectors
 from srbf.methods.relighting_map import linear_response, receiver_weights, relight
@@ -104,14 +104,14 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     assert (evaluate("lights/spot_cone.glsl", "vec4(srbfSpotCone(a.x, 3.0, 4.0))", vec4(versine)) == 1).all()
 
 
-@twin("lights/lamp_strength.glsl")
+@twin("lights/point_light_strength.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     asset = make_asset(K)
     positions = np.random.default_rng(6).uniform(-1, 1, (N, 3)).astype(np.float32)
     for light in (POINT, SPOT, replace(SPOT, falloff="linear", inner=0.0, outer=np.pi)):
         vectors = (np.array(light.position) - positions).astype(np.float32)
-        expression = f"vec4(srbfLampStrength({lamp_expression(light)}, a.xyz))"
-        found = evaluate("lights/lamp_strength.glsl", expression, vec4(vectors))[:, 0]
+        expression = f"vec4(srbfPointLightStrength({point_light_expression(light)}, a.xyz))"
+        found = evaluate("lights/point_light_strength.glsl", expression, vec4(vectors))[:, 0]
         _, expected = receiver_weights(asset, light, positions)
         strongest = attenuation(np.linalg.norm(vectors, axis=1), light)
         np.testing.assert_array_less(np.abs(found - expected), SUM * strongest)
@@ -225,18 +225,18 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     assert found.min() < 0.1 and found.max() > 0.9
 
 
-@twin("shadow/wall_tint.glsl")
+@twin("shadow/transmittance.glsl")
 def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     curve = np.random.default_rng(16).uniform(0, 2, (8, 3)).astype(np.float32)
     cosine = np.linspace(-1, 1, N).astype(np.float32)
     found = evaluate(
-        "shadow/wall_tint.glsl",
-        "vec4(srbfWallTint(curve, a.x), 0.0)",
+        "shadow/transmittance.glsl",
+        "vec4(srbfTransmittance(curve, a.x), 0.0)",
         vec4(cosine),
         declarations="uniform vec4 curve[8];",
         arrays={"curve": padded(curve)},
     )[:, :3]
-    np.testing.assert_allclose(found, shadow.wall_tint(np.broadcast_to(curve, (N, 8, 3)), cosine), atol=16 * UNIT)
+    np.testing.assert_allclose(found, shadow.transmittance(np.broadcast_to(curve, (N, 8, 3)), cosine), atol=16 * UNIT)
 
 
 @twin("methods/relighting_map.glsl")
@@ -245,7 +245,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
     _directional(evaluate, asset, file, "srbfRelightDirectional")
     positions = asset.images["position"][0]
     for light in (POINT, SPOT):
-        expression = f"vec4(srbfRelightPoint(maps, uv, 0, rTable, centers, scale, bias, a.xyz, {lamp_expression(light)}), 0.0)"
+        expression = f"vec4(srbfRelightPoint(maps, uv, 0, rTable, centers, scale, bias, a.xyz, {point_light_expression(light)}), 0.0)"
         found = evaluate(file, expression, vec4(positions), **_uploads(asset))[:, :3]
         weights, _ = receiver_weights(asset, light, positions)
         strength = attenuation(np.linalg.norm(np.array(light.position) - positions, axis=1), light)
@@ -282,12 +282,12 @@ def _(evaluate: Evaluate) -> None:
     np.testing.assert_allclose(found, expected, atol=UNIT + 2 * EPS * size)
 
 
-@twin("combine/decode_planes.glsl")
+@twin("combine/decode_components.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(6, None, "uint8", 1, M)
     for i in range(2):
         rows = [np.broadcast_to(x, (M, 4)) for x in (asset.stored[i, 0] / 255, asset.scale[i], asset.bias[i])]
-        found = evaluate("combine/decode_planes.glsl", "srbfDecodePlanes(a, b, c)", *rows)
+        found = evaluate("combine/decode_components.glsl", "srbfDecodeComponents(a, b, c)", *rows)
         np.testing.assert_allclose(found, asset.coefficients()[i, 0], atol=UNIT * float((asset.scale[i] + np.abs(asset.bias[i])).max()))
     assert (found[:, 2:] == 0).all()  # past the last scalar
 
@@ -308,7 +308,7 @@ SUNS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0
 
 def _plane_uploads(asset: Asset) -> dict[str, Any]:
     """Everything that the plane functions read, for one row of M receivers, decoded from floats that are stored / 255."""
-    weights = scalar_planes.folded_weights(asset, SUNS).reshape(asset.clusters, -1, 3)
+    weights = coefficient_maps.projected_weights(asset, SUNS).reshape(asset.clusters, -1, 3)
     return {
         "images": {
             "planes": asset.stored.astype(np.float32) / 255,
@@ -317,7 +317,7 @@ def _plane_uploads(asset: Asset) -> dict[str, Any]:
             "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias},
-        "defines": {"SRBF_SCALARS": asset.scalars},
+        "defines": {"SRBF_COMPONENTS": asset.scalars},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS];",
     }
 
@@ -326,12 +326,12 @@ def _equals_planes(evaluate: Evaluate, file: str, call: str, asset: Asset, light
     """`call` against linear_response, within the contract's share of |w_0| + sum (|stored scale| + |bias|) |w_j|."""
     found = evaluate(file, f"vec4({call}, 0.0)", *rows, **_plane_uploads(asset))[:, :3]
     lights: list[Any] = SUNS if light is None else [light]
-    bias = scalar_planes.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
-    planes = scalar_planes.planes_of(asset.coefficients(), asset.scalars)[:, 0]
+    bias = coefficient_maps.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
+    planes = coefficient_maps.planes_of(asset.coefficients(), asset.scalars)[:, 0]
     terms = np.concatenate([np.ones((1, M)), np.abs(planes) + 2 * bias])  # (S + 1, M)
     function = first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
     if light is None:
-        weights = scalar_planes.folded_weights(asset, lights)[function]
+        weights = coefficient_maps.projected_weights(asset, lights)[function]
     else:
         positions = asset.images["position"][0]
         unit, _ = light_vectors(light, positions)
@@ -340,25 +340,25 @@ def _equals_planes(evaluate: Evaluate, file: str, call: str, asset: Asset, light
         places = np.broadcast_to(unit[:, None], (*function.shape, 3))
         weights = octahedral_table.lookup(asset.tables["w_table"], size, columns, function, places) * strength[:, None, None] * light.color
     bound = np.einsum("fn,nfc->nc", terms, np.abs(weights))
-    assert (np.abs(found - scalar_planes.linear_response(asset, lights)[0]) <= SUM * bound).all()
+    assert (np.abs(found - coefficient_maps.linear_response(asset, lights)[0]) <= SUM * bound).all()
     assert (bound > 0).any()
 
 
-@twin("combine/planes_directional.glsl")
+@twin("combine/components_directional.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
-    call = "srbfCombinePlanesDirectional(planes, uv, 0, weights, int(a.x), scale, bias)"
+    call = "srbfCombineComponentsDirectional(planes, uv, 0, weights, int(a.x), scale, bias)"
     asset = make_planes(K, 7, "uint8", 1, M)
-    _equals_planes(evaluate, "combine/planes_directional.glsl", call, asset, None, vec4(asset.tables["cluster_index"][0]))
+    _equals_planes(evaluate, "combine/components_directional.glsl", call, asset, None, vec4(asset.tables["cluster_index"][0]))
 
 
-@twin("combine/planes_point.glsl")
+@twin("combine/components_point.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, 7, "uint8", 1, M)
     light = replace(POINT, color=(1.0, 1.0, 1.0))
     unit, strength = light_vectors(light, asset.images["position"][0])
-    call = "b.x * srbfCombinePlanesPoint(planes, uv, 0, wTable, 17, int(a.w), a.xyz, scale, bias)"
+    call = "b.x * srbfCombineComponentsPoint(planes, uv, 0, wTable, 17, int(a.w), a.xyz, scale, bias)"
     rows = vec4(unit, asset.tables["cluster_index"][0]), vec4(strength)
-    _equals_planes(evaluate, "combine/planes_point.glsl", call, asset, light, *rows)
+    _equals_planes(evaluate, "combine/components_point.glsl", call, asset, light, *rows)
 
 
 @twin("methods/eigen_map.glsl")
@@ -367,21 +367,21 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     positions = vec4(asset.images["position"][0])
     _equals_planes(evaluate, file, "srbfEigenMapDirectional(planes, uv, 0, weights, scale, bias)", asset, None, positions)
     for light in (POINT, SPOT):
-        call = f"srbfEigenMapPoint(planes, uv, 0, wTable, 17, scale, bias, a.xyz, {lamp_expression(light)})"
+        call = f"srbfEigenMapPoint(planes, uv, 0, wTable, 17, scale, bias, a.xyz, {point_light_expression(light)})"
         _equals_planes(evaluate, file, call, asset, light, positions)
 
 
 @twin("methods/clustered_eigen_map.glsl")
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
-    """By texel, and by the place of a texel's centre; what lies between is tested against numpy's filtered picture elsewhere."""
+    """By texel, and by the place of a texel's center; what lies between is tested against numpy's filtered picture elsewhere."""
     asset, file = make_planes(K, 7, "uint8", 1, M), "methods/clustered_eigen_map.glsl"
     positions = vec4(asset.images["position"][0])
     for name, place in (("", "at"), ("Filtered", "uv")):
         call = f"srbfClusteredDirectional{name}(planes, clusters, {place}, 0, weights, scale, bias)"
         _equals_planes(evaluate, file, call, asset, None, positions)
         for light in (POINT, SPOT):
-            lamp = f"scale, bias, a.xyz, {lamp_expression(light)}"
-            call = f"srbfClusteredPoint{name}(planes, clusters, {place}, 0, wTable, 17, {lamp})"
+            point_light = f"scale, bias, a.xyz, {point_light_expression(light)}"
+            call = f"srbfClusteredPoint{name}(planes, clusters, {place}, 0, wTable, 17, {point_light})"
             _equals_planes(evaluate, file, call, asset, light, positions)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from srbf.gl.uniforms import lamp_uniforms
+from srbf.gl.uniforms import point_light_uniforms
 from srbf.lights import PointLight, SpotLight
 from srbf.sphere import normalize
 
@@ -16,7 +16,7 @@ UNIT = 4 * EPS  # a few roundings of numbers near 1
 SUM = 1e-5  # the contract, of sum |c_i R_i|
 
 N = 97
-M = 64  # texels a row of planes: their centres are exact in float32
+M = 64  # texels a row of planes: their centers are exact in float32
 K = 5
 SPOT = SpotLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.7, falloff="inverse-square")
 POINT = PointLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, radius=0.7)
@@ -45,10 +45,10 @@ def units(n: int, seed: int) -> np.ndarray:
     return normalize(np.random.default_rng(seed).normal(size=(n, 3))).astype(np.float32)
 
 
-def lamp_expression(light: PointLight) -> str:
-    """SrbfLamp(...) with the members in the struct's order."""
-    u = lamp_uniforms(light)
+def point_light_expression(light: PointLight) -> str:
+    """SrbfPointLight(...) with the members in the struct's order."""
+    u = point_light_uniforms(light)
     names = ("position", "positionLow", "color", "axis", "a0", "radius", "versineInner", "versineOuter", "falloff")
     members = [f"vec3({', '.join(map(repr, map(float, u[name])))})" for name in names[:4]]
     members += [repr(float(u[name])) for name in names[4:8]] + [str(u["falloff"])]
-    return f"SrbfLamp({', '.join(members)})"
+    return f"SrbfPointLight({', '.join(members)})"

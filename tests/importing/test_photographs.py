@@ -20,7 +20,7 @@ DIRECTIONS = {"b.png": (0, 0, 2), "a.png": (0.6, 0, 0.8), "c with space.png": (0
 
 @pytest.fixture
 def photographs(tmp_path: Path) -> Path:
-    """Three 8-bit images of constant grey 50, 100, 150, listed neither by name nor by order."""
+    """Three 8-bit images of constant gray 50, 100, 150, listed neither by name nor by order."""
     for level, name in zip((50, 100, 150), DIRECTIONS, strict=True):
         write_image(tmp_path / name, np.full((4, 6, 3), level, np.uint8), "uint8")
     lines = [f"{name} {x} {y} {z}" for name, (x, y, z) in DIRECTIONS.items()]
@@ -98,7 +98,7 @@ def test_names_with_folders_and_an_image_taken_twice(tmp_path: Path) -> None:
         LightListImport(tmp_path / "l.lp", "linear").write(tmp_path / "again")
 
 
-def test_alpha_does_not_darken_colour(tmp_path: Path) -> None:
+def test_alpha_does_not_darken_color(tmp_path: Path) -> None:
     from PIL import Image  # OpenImageIO would divide by alpha when it writes
 
     Image.fromarray(np.full((2, 2, 4), 128, np.uint8)).save(tmp_path / "a.png")

@@ -69,10 +69,10 @@ def test_nan_is_named_with_its_texel(tmp_path: Path) -> None:
         require_finite(pixels, tmp_path / "x.exr")
 
 
-def test_grey_is_repeated_and_alpha_dropped(tmp_path: Path) -> None:
-    write_image(tmp_path / "grey.exr", np.full((2, 2, 1), 0.5, np.float32), "float")
+def test_gray_is_repeated_and_alpha_dropped(tmp_path: Path) -> None:
+    write_image(tmp_path / "gray.exr", np.full((2, 2, 1), 0.5, np.float32), "float")
     write_image(tmp_path / "rgba.exr", np.arange(16, dtype=np.float32).reshape(2, 2, 4), "float")
-    assert read_image(tmp_path / "grey.exr", 3).shape == (2, 2, 3)
+    assert read_image(tmp_path / "gray.exr", 3).shape == (2, 2, 3)
     np.testing.assert_array_equal(read_image(tmp_path / "rgba.exr", 3)[0, 1], [4, 5, 6])
 
 

@@ -23,17 +23,17 @@ def planted(clusters: int, scalars: int, seed: int = 0):
     labels = rng.integers(clusters, size=(HEIGHT, WIDTH))
     planes = rng.normal(size=(scalars, HEIGHT, WIDTH))
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         means, functions = rng.normal(size=(clusters, 3)) * 2, rng.normal(size=(clusters, scalars, 3))
         return means[labels] + np.einsum("jhw,hwjc->hwc", planes, functions[labels])
 
-    return answer, labels
+    return response, labels
 
 
 @pytest.mark.parametrize(("clusters", "scalars"), [(1, 4), (4, 2), (5, 1)])
 def test_planted_clusters_are_reproduced(make_capture, clusters: int, scalars: int) -> None:
-    answer, labels = planted(clusters, scalars)
-    capture: Capture = make_capture(answer, lights=40, holdout=0)
+    response, labels = planted(clusters, scalars)
+    capture: Capture = make_capture(response, lights=40, holdout=0)
     asset = ClusteredEigenMap(clusters, scalars, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
     expected = np.stack([capture.image(i) for i in capture.indices("train")])
     got = directional_responses(asset, capture.directions())
@@ -52,15 +52,15 @@ def test_one_cluster_is_an_eigen_map(make_capture) -> None:
     directions = capture.directions(capture.indices("holdout"))
     settings = {"scalars": 5, "spread": 0.5, "ridge": 0.01, "encoding": "float"}
     expected = directional_responses(EigenMap(**settings).encode(capture), directions)
-    # The centre of a cluster's range and the mean of the sample differ, their sums do not; axes come of few steps of iteration.
+    # The center of a cluster's range and the mean of the sample differ, their sums do not; axes come of few steps of iteration.
     got = directional_responses(ClusteredEigenMap(clusters=1, **settings).encode(capture), directions)
     assert np.sqrt(((got - expected) ** 2).mean()) < 0.01 * np.sqrt((expected**2).mean())
 
 
 def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
-    answer, _ = planted(4, 3, seed=3)
+    response, _ = planted(4, 3, seed=3)
     coverage = (np.random.default_rng(4).random((HEIGHT, WIDTH)) > 0.2).astype(np.float32)
-    asset = ClusteredEigenMap(4, 3, encoding="float").encode(make_capture(answer, lights=40, coverage=coverage))
+    asset = ClusteredEigenMap(4, 3, encoding="float").encode(make_capture(response, lights=40, coverage=coverage))
     planes = asset.coefficients()[0]
     for number in range(4):
         own = planes[(asset.tables["cluster_index"] == number) & (coverage > 0)]
@@ -70,8 +70,8 @@ def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
 
 
 def test_bytes_cost_little(make_capture) -> None:
-    answer, _ = planted(4, 3, seed=5)
-    capture = make_capture(answer, lights=60, holdout=0).kept()
+    response, _ = planted(4, 3, seed=5)
+    capture = make_capture(response, lights=60, holdout=0).kept()
     settings = {"spread": 0.3, "ridge": 1e-3}
     images = np.stack([capture.image(i) for i in capture.indices("train")])
     assets = [ClusteredEigenMap(4, 3, encoding=encoding, **settings).encode(capture) for encoding in ("float", "uint8")]
@@ -101,25 +101,25 @@ def test_settings_that_no_clustered_eigen_map_has(settings: dict) -> None:
 def test_more_clusters_than_texels(make_capture) -> None:
     coverage = np.zeros((HEIGHT, WIDTH), np.float32)
     coverage[3, 4:9] = 1
-    answer, _ = planted(3, 2)
-    capture = make_capture(answer, lights=30, coverage=coverage)
+    response, _ = planted(3, 2)
+    capture = make_capture(response, lights=30, coverage=coverage)
     asset = ClusteredEigenMap(clusters=16, scalars=3).encode(capture)
     assert asset.tables["cluster_index"].max() < asset.clusters <= 16
     assert np.isfinite(directional_responses(asset, capture.directions())).all()
 
 
 def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
-    """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbours' clusters."""
+    """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
     height, width, band = 512, 256, 16
     facing = np.random.default_rng(5).normal(size=(height // band, 3))
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     plane = np.random.default_rng(6).random((height, width, 1), np.float32)
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         bump = np.repeat(np.exp(4 * (facing @ direction - 1)), band)[:, None, None]
         return (bump * (1 + plane)).repeat(3, axis=2)
 
-    capture = make_capture(answer, lights=24, holdout=0, encoding="half")
+    capture = make_capture(response, lights=24, holdout=0, encoding="half")
     asset = ClusteredEigenMap(2 * height // band, 2, spread=0.3, ridge=1e-9).encode(capture)
     error = np.zeros(height)
     for i in capture.indices("train"):

@@ -28,7 +28,7 @@ def planted(rank: int, seed: int = 0):
     return lambda direction: rng.normal(size=3) + np.einsum("jhw,jc->hwc", planes, rng.normal(size=(rank, 3)))
 
 
-BALLS = [((0.3, 0.2, 0.5), 0.3), ((-0.5, 0.4, 0.4), 0.25), ((0, -0.5, 0.6), 0.3)]  # centre, radius
+BALLS = [((0.3, 0.2, 0.5), 0.3), ((-0.5, 0.4, 0.4), 0.25), ((0, -0.5, 0.6), 0.3)]  # center, radius
 PENUMBRA = 0.5  # rad
 
 
@@ -37,17 +37,17 @@ def softly_shadowed(height: int, width: int):
     x, y = np.meshgrid(-1 + 2 * (np.arange(width) + 0.5) / width, 1 - 2 * (np.arange(height) + 0.5) / height)
     albedo = np.where((np.floor(3 * x) + np.floor(3 * y)) % 2 == 0, 0.4, 0.8)[..., None] * [1, 0.8, 0.5]
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         image = max(direction[2], 0) * albedo
-        for centre, radius in BALLS:
-            to_ball = np.array(centre) - np.stack([x, y, np.zeros_like(x)], axis=-1)
+        for center, radius in BALLS:
+            to_ball = np.array(center) - np.stack([x, y, np.zeros_like(x)], axis=-1)
             distance = np.linalg.norm(to_ball, axis=-1)
             off = np.arccos(np.clip(to_ball @ direction / distance, -1, 1)) - np.arcsin(radius / distance)
             t = np.clip(off / PENUMBRA + 0.5, 0, 1)
             image = image * (t * t * (3 - 2 * t))[..., None]
         return image
 
-    return answer
+    return response
 
 
 @pytest.mark.parametrize("rank", [1, 3, 6])

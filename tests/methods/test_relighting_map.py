@@ -15,7 +15,7 @@ from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
 from srbf.methods.receivers import outside_domain
-from srbf.methods.relighting_map import RelightingMap, folded_weights, linear_response, relight
+from srbf.methods.relighting_map import RelightingMap, linear_response, projected_weights, relight
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
@@ -25,7 +25,7 @@ ALBEDO = np.array([0.8, 0.5, 0.2])
 
 
 def lambert(shape: tuple[int, int]):
-    """A plane facing up: E = max(0, z), times a colour so that channels differ."""
+    """A plane facing up: E = max(0, z), times a color so that channels differ."""
     return lambda direction: np.broadcast_to(max(0.0, direction[2]) * ALBEDO, (*shape, 3))
 
 
@@ -75,11 +75,11 @@ def test_lambert_under_a_directional_light(plane: Asset) -> None:
 
 @pytest.mark.parametrize(("falloff", "power"), [("linear", 1), ("inverse-square", 2)])
 def test_lambert_under_a_point_light(plane: Asset, plane_positions: np.ndarray, falloff: str, power: int) -> None:
-    lamp = np.array([0.3, -0.2, 1.5])
-    vectors = lamp - plane_positions
+    point_light = np.array([0.3, -0.2, 1.5])
+    vectors = point_light - plane_positions
     distance = np.linalg.norm(vectors, axis=2)
     expected = vectors[..., 2] / distance * (1.2 / distance) ** power
-    got = relight(plane, [PointLight(tuple(lamp), a0=1.2, falloff=falloff)])
+    got = relight(plane, [PointLight(tuple(point_light), a0=1.2, falloff=falloff)])
     np.testing.assert_allclose(got, np.repeat(expected[..., None], 3, axis=2), atol=FIT)
 
 
@@ -105,7 +105,7 @@ def test_environment_weight_is_the_integral_of_r(plane: Asset) -> None:
     r = np.sqrt(1 - z**2)
     grid = np.stack([r[:, None] * np.cos(azimuth), r[:, None] * np.sin(azimuth), np.repeat(z[:, None], 200, axis=1)], axis=-1)
     exact = plane.basis.evaluate(grid.reshape(-1, 3)).mean(axis=0) * 2 * np.pi
-    got = folded_weights(plane, [EnvironmentLight(np.ones((128, 256, 3), np.float32))])
+    got = projected_weights(plane, [EnvironmentLight(np.ones((128, 256, 3), np.float32))])
     np.testing.assert_allclose(got, np.repeat(exact[:, None], 3, axis=1), rtol=2e-3)
 
 
@@ -124,8 +124,8 @@ def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
     expected = relight(plane, [DirectionalLight(tuple(direction))])
     errors = []
     for distance in (10.0, 100.0, 1000.0):
-        lamp = PointLight(tuple(direction * distance), a0=distance)
-        errors.append(np.abs(relight(plane, [lamp]) - expected).max())
+        point_light = PointLight(tuple(direction * distance), a0=distance)
+        errors.append(np.abs(relight(plane, [point_light]) - expected).max())
     assert errors[0] > errors[1] > errors[2]
     assert errors[2] < 0.005  # the square spans 1.4 m of 1000 m
 
@@ -186,10 +186,10 @@ def test_a_moved_asset_is_lit_where_it_stands(plane: Asset) -> None:
     to_asset = np.eye(4)
     to_asset[:3, :3], to_asset[:3, 3] = turn.T, -turn.T @ at
     instance = replace(plane, manifest={**plane.manifest, "asset_from_world": to_asset.tolist()})
-    lamp, direction = np.array([0.3, -0.2, 1.5]), np.array([0.48, 0.36, 0.8])
+    point_light, direction = np.array([0.3, -0.2, 1.5]), np.array([0.48, 0.36, 0.8])
     np.testing.assert_allclose(
-        relight(instance, [PointLight(tuple(turn @ lamp + at)), DirectionalLight(tuple(turn @ direction))]),
-        relight(plane, [PointLight(tuple(lamp)), DirectionalLight(tuple(direction))]),
+        relight(instance, [PointLight(tuple(turn @ point_light + at)), DirectionalLight(tuple(turn @ direction))]),
+        relight(plane, [PointLight(tuple(point_light)), DirectionalLight(tuple(direction))]),
         atol=1e-5,
     )
 

@@ -15,7 +15,7 @@ from srbf.io.image import write_image
 from srbf.report import abrdf_mosaic, canvas
 from srbf.sphere import point_set, random_directions
 
-SPHERES = np.array([[-0.75, 0.1, 0.38, 0.38], [0.35, 0.35, 0.26, 0.26], [0.75, -0.4, 0.45, 0.2]])  # x, y, z, radius; metres
+SPHERES = np.array([[-0.75, 0.1, 0.38, 0.38], [0.35, 0.35, 0.26, 0.26], [0.75, -0.4, 0.45, 0.2]])  # x, y, z, radius; meters
 
 
 @dataclass(frozen=True)
@@ -26,13 +26,13 @@ class Scene:
     normal: np.ndarray
     albedo: np.ndarray
 
-    def answer(self, light: np.ndarray) -> np.ndarray:
+    def response(self, light: np.ndarray) -> np.ndarray:
         """Radiance under a directional light of unit irradiance: albedo / pi * NoL * visibility."""
         lit = np.maximum(self.normal @ light, 0)
         start = self.position + 1e-4 * self.normal
-        for *centre, radius in SPHERES:
-            along = (centre - start) @ light
-            square = ((centre - start) ** 2).sum(axis=-1) - along**2
+        for *center, radius in SPHERES:
+            along = (center - start) @ light
+            square = ((center - start) ** 2).sum(axis=-1) - along**2
             lit = np.where((along > 0) & (square < radius**2), 0, lit)
         return self.albedo / np.pi * lit[..., None]
 
@@ -45,13 +45,13 @@ def scene(height: int, width: int) -> Scene:
     chequer = ((np.floor(x * 3) + np.floor(y * 3)) % 2)[..., None]
     position, normal = np.stack([x, y, 0 * x], 2), np.broadcast_to([0.0, 0.0, 1.0], (height, width, 3))
     albedo = np.where(chequer > 0, [0.75, 0.72, 0.66], [0.30, 0.42, 0.50])
-    for (cx, cy, cz, radius), colour in zip(SPHERES, ([0.8, 0.3, 0.2], [0.85, 0.7, 0.25], [0.35, 0.65, 0.4]), strict=True):
+    for (cx, cy, cz, radius), color in zip(SPHERES, ([0.8, 0.3, 0.2], [0.85, 0.7, 0.25], [0.35, 0.65, 0.4]), strict=True):
         square = radius**2 - (x - cx) ** 2 - (y - cy) ** 2
         top = cz + np.sqrt(np.maximum(square, 0))
         hit = (square > 0) & (top > position[..., 2])
         surface = np.stack([x, y, top], 2)
         normal = np.where(hit[..., None], (surface - [cx, cy, cz]) / radius, normal)
-        albedo = np.where(hit[..., None], colour, albedo)
+        albedo = np.where(hit[..., None], color, albedo)
         position = np.where(hit[..., None], surface, position)
     return Scene(position, normal, albedo)
 
@@ -85,7 +85,7 @@ def write_capture(
     (folder / "lights").mkdir(parents=True)
     lights = []
     for i, (direction, role) in enumerate(directions):
-        image = np.where(coverage[..., None] > 0, seen.answer(direction), 50.0).astype(np.float32)
+        image = np.where(coverage[..., None] > 0, seen.response(direction), 50.0).astype(np.float32)
         write_image(folder / f"lights/{i:04d}.exr", image, "half")
         lights.append({"kind": "directional", "direction": direction.tolist(), "role": role, "file": f"lights/{i:04d}.exr"})
     manifest = {

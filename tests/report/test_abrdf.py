@@ -49,8 +49,8 @@ def lambert(tmp_path_factory: pytest.TempPathFactory) -> Capture:
     (folder / "lights").mkdir()
     lights = []
     for i, direction in enumerate(point_set("hammersley", LIGHTS, "hemisphere")):
-        answer = np.repeat(np.maximum(normals() @ direction, 0)[..., None], 3, axis=2) * [1, 0.5, 0.25]
-        write_image(folder / f"lights/{i}.exr", answer.astype(np.float32), "half")
+        response = np.repeat(np.maximum(normals() @ direction, 0)[..., None], 3, axis=2) * [1, 0.5, 0.25]
+        write_image(folder / f"lights/{i}.exr", response.astype(np.float32), "half")
         lights.append({"kind": "directional", "direction": direction.tolist(), "role": "train", "file": f"lights/{i}.exr"})
     manifest = {"format": "srbf-capture", "version": 1, "quantity": "radiance", "width": WIDTH, "height": HEIGHT, "lights": lights}
     files.write_json(folder / "capture.json", manifest)
@@ -64,19 +64,19 @@ def every_receiver() -> csr_array:
 @pytest.mark.parametrize("projection", ["equal-area", "orthographic", "latitude-longitude"])
 def test_lambert_tiles_are_the_cosine(lambert: Capture, projection: str) -> None:
     directions = tile_directions(20, projection)  # type: ignore[arg-type]
-    answers = rebin(lambert, range(LIGHTS), every_receiver())
-    tiles = captured_tiles(answers, lambert.directions(), directions)
+    responses = rebin(lambert, range(LIGHTS), every_receiver())
+    tiles = captured_tiles(responses, lambert.directions(), directions)
     above = directions[..., 2] > 0
     expected = np.maximum(normals().reshape(-1, 3) @ directions[above].T, 0)
     assert np.abs(tiles[:, above, 0] - expected).max() < COVERING + HALF_STEP
-    assert np.abs(tiles[:, above, 0] - expected).mean() < 0.5 * SPACING  # a square's points lie 0.38 sides from its centre on average
+    assert np.abs(tiles[:, above, 0] - expected).mean() < 0.5 * SPACING  # a square's points lie 0.38 sides from its center on average
     assert np.array_equal(np.isnan(tiles[0, ..., 0]), np.isnan(directions[..., 0]))
 
 
 def test_a_pixel_holds_the_nearest_light_exactly(lambert: Capture) -> None:
     directions = tile_directions(15, "equal-area")
-    answers = rebin(lambert, range(LIGHTS), every_receiver())
-    tiles = captured_tiles(answers, lambert.directions(), directions)
+    responses = rebin(lambert, range(LIGHTS), every_receiver())
+    tiles = captured_tiles(responses, lambert.directions(), directions)
     for row, column in ((7, 7), (2, 9), (11, 3)):
         nearest = int(np.argmin([np.arccos(min(1.0, float(d @ directions[row, column]))) for d in lambert.directions()]))
         assert np.array_equal(tiles[:, row, column], lambert.image(nearest).reshape(-1, 3))
@@ -142,9 +142,9 @@ def test_a_tile_without_receivers_is_nan_before_and_after(lambert: Capture) -> N
     coverage = np.ones((HEIGHT, WIDTH), np.float32)
     coverage[:3, :3] = 0
     blocks = block_means(coverage, (2, 3))
-    answers = rebin(lambert, range(40), blocks)
+    responses = rebin(lambert, range(40), blocks)
     fitted = fitted_tiles(RelightingMap(k=9).encode(lambert), blocks, tile_directions(5, "equal-area"))
-    for values in (answers.transpose(1, 0, 2), fitted[:, 2, 2]):
+    for values in (responses.transpose(1, 0, 2), fitted[:, 2, 2]):
         assert np.isnan(values[0]).all() and np.isfinite(values[1:]).all()
 
 

@@ -23,12 +23,12 @@ from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 from srbf.report.canvas import UNCOVERED, shown, shown_signed
 from srbf.report.contact_sheet import difference_gain
-from srbf.report.lamps import demonstration_lamps, stage_of
+from srbf.report.point_lights import demonstration_point_lights, stage_of
 from srbf.report.subject import EXPOSURE_LEVEL, EXPOSURE_QUANTILE, gather
 from srbf.sphere import farthest_points
 
 ALWAYS = {"contact_sheet.png", "sum_of_maps.png", "centers.png", "r_curve.png", "abrdf_tiles.png"}
-LAMPS = {"point_light.png", "point_strip.png", "spot_strip.png"}
+POINT_LIGHTS = {"point_light.png", "point_strip.png", "spot_strip.png"}
 MakeCapture = Callable[..., Capture]
 PAGES = {"report.md", "index.html"}
 BYTE = 1 / 255
@@ -79,9 +79,9 @@ def assert_shows_something(path: Path) -> None:
 
 def test_a_report_leaves_every_file(report: Path) -> None:
     found = {path.name for path in report.iterdir()}
-    assert found >= ALWAYS | LAMPS | PAGES
-    assert found - (ALWAYS | LAMPS | PAGES) <= {"animation.webp", "animation.gif"}
-    for name in ALWAYS | LAMPS:
+    assert found >= ALWAYS | POINT_LIGHTS | PAGES
+    assert found - (ALWAYS | POINT_LIGHTS | PAGES) <= {"animation.webp", "animation.gif"}
+    for name in ALWAYS | POINT_LIGHTS:
         assert_shows_something(report / name)
 
 
@@ -99,9 +99,9 @@ def test_the_animation_moves_and_is_small(report: Path) -> None:
 def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report: Path) -> None:
     html, markdown = (report / "index.html").read_text(), (report / "report.md").read_text()
     sources = re.findall(r'src="([^"]*)"', html)
-    assert len(sources) > len(ALWAYS | LAMPS) and all(source.startswith("data:image/") for source in sources)
+    assert len(sources) > len(ALWAYS | POINT_LIGHTS) and all(source.startswith("data:image/") for source in sources)
     assert not re.search(r"href=|url\(|@import|<script|<link", html)
-    for name in ALWAYS | LAMPS:
+    for name in ALWAYS | POINT_LIGHTS:
         assert f"]({name})" in markdown and name not in html
     for text in (re.sub(r"data:[^\"]*", "", html), markdown):
         assert "http" not in text and str(report.parent) not in text
@@ -123,9 +123,9 @@ def test_equal_inputs_give_equal_files(full: Case, report: Path, tmp_path: Path)
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
-def test_holes_are_grey_and_a_sphere_has_two_discs(holed: Case, tmp_path: Path) -> None:
+def test_holes_are_gray_and_a_sphere_has_two_discs(holed: Case, tmp_path: Path) -> None:
     holed.write(tmp_path)
-    for name in ALWAYS | LAMPS:
+    for name in ALWAYS | POINT_LIGHTS:
         assert_shows_something(tmp_path / name)
     sheet = read_image(tmp_path / "contact_sheet.png", 3)
     assert (np.abs(sheet - UNCOVERED).max(axis=2) < 2 * BYTE).mean() > 0.05  # a twelfth and three rows of each image are not covered
@@ -140,15 +140,15 @@ def test_without_holdout_lights_the_report_says_what_it_compares(make_capture: M
     bare.write(tmp_path)
     text = (tmp_path / "report.md").read_text()
     assert "neither holdout nor validation" in text and "no position map" in text
-    assert {path.name for path in tmp_path.iterdir()} & LAMPS == set()
+    assert {path.name for path in tmp_path.iterdir()} & POINT_LIGHTS == set()
     for name in ALWAYS:
         assert_shows_something(tmp_path / name)
 
 
-def test_given_lamps_replace_the_derived_ones(full: Case) -> None:
-    lamp = PointLight((0.2, 0.1, 2.0), a0=2.0)
-    subject = gather(full.asset, full.capture, full.evaluation, [lamp])
-    assert subject.points == (lamp,) and len(subject.spots) == 6
+def test_given_point_lights_replace_the_derived_ones(full: Case) -> None:
+    point_light = PointLight((0.2, 0.1, 2.0), a0=2.0)
+    subject = gather(full.asset, full.capture, full.evaluation, [point_light])
+    assert subject.points == (point_light,) and len(subject.spots) == 6
 
 
 def test_another_capture_is_refused(full: Case, holed: Case, tmp_path: Path) -> None:
@@ -163,17 +163,17 @@ def test_exposure_brings_the_references_to_its_level(full: Case) -> None:
     assert subject.role == "holdout" and len(set(subject.shown)) == 6
 
 
-def test_a_lamp_on_the_right_brightens_what_faces_right(full: Case) -> None:
+def test_a_point_light_on_the_right_brightens_what_faces_right(full: Case) -> None:
     subject = gather(full.asset, full.capture, full.evaluation, None)
     x = full.asset.images["normal"][..., 0]
-    for lamp, side in ((subject.points[0], -1), (subject.points[-1], 1)):
-        assert lamp.position[0] * side > 0.5
-        assert lamp.position[2] > full.asset.images["position"][..., 2].max()  # above the receivers, not among them
-        image = relight(full.asset, [lamp])
+    for point_light, side in ((subject.points[0], -1), (subject.points[-1], 1)):
+        assert point_light.position[0] * side > 0.5
+        assert point_light.position[2] > full.asset.images["position"][..., 2].max()  # above the receivers, not among them
+        image = relight(full.asset, [point_light])
         assert image[x * side > 0.5].mean() > 2 * image[x * side < -0.5].mean()
 
 
-def test_lamps_stand_in_front_of_a_wall_and_inside_a_room(full: Case) -> None:
+def test_point_lights_stand_in_front_of_a_wall_and_inside_a_room(full: Case) -> None:
     def asset(position: np.ndarray, normal: np.ndarray) -> Asset:
         images = {"position": position.astype(np.float32), "normal": normal.astype(np.float32)}
         return Asset(
@@ -188,14 +188,14 @@ def test_lamps_stand_in_front_of_a_wall_and_inside_a_room(full: Case) -> None:
     s, t = np.meshgrid(np.linspace(-2, 2, 16), np.linspace(0, 3, 12))
     everywhere = np.ones((12, 16), bool)
     wall = asset(np.stack([0 * s, s, t], 2), np.broadcast_to([-1.0, 0.0, 0.0], (12, 16, 3)))
-    points, _ = demonstration_lamps(wall, everywhere, None)
+    points, _ = demonstration_point_lights(wall, everywhere, None)
     assert all(light.position[0] < -0.3 for light in points)
     angle = np.linspace(0, 2 * np.pi, 16)
     ring = np.stack([np.broadcast_to(3 * np.cos(angle), s.shape), np.broadcast_to(3 * np.sin(angle), s.shape), t], 2)
     inward = -ring * [1 / 3, 1 / 3, 0]
     room = asset(ring, inward)
     assert stage_of(room, everywhere).inside
-    points, _ = demonstration_lamps(room, everywhere, None)
+    points, _ = demonstration_point_lights(room, everywhere, None)
     assert all(np.hypot(*light.position[:2]) < 3 and 0 < light.position[2] < 3 for light in points)
 
 

@@ -15,7 +15,7 @@ L, P, C, J, G = 17, 230, 3, 4, 5
 @pytest.mark.parametrize("block", [1, 6, L])
 @pytest.mark.parametrize("columns", [7, 4096])
 def test_equals_einsum(kind: type, block: int, columns: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.solve.grouped_product.COLUMNS_AT_A_TIME", columns)
+    monkeypatch.setattr("srbf.solve.grouped_product.COLUMN_BATCH", columns)
     rng = np.random.default_rng(0)
     rows = rng.normal(size=(L, P, C)).astype(kind)
     weights = rng.normal(size=(G, J, L, C)).astype(np.float32)

@@ -7,7 +7,7 @@ import pytest
 
 from srbf.solve.least_squares import StreamedLeastSquares
 
-FLOAT32_STREAM = 2e-6  # relative: products are float32, the factorisation float64
+FLOAT32_STREAM = 2e-6  # relative: products are float32, the factorization float64
 
 
 def fed(matrix: np.ndarray, right: np.ndarray, ridge: float, block: int) -> StreamedLeastSquares:

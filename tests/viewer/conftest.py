@@ -51,16 +51,16 @@ class Browser:
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         assert line, "expected an answer of the browser, found it gone"
-        answer = json.loads(line)
-        assert "error" not in answer, answer
-        bad = [said for said in answer["said"] if said.startswith("error")]
+        response = json.loads(line)
+        assert "error" not in response, response
+        bad = [said for said in response["said"] if said.startswith("error")]
         assert self.may_fail or not bad, bad
-        return answer.get("value")
+        return response.get("value")
 
     def canvas(self) -> np.ndarray:
         """(H, W, 3) bytes of the canvas."""
-        answer = self("canvas")
-        return np.frombuffer(base64.b64decode(answer["bytes"]), np.uint8).reshape(answer["height"], answer["width"], 4)[..., :3]
+        response = self("canvas")
+        return np.frombuffer(base64.b64decode(response["bytes"]), np.uint8).reshape(response["height"], response["width"], 4)[..., :3]
 
     def texels(self, width: int, height: int, zoom: int) -> np.ndarray:
         """The picture on the canvas, of which each texel is `zoom` x `zoom` equal pixels: (H, W, 3) bytes."""
@@ -68,7 +68,7 @@ class Browser:
         top = round(canvas.shape[0] / 2 - height * zoom / 2)
         left = round(canvas.shape[1] / 2 - width * zoom / 2)
         blocks = canvas[top : top + height * zoom, left : left + width * zoom].reshape(height, zoom, width, zoom, 3)
-        assert (blocks == blocks[:, :1, :, :1]).all(), "texels are not squares of one colour"
+        assert (blocks == blocks[:, :1, :, :1]).all(), "texels are not squares of one color"
         return blocks[:, 0, :, 0]
 
     def state(self) -> dict[str, Any]:

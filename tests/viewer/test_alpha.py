@@ -78,10 +78,10 @@ def test_the_captures_own_picture_is_cut_out_alike(chromium: Any, make_capture: 
     asset = ball()
     share = asset.images["coverage"]
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         return np.maximum(linear_response(asset, [DirectionalLight(tuple(direction))]), 0)
 
-    capture = make_capture(answer, lights=12, holdout=0, coverage=share, position=asset.images["position"])
+    capture = make_capture(response, lights=12, holdout=0, coverage=share, position=asset.images["position"])
     files.write_json(capture.folder / "capture.json", {**capture.manifest, "receiver": {"kind": "view", "camera": "Camera"}})
     asset.save(tmp_path / "asset")
     url = serve(tmp_path / "asset", capture.folder)

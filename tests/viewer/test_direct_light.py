@@ -51,7 +51,7 @@ def test_terms_are_the_shadow_map_s_and_the_maps(chromium: Any, split: Asset, se
     split.save(tmp_path / "asset")
     lights = [DirectionalLight((-0.45, -0.5, 0.74))]
     with Added(split, "shadow-map") as added:
-        direct = added.answer(lights)
+        direct = added.response(lights)
     expected = {"both": relight(split, lights, direct), "direct": direct, "indirect": relight(split, lights)}
     assert np.abs(expected["both"] - expected["direct"]).max() > 0.05
     url = serve(tmp_path / "asset")
@@ -66,7 +66,9 @@ def test_terms_are_the_shadow_map_s_and_the_maps(chromium: Any, split: Asset, se
         assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART), terms
 
 
-def test_lamps_say_that_their_direct_light_is_missing(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+def test_point_lights_say_that_their_direct_light_is_missing(
+    chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path
+) -> None:
     split.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
     assert "indirect light alone" not in chromium("run", script="document.getElementById('status').textContent")
@@ -78,7 +80,7 @@ def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[
     export(split, "web", tmp_path / "site")
     lights = [DirectionalLight((-0.45, -0.5, 0.74))]
     with Added(split, "shadow-map") as added:
-        expected = relight(split, lights, added.answer(lights))
+        expected = relight(split, lights, added.response(lights))
     where = f"#{{'zoom':{ZOOM},'middle':[{SIDE / 2},{SIDE / 2}],'exposure':0,'view':'texels'}}"
     chromium("open", url=serve_static(tmp_path / "site") + where, width=WIDTH, height=HEIGHT)
     apart = np.abs(chromium.texels(SIDE, SIDE, ZOOM) - shown_as(expected))

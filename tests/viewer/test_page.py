@@ -72,20 +72,32 @@ def test_a_sun_dragged_over_the_sky_relights(chromium: Any, asset: Asset, url: s
 
 
 @pytest.mark.parametrize("kind", ["relighting-map", "eigen-map", "clustered-eigen-map"])
-def test_lamps_and_suns_together_are_numpys(
+def test_point_lights_and_suns_together_are_numpys(
     chromium: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path, kind: str
 ) -> None:
-    """Typed into the panel; each light's colour and falloff its own."""
+    """Typed into the panel; each light's color and falloff its own."""
     made = make_asset(k=6) if kind == "relighting-map" else make_planes(scalars=5, clusters=4 if kind.startswith("c") else None)
     asset = complete(on_a_plane(made))
     asset.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset") + PICTURE + ",'exposure':-1}", width=WIDTH, height=HEIGHT)
     chromium("number", name="Intensity", value=0.4)
     chromium("choose", selector=".chip.add", value="point")
-    for name, value in {"Lamp x (m)": 0.3, "Lamp y (m)": -0.4, "Lamp z (m)": 0.9, "a₀ (m)": 0.8, "Intensity": 0.7}.items():
+    for name, value in {
+        "Point light x (m)": 0.3,
+        "Point light y (m)": -0.4,
+        "Point light z (m)": 0.9,
+        "a₀ (m)": 0.8,
+        "Intensity": 0.7,
+    }.items():
         chromium("number", name=name, value=value)
     chromium("choose", selector=".chip.add", value="spot")
-    for name, value in {"Lamp x (m)": -0.5, "Lamp z (m)": 1.25, "Aim x (m)": 0.5, "Full within (°)": 12, "None past (°)": 35}.items():
+    for name, value in {
+        "Point light x (m)": -0.5,
+        "Point light z (m)": 1.25,
+        "Aim x (m)": 0.5,
+        "Full within (°)": 12,
+        "None past (°)": 35,
+    }.items():
         chromium("number", name=name, value=value)
     (lights,) = lights_of(chromium, tmp_path)
     assert [type(light).__name__ for light in lights] == ["DirectionalLight", "PointLight", "SpotLight"]
@@ -96,7 +108,7 @@ def test_lamps_and_suns_together_are_numpys(
 def test_an_address_brings_everything_back(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url + PICTURE + ",'tone':'agx','exposure':0.5}", width=WIDTH, height=HEIGHT)
     chromium("choose", selector=".chip.add", value="point")
-    chromium("number", name="Lamp x (m)", value=0.31)
+    chromium("number", name="Point light x (m)", value=0.31)
     chromium("press", keys=["1", "ArrowLeft", "Shift+ArrowUp"])
     there, seen = chromium("address"), chromium.texels(asset.width, asset.height, ZOOM)
     kept = chromium.state()
@@ -230,7 +242,7 @@ def test_a_map_is_shown_signed(chromium: Any, asset: Asset, url: str) -> None:
         chromium("press", keys=["m"])
 
 
-def test_a_tap_places_a_lamp_above_the_texel(chromium: Any, asset: Asset, url: str) -> None:
+def test_a_tap_places_a_point_light_above_the_texel(chromium: Any, asset: Asset, url: str) -> None:
     """On a touch screen, twice: above what the position map has there."""
     chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT, touch=True)
     row, column = 2, 9
@@ -239,10 +251,10 @@ def test_a_tap_places_a_lamp_above_the_texel(chromium: Any, asset: Asset, url: s
     at = [(WIDTH - PANEL) / 2 + (column - 7 + 0.4) * ZOOM, HEIGHT / 2 + (row - 4.5 + 0.6) * ZOOM]
     chromium("touch", at=at, count=2)
     chromium("press", keys=["2"])
-    lamp = chromium.state()["lights"][1]
-    assert lamp["kind"] == "point"
-    assert lamp["position"][:2] == pytest.approx(place[:2].tolist(), abs=1e-4)
-    assert lamp["position"][2] > place[2] + 0.05
+    point_light = chromium.state()["lights"][1]
+    assert point_light["kind"] == "point"
+    assert point_light["position"][:2] == pytest.approx(place[:2].tolist(), abs=1e-4)
+    assert point_light["position"][2] > place[2] + 0.05
 
 
 def test_a_damaged_asset_is_said_in_one_line(

@@ -24,26 +24,28 @@ CANVAS = (WIDTH - PANEL, HEIGHT)
 TURN = np.radians(38) / 2  # half the orbit camera's field of view, upwards
 
 
-def test_a_lamp_is_pulled_up_by_its_handle(
+def test_a_point_light_is_pulled_up_by_its_handle(
     chromium: Any, make_asset: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path
 ) -> None:
     """In a view: the handles stand where the fitted camera sees the lamp."""
     asset = seen_room(make_asset(k=4, height=18, width=28))
     asset.save(tmp_path / "asset")
-    lamp = [0.2, 0.5, 0.9]
-    light = f"{{'kind':'point','on':true,'color':'%23ffd0a0','intensity':1,'position':{lamp},'a0':1,'falloff':'linear','radius':0.01}}"
+    point_light = [0.2, 0.5, 0.9]
+    light = (
+        f"{{'kind':'point','on':true,'color':'%23ffd0a0','intensity':1,'position':{point_light},'a0':1,'falloff':'linear','radius':0.01}}"
+    )
     where = f"#{{'lights':[{light}],'selected':0,'zoom':{ZOOM},'middle':[14,9],'exposure':-1}}"
     chromium("open", url=serve(tmp_path / "asset") + where, width=WIDTH, height=HEIGHT)
 
     def on_canvas(place: list[float]) -> np.ndarray:
         return np.array(CANVAS) / 2 + (project(np.array(place)) - 0.5) * [28 * ZOOM, 18 * ZOOM]
 
-    x, y = on_canvas(lamp).tolist()
+    x, y = on_canvas(point_light).tolist()
     grip = y - 0.178 * CANVAS[1] / 2  # half the arrow's length, of half the picture's height
     chromium("drag", path=[[x, grip], [x, grip - 20], [x, grip - 40]])
     moved = chromium.state()["lights"][0]["position"]
-    assert moved[:2] == pytest.approx(lamp[:2], abs=1e-4)
-    assert moved[2] > lamp[2] + 0.1
+    assert moved[:2] == pytest.approx(point_light[:2], abs=1e-4)
+    assert moved[2] > point_light[2] + 0.1
     assert on_canvas(moved)[1] == pytest.approx(y - 40, abs=3)
     (lights,) = lights_of(chromium, tmp_path)
     (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
@@ -92,10 +94,10 @@ def test_a_lightmap_is_shown_on_its_mesh(chromium: Any, lightmap: Asset, serve: 
         assert np.abs(shown[int(y), int(x)] - expected[row, column]).max() <= 3, (row, column)
     x, y = orbit_pixel(lightmap.images["position"][33, 12], eye, target)
     chromium("click", at=[x, y], count=2)
-    lamp = chromium.state()["lights"][-1]
-    assert lamp["kind"] == "point"
-    assert lamp["position"][:2] == pytest.approx(lightmap.images["position"][33, 12, :2].tolist(), abs=0.02)
-    assert lamp["position"][2] > lightmap.images["position"][33, 12, 2] + 0.1
+    point_light = chromium.state()["lights"][-1]
+    assert point_light["kind"] == "point"
+    assert point_light["position"][:2] == pytest.approx(lightmap.images["position"][33, 12, :2].tolist(), abs=0.02)
+    assert point_light["position"][2] > lightmap.images["position"][33, 12, 2] + 0.1
     chromium("drag", path=[[30, 400], [90, 380]])
     turned = np.array(chromium.state()["eye"][0])
     assert np.linalg.norm(turned - eye) > 0.2
@@ -127,10 +129,10 @@ def compared(
     asset = complete(on_a_plane(make_asset(k=5, encoding="half")))
     pattern = np.random.default_rng(8).random((9, 14, 3)).astype(np.float32)
 
-    def answer(direction: np.ndarray) -> np.ndarray:
+    def response(direction: np.ndarray) -> np.ndarray:
         return (pattern * (0.6 + 0.4 * direction[0]) + 0.1 * max(direction[1], 0)).astype(np.float32)
 
-    capture = make_capture(answer, lights=12, holdout=3)
+    capture = make_capture(response, lights=12, holdout=3)
     asset.save(tmp_path / "asset")
     return asset, capture, serve(tmp_path / "asset", capture.folder)
 

@@ -32,10 +32,10 @@ def ask(url: str, path: str, method: str = "GET", host: str | None = None) -> tu
     connection.putrequest(method, path, skip_host=True)
     connection.putheader("Host", host or parts.netloc)
     connection.endheaders()
-    answer = connection.getresponse()
-    body = answer.read()
+    response = connection.getresponse()
+    body = response.read()
     connection.close()
-    return answer.status, body
+    return response.status, body
 
 
 @pytest.fixture
@@ -147,8 +147,8 @@ def test_the_command_serves_until_it_is_interrupted(folder: Path, built: Path) -
         assert process.stdout is not None
         url = process.stdout.readline().strip()
         assert url.startswith("http://127.0.0.1:")
-        with urllib.request.urlopen(url + "asset/asset.json", timeout=10) as answer:
-            assert answer.read() == (folder / "asset.json").read_bytes()
+        with urllib.request.urlopen(url + "asset/asset.json", timeout=10) as response:
+            assert response.read() == (folder / "asset.json").read_bytes()
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=20)
     finally:

@@ -43,8 +43,8 @@ def fitted(make_capture: Callable[..., Capture], plane_positions: np.ndarray, tm
 
 
 def ask(url: str) -> dict[str, Any]:
-    with urllib.request.urlopen(url, timeout=20) as answer:
-        return dict(json.loads(answer.read()))
+    with urllib.request.urlopen(url, timeout=20) as response:
+        return dict(json.loads(response.read()))
 
 
 def test_the_page_switches_between_them(chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]) -> None:
@@ -67,7 +67,7 @@ def test_the_page_switches_between_them(chromium: Any, fitted: tuple[Capture, li
 
 
 def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]) -> None:
-    """As numbers, and as colours on the sky: the worst light's dot is redder than the best one's."""
+    """As numbers, and as colors on the sky: the worst light's dot is redder than the best one's."""
     capture, folders = fitted
     url = serve(folders, capture.folder)
     for i, folder in enumerate(folders):
@@ -78,7 +78,7 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
         assert told["peak"] == pytest.approx(expected["train"]["peak"], rel=2e-3)
         assert told["texels"] == int((capture.coverage() >= 0.5).sum())
     chromium("open", url=url + PICTURE + ",'errors':true,'asset':1}", width=WIDTH, height=HEIGHT)
-    colours = {}
+    colors = {}
     for name, index in {"best": int(np.argmax(told["psnr"])), "worst": int(np.argmin(told["psnr"]))}.items():
         x, y, z = capture.directions()[index]
         script = f"""(() => {{
@@ -88,9 +88,9 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
             const flat = Math.hypot({x}, {y}) || 1, at = [sky.clientWidth / 2 + r * {x} / flat, sky.clientHeight / 2 - r * {y} / flat];
             return [...sky.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data];
         }})()"""
-        colours[name] = chromium("run", script=script)
-    assert colours["worst"][0] > colours["worst"][2] + 60
-    assert colours["best"][2] > colours["best"][0] + 60
+        colors[name] = chromium("run", script=script)
+    assert colors["worst"][0] > colors["worst"][2] + 60
+    assert colors["best"][2] > colors["best"][0] + 60
 
 
 def test_a_spectrum_is_the_singular_values_of_the_answers(
@@ -99,8 +99,8 @@ def test_a_spectrum_is_the_singular_values_of_the_answers(
     capture, folders = fitted
     url = serve(folders, capture.folder)
     told = ask(f"{url}spectrum-1.json")
-    answers = np.stack([capture.image(i).reshape(-1, 3) for i in capture.indices("train")], axis=1).reshape(140, -1)
-    values = np.linalg.svd(answers - answers.mean(axis=0), compute_uv=False) / np.sqrt(answers.size)
+    responses = np.stack([capture.image(i).reshape(-1, 3) for i in capture.indices("train")], axis=1).reshape(140, -1)
+    values = np.linalg.svd(responses - responses.mean(axis=0), compute_uv=False) / np.sqrt(responses.size)
     np.testing.assert_allclose(told["capture"][:20], values[:20], rtol=2e-3)
     assert told["scalars"] == 5
     assert len(told["asset"]) == 5, "five planes answer in five dimensions"

@@ -1,4 +1,4 @@
-"""A lightmap in its scene: its own colours on the receiver, other things about it, and glass that shows what is behind it, tinted."""
+"""A lightmap in its scene: its own colors on the receiver, other things about it, and glass that shows what is behind it, tinted."""
 
 from __future__ import annotations
 

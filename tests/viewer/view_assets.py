@@ -17,7 +17,7 @@ FORWARD = np.array([-0.05, 1.0, -0.15]) / np.linalg.norm([-0.05, 1.0, -0.15])
 RIGHT = np.cross(FORWARD, [0, 0, 1]) / np.linalg.norm(np.cross(FORWARD, [0, 0, 1]))
 ROTATION = np.stack([RIGHT, np.cross(FORWARD, RIGHT), FORWARD])
 LENS = np.array([[0.9, 0, 0.5], [0, 1.2, 0.48], [0, 0, 1]])  # to u and v, 0 to 1
-DEPTHS = (0.0, 3.0)  # metres: of the floor, and of the wall at the end of it
+DEPTHS = (0.0, 3.0)  # meters: of the floor, and of the wall at the end of it
 
 
 def seen_room(asset: Asset) -> Asset:

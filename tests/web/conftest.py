@@ -52,7 +52,7 @@ class Browser:
         """Where the asset of a URL lies."""
         return self._assets / url.removeprefix("/served/")
 
-    def answer(self, run: str, **job: Any) -> dict[str, Any]:
+    def response(self, run: str, **job: Any) -> dict[str, Any]:
         """What the page says to a job, errors included."""
         job = {"run": run, **job, "lights": [as_json(light) for light in job.get("lights", [])]}
         job["lightSets"] = [[as_json(light) for light in lights] for lights in job.get("lightSets", [])]
@@ -65,15 +65,15 @@ class Browser:
 
     def picture(self, run: str, **job: Any) -> np.ndarray:
         """The picture of a job, (H, W, 3) float32, row 0 at the top."""
-        answer = self.answer(run, **job)
-        assert "error" not in answer, answer
-        return decoded(answer)
+        response = self.response(run, **job)
+        assert "error" not in response, response
+        return decoded(response)
 
     def lightmaps(self, run: str, asset: str, light_sets: list[list[Light]], **job: Any) -> list[np.ndarray]:
         """The pictures of a job under one set of lights after the other, each (H, W, 3) float32."""
-        answer = self.answer(run, asset=asset, lightSets=light_sets, **job)
-        assert "error" not in answer, answer
-        return [decoded(one) for one in answer["pictures"]]
+        response = self.response(run, asset=asset, lightSets=light_sets, **job)
+        assert "error" not in response, response
+        return [decoded(one) for one in response["pictures"]]
 
 
 @pytest.fixture(scope="session")

@@ -11,9 +11,9 @@ from web_assets import LIGHTS, complete
 
 from srbf.asset import Asset
 from srbf.export import Settings, export
-from srbf.gl.uniforms import lamp_uniforms
+from srbf.gl.uniforms import point_light_uniforms
 from srbf.lights import PointLight, moved
-from srbf.methods import folded_weights
+from srbf.methods import projected_weights
 
 DOUBLE = 1e-11  # relative: the same double-precision arithmetic in another order
 ENCODINGS = ("float", "half", "uint8")
@@ -29,7 +29,7 @@ def moving() -> np.ndarray:
 
 @pytest.mark.parametrize("still", [True, False])
 @pytest.mark.parametrize("method", ["relighting-map", "eigen-map", "clustered-eigen-map"])
-def test_weights_and_lamps_are_numpys(browser: Any, make_asset: Callable, make_planes: Callable, method: str, still: bool) -> None:
+def test_weights_and_point_lights_are_numpys(browser: Any, make_asset: Callable, make_planes: Callable, method: str, still: bool) -> None:
     made = {
         "relighting-map": lambda: make_asset(k=25),
         "eigen-map": lambda: make_planes(scalars=9),
@@ -38,38 +38,38 @@ def test_weights_and_lamps_are_numpys(browser: Any, make_asset: Callable, make_p
     asset = complete(made[method](), asset_from_world=(np.eye(4) if still else moving()).tolist())
     url = browser.serve(asset)
     for kind, lights in LIGHTS.items():
-        said = browser.answer("host", asset=url, lights=lights)
-        expected = folded_weights(Asset.open(browser.folder(url)), lights)
+        said = browser.response("host", asset=url, lights=lights)
+        expected = projected_weights(Asset.open(browser.folder(url)), lights)
         np.testing.assert_allclose(
             np.reshape(said["weights"], (-1, 3)), expected, rtol=DOUBLE, atol=DOUBLE * max(np.abs(expected).max(), 1), err_msg=kind
         )
-        lamps = [lamp_uniforms(moved(light, asset.asset_from_world)) for light in lights if isinstance(light, PointLight)]
-        assert len(said["lamps"]) == len(lamps)
-        for found, lamp in zip(said["lamps"], lamps, strict=True):
-            assert found.keys() == lamp.keys()
-            place = [np.add(one["position"], one["positionLow"]) for one in (found, lamp)]  # either sum may be split at another bit
+        point_lights = [point_light_uniforms(moved(light, asset.asset_from_world)) for light in lights if isinstance(light, PointLight)]
+        assert len(said["pointLights"]) == len(point_lights)
+        for found, point_light in zip(said["pointLights"], point_lights, strict=True):
+            assert found.keys() == point_light.keys()
+            place = [np.add(one["position"], one["positionLow"]) for one in (found, point_light)]  # either sum may be split at another bit
             np.testing.assert_allclose(place[0], place[1], rtol=1e-10)
-            for name in lamp.keys() - {"position", "positionLow"}:
-                np.testing.assert_allclose(found[name], lamp[name], rtol=1e-12, atol=1e-15, err_msg=f"{kind} {name}")
+            for name in point_light.keys() - {"position", "positionLow"}:
+                np.testing.assert_allclose(found[name], point_light[name], rtol=1e-12, atol=1e-15, err_msg=f"{kind} {name}")
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
 def test_layers_are_decoded_to_the_bit(browser: Any, make_asset: Callable, make_planes: Callable, encoding: str) -> None:
     for asset in (make_asset(k=3, encoding=encoding), make_planes(scalars=6, encoding=encoding)):
-        said = browser.answer("layers", asset=browser.serve(complete(asset)))
+        said = browser.response("layers", asset=browser.serve(complete(asset)))
         found = np.array(said["levels"][0]).reshape(len(asset.stored), asset.height, asset.width, 4)[..., : asset.stored.shape[3]]
         stored = asset.stored.view(np.uint16) if encoding == "half" else asset.stored
         np.testing.assert_array_equal(found, stored)
 
 
 def test_every_byte_is_kept_whatever_alpha_says(browser: Any, make_planes: Callable) -> None:
-    """No colour management, no multiplication by alpha: all 256 values beside alphas of 0, 1 and 255."""
+    """No color management, no multiplication by alpha: all 256 values beside alphas of 0, 1 and 255."""
     asset = complete(make_planes(scalars=4, encoding="uint8", height=16, width=48))
     values = np.arange(256, dtype=np.uint8).reshape(16, 16)
     for i, alpha in enumerate((0, 1, 255)):
         part = asset.stored[0, :, 16 * i : 16 * (i + 1)]
         part[..., 0], part[..., 1], part[..., 2], part[..., 3] = values, values.T, values[::-1], alpha
-    said = browser.answer("layers", asset=browser.serve(asset))
+    said = browser.response("layers", asset=browser.serve(asset))
     np.testing.assert_array_equal(np.array(said["levels"][0]).reshape(asset.stored.shape), asset.stored)
 
 
@@ -78,7 +78,7 @@ def test_texture_arrays_are_read_level_by_level(browser: Any, make_asset: Callab
     asset = complete(make_asset(k=3, encoding="half", height=24, width=20))
     asset.images["coverage"][:] = 1
     url = browser.place(lambda folder: export(asset, target, folder, Settings(encoding=form, levels=3)))
-    said = browser.answer("layers", asset=url)
+    said = browser.response("layers", asset=url)
     exported = Asset.open(browser.folder(url))
     assert said["encoding"] == form and len(said["levels"]) == 3
     if not form.startswith("bc"):
@@ -90,9 +90,9 @@ def test_damage_is_named(browser: Any, make_asset: Callable) -> None:
     url = browser.serve(complete(make_asset(k=2, encoding="half")))
     path = browser.folder(url) / "map_01.exr"
     path.write_bytes(path.read_bytes()[:-1] + b"x")
-    assert "map_01.exr as it was written, found another checksum" in browser.answer("load", asset=url)["error"]
+    assert "map_01.exr as it was written, found another checksum" in browser.response("load", asset=url)["error"]
     path.unlink()
-    assert "map_01.exr, found status 404" in browser.answer("load", asset=url)["error"]
+    assert "map_01.exr, found status 404" in browser.response("load", asset=url)["error"]
 
 
 def test_the_units_types_and_build_of_the_package_pass(npm: Callable[..., str]) -> None:

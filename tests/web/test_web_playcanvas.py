@@ -31,4 +31,4 @@ def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, 
     shown = browser.picture("playcanvas-material", asset=browser.serve(asset), **job)
     assert (np.abs(shown - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
     clustered = browser.serve(complete(make_planes(scalars=5, clusters=7)))
-    assert "found a clustered eigen map" in browser.answer("playcanvas-material", asset=clustered, **job)["error"]
+    assert "found a clustered eigen map" in browser.response("playcanvas-material", asset=clustered, **job)["error"]

@@ -61,7 +61,7 @@ def test_a_lambert_material_shows_albedo_times_irradiance_over_pi(browser: Any, 
         "source": source,
     }
     if (method, source) == ("clustered-eigen-map", "maps"):
-        assert 'expected source "lightmap"' in browser.answer("three-material", **job)["error"]
+        assert 'expected source "lightmap"' in browser.response("three-material", **job)["error"]
         return
     shown = browser.picture("three-material", **job)
     assert (np.abs(shown * np.pi / ALBEDO - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
@@ -104,8 +104,8 @@ def test_lights_may_come_and_go_and_nothing_is_left_behind(browser: Any, served:
     pictures = browser.lightmaps("three-material", url, sets, **job)
     for picture, lights in zip(pictures, sets, strict=True):
         assert (np.abs(picture * np.pi / ALBEDO - relight(asset, lights)) <= tolerance(asset, lights)).all(), lights
-    again = browser.answer("three-material", asset=url, lightSets=sets[:1], **job)
-    once_more = browser.answer("three-material", asset=url, lightSets=sets, **job)
+    again = browser.response("three-material", asset=url, lightSets=sets[:1], **job)
+    once_more = browser.response("three-material", asset=url, lightSets=sets, **job)
     for name in ("textures", "programs"):
         assert once_more[name] == again[name], name
 
@@ -171,18 +171,18 @@ def test_a_mesh_far_away_shows_the_file_s_own_mip_level(browser: Any, make_asset
 
 
 def test_a_gltf_export_loads_and_is_lit_by_the_asset_that_it_names(browser: Any, make_asset: Callable[..., Asset]) -> None:
-    """Its mesh reaches from the first texel's centre to the last one's, so the pixels at the edge are not all its own."""
+    """Its mesh reaches from the first texel's center to the last one's, so the pixels at the edge are not all its own."""
     asset = complete(on_a_plane(make_asset(k=7, encoding="half")), source={"receiver": {"kind": "lightmap", "object": "Plate"}})
     asset.images["coverage"][:] = 1
     asset.images["normal"] = np.broadcast_to(np.float32([0, 0, 1]), asset.images["position"].shape).copy()
     asset.manifest["normal"] = "normal.exr"
     url = browser.place(lambda folder: export(asset, "gltf", folder, Settings(encoding="half")))
-    answer = browser.answer("three-gltf", asset=url, lights=LIGHTS["several"], half=HALF_EXTENT)
-    assert "error" not in answer, answer
-    assert all(width for width in answer["fallback"]), "a viewer that does not know the extension shows a picture"
+    response = browser.response("three-gltf", asset=url, lights=LIGHTS["several"], half=HALF_EXTENT)
+    assert "error" not in response, response
+    assert all(width for width in response["fallback"]), "a viewer that does not know the extension shows a picture"
     inner = (slice(1, -1), slice(1, -1))
     exported = Asset.open(browser.folder(url))
-    error = np.abs(decoded(answer) * np.pi - relight(exported, LIGHTS["several"]))
+    error = np.abs(decoded(response) * np.pi - relight(exported, LIGHTS["several"]))
     assert (error <= tolerance(exported, LIGHTS["several"]))[inner].all()
 
 
@@ -198,7 +198,7 @@ def test_lights_that_no_asset_answers_are_refused(browser: Any, served: dict, li
     _, url = served["relighting-map", "half"]
     light = {"color": (1, 1, 1), "intensity": 1, "position": (0, 1, 0), **light}
     job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": [light]}
-    assert message in browser.answer("three-material", **job)["error"]
+    assert message in browser.response("three-material", **job)["error"]
 
 
 def _doubled(image: np.ndarray) -> np.ndarray:
@@ -219,7 +219,7 @@ def _doubled(image: np.ndarray) -> np.ndarray:
 def test_texture_arrays_are_relit_as_they_are_read_by_numpy(
     browser: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], target: str, form: str
 ) -> None:
-    """The GPU's decoder of blocks against OpenImageIO's: BC7 is exact, BC1's mixed colours may round to another byte."""
+    """The GPU's decoder of blocks against OpenImageIO's: BC7 is exact, BC1's mixed colors may round to another byte."""
     made = [make_asset(k=4, encoding="half", height=12, width=20)]
     if form == "bc7":
         made += [make_planes(scalars=5, clusters=7, encoding="half", height=12, width=20)]

@@ -30,7 +30,7 @@ LIGHTS["several"] = [light for lights in LIGHTS.values() for light in lights] + 
     PointLight((-0.9, -0.7, 0.5), (0.3, 0.2, 0.8), falloff="inverse-square"),
 ]
 
-HALF_EXTENT = (1.4, 0.9, 0.25)  # of the rectangle that receivers of `on_a_plane` fill, and its height, metres
+HALF_EXTENT = (1.4, 0.9, 0.25)  # of the rectangle that receivers of `on_a_plane` fill, and its height, meters
 
 # Lights as three.js, y up, has them, and as the library does.
 FOLLOWED: dict[str, tuple[list[dict[str, Any]], list[Light]]] = {

@@ -12,10 +12,10 @@ document.body.append(renderer.domElement);
 const scene = new THREE.Scene();
 
 const map = await SrbfRelightingMap.load(query.get("asset") ?? "asset");
-const lamp = new THREE.PointLight(0xffffff, Number(query.get("intensity") ?? 4));
-lamp.position.fromArray((query.get("lamp") ?? "0.4,1,0.3").split(",").map(Number));
-scene.add(lamp);
-map.follow(lamp);
+const pointLight = new THREE.PointLight(0xffffff, Number(query.get("intensity") ?? 4));
+pointLight.position.fromArray((query.get("pointLight") ?? "0.4,1,0.3").split(",").map(Number));
+scene.add(pointLight);
+map.follow(pointLight);
 
 const camera = query.has("mesh") ? await lightmap() : view();
 
@@ -48,7 +48,7 @@ addEventListener("resize", resize);
 resize();
 
 renderer.domElement.addEventListener("pointermove", (event) => {
-  if (event.buttons) lamp.position.add(new THREE.Vector3(event.movementX, 0, event.movementY).multiplyScalar(0.005));
+  if (event.buttons) pointLight.position.add(new THREE.Vector3(event.movementX, 0, event.movementY).multiplyScalar(0.005));
 });
 
 renderer.setAnimationLoop(() => {

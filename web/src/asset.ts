@@ -33,7 +33,7 @@ export interface Asset {
   readonly scale: Float32Array;
   readonly bias: Float32Array;
   readonly basis: Basis;
-  /** World position of every receiver, metres, (H, W, 4). */
+  /** World position of every receiver, meters, (H, W, 4). */
   readonly position?: FloatImage;
   readonly ambient?: FloatImage;
   /** Of a view that does not fill its picture: the share of every texel that is there, (H, W). Layers hold colors that are not multiplied by it. */

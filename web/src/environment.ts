@@ -28,10 +28,10 @@ export function* environmentSamples(
     const bottom = elevation(r + 1);
     const solidAngle = (Math.sin(top) - Math.sin(bottom)) * ((2 * Math.PI) / width);
     if (solidAngle === 0) continue;
-    const centre = (top + bottom) / 2;
+    const center = (top + bottom) / 2;
     for (let c = 0; c < width; ++c) {
       const azimuth = (0.5 - (c + 0.5) / width) * 2 * Math.PI;
-      const direction = turned(rotation, [Math.cos(centre) * Math.cos(azimuth), Math.cos(centre) * Math.sin(azimuth), Math.sin(centre)]);
+      const direction = turned(rotation, [Math.cos(center) * Math.cos(azimuth), Math.cos(center) * Math.sin(azimuth), Math.sin(center)]);
       if (domain === "hemisphere" && !upright && direction[2] <= 0) continue;
       const at = 3 * (r * width + c);
       yield [direction, [pixels[at] * solidAngle * color[0], pixels[at + 1] * solidAngle * color[1], pixels[at + 2] * solidAngle * color[2]]];

@@ -9,8 +9,8 @@ export interface LightFunctions {
   readonly coefficients: Float32Array;
 }
 
-/** sum over lights of color * w_f(direction), added to `folded` (F, 3). `lights` yields unit directions with their colours. */
-export function foldFunctions(functions: LightFunctions, lights: Iterable<readonly [Triple, Triple]>, folded: Float64Array): void {
+/** sum over lights of color * w_f(direction), added to `folded` (F, 3). `lights` yields unit directions with their colors. */
+export function foldFunctions(functions: LightFunctions, lights: Iterable<readonly [Triple, Triple]>, projected: Float64Array): void {
   const { centers, spreads, coefficients } = functions;
   const distinct = [...new Set(spreads)];
   const b = centers.length;
@@ -28,7 +28,7 @@ export function foldFunctions(functions: LightFunctions, lights: Iterable<readon
   for (let f = 0; f < spreads.length; ++f) {
     const sums = index.get(spreads[f]) as Float64Array;
     for (let i = 0; i < b; ++i) {
-      for (let c = 0; c < 3; ++c) folded[3 * f + c] += coefficients[3 * (f * b + i) + c] * sums[3 * i + c];
+      for (let c = 0; c < 3; ++c) projected[3 * f + c] += coefficients[3 * (f * b + i) + c] * sums[3 * i + c];
     }
   }
 }

@@ -5,7 +5,7 @@
 import { SrbfError } from "./errors";
 import { carried, determinant, type Matrix4, type Triple, turned } from "./matrix";
 
-export const DEFAULT_RADIUS = 1e-4; // metres: a receiver no nearer than this, so that a lamp in a surface stays finite
+export const DEFAULT_RADIUS = 1e-4; // meters: a receiver no nearer than this, so that a lamp in a surface stays finite
 const WHITE: Triple = [1, 1, 1];
 
 /** A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it. */
@@ -15,8 +15,8 @@ export interface DirectionalLight {
   readonly color: Triple;
 }
 
-/** A lamp; `color` is its irradiance at the distance `a0` (m); |L| is never less than `radius` (m). */
-interface Lamp {
+/** A point light; `color` is its irradiance at the distance `a0` (m); |L| is never less than `radius` (m). */
+interface Punctual {
   readonly position: Triple;
   readonly color: Triple;
   readonly a0: number;
@@ -25,12 +25,12 @@ interface Lamp {
   readonly radius: number;
 }
 
-export interface PointLight extends Lamp {
+export interface PointLight extends Punctual {
   readonly kind: "point";
 }
 
-/** A lamp times a smooth cone about `direction` (where it shines): full inside the half-angle `inner`, none past `outer` (rad). */
-export interface SpotLight extends Lamp {
+/** A point light times a smooth cone about `direction` (where it shines): full inside the half-angle `inner`, none past `outer` (rad). */
+export interface SpotLight extends Punctual {
   readonly kind: "spot";
   readonly direction: Triple;
   readonly inner: number;
@@ -47,7 +47,7 @@ export interface EnvironmentLight {
 }
 
 export type Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight;
-export type LampLight = PointLight | SpotLight;
+export type PunctualLight = PointLight | SpotLight;
 
 /** @throws SrbfError on a direction of no length. */
 export function directionalLight(direction: Triple, color: Triple = WHITE): DirectionalLight {
@@ -55,8 +55,8 @@ export function directionalLight(direction: Triple, color: Triple = WHITE): Dire
 }
 
 /** @throws SrbfError on numbers that are not finite, or a0 or radius not above 0. */
-export function pointLight(position: Triple, options: Partial<Omit<Lamp, "position">> = {}): PointLight {
-  return { kind: "point", ...lamp(position, options) };
+export function pointLight(position: Triple, options: Partial<Omit<Punctual, "position">> = {}): PointLight {
+  return { kind: "point", ...punctual(position, options) };
 }
 
 /** @throws SrbfError as `pointLight`, and on half-angles that are not 0 <= inner <= outer <= pi. */
@@ -64,13 +64,13 @@ export function spotLight(
   position: Triple,
   direction: Triple,
   cone: { inner: number; outer: number },
-  options: Partial<Omit<Lamp, "position">> = {},
+  options: Partial<Omit<Punctual, "position">> = {},
 ): SpotLight {
   const { inner, outer } = cone;
   if (!(0 <= inner && inner <= outer && outer <= Math.PI)) {
     throw new SrbfError(`expected spot half-angles 0 <= inner <= outer <= pi rad, found inner ${inner}, outer ${outer}`);
   }
-  return { kind: "spot", ...lamp(position, options), direction: unit(direction), inner, outer };
+  return { kind: "spot", ...punctual(position, options), direction: unit(direction), inner, outer };
 }
 
 /** @throws SrbfError where `pixels` are not width x height x 3 finite numbers. */
@@ -93,7 +93,7 @@ export function moved<L extends Light>(light: L, matrix: Matrix4): L {
   return light.kind === "spot" ? { ...out, direction: unit(turned(matrix, light.direction)) } : out;
 }
 
-export function isLamp(light: Light): light is LampLight {
+export function isPunctual(light: Light): light is PunctualLight {
   return light.kind === "point" || light.kind === "spot";
 }
 
@@ -108,7 +108,7 @@ export function unit(v: Triple): Triple {
   return [scaled[0] / length, scaled[1] / length, scaled[2] / length];
 }
 
-function lamp(position: Triple, options: Partial<Omit<Lamp, "position">>): Lamp {
+function punctual(position: Triple, options: Partial<Omit<Punctual, "position">>): Punctual {
   const { color = WHITE, a0 = 1, falloff = "linear", radius = DEFAULT_RADIUS } = options;
   for (const [name, value] of Object.entries({ a0, radius })) {
     if (!(Number.isFinite(value) && value > 0)) throw new SrbfError(`expected ${name} above 0, found ${value}`);

@@ -1,4 +1,4 @@
-/** 4 x 4 matrices as four rows, as manifests hold them; columns of translation are metres. */
+/** 4 x 4 matrices as four rows, as manifests hold them; columns of translation are meters. */
 export type Triple = readonly [number, number, number];
 export type Matrix4 = readonly (readonly number[])[];
 

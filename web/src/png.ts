@@ -1,4 +1,4 @@
-/** Linear PNG files of bytes: read by a library and never by the browser, whose decoders may manage colours and multiply by alpha. */
+/** Linear PNG files of bytes: read by a library and never by the browser, whose decoders may manage colors and multiply by alpha. */
 import { decode } from "fast-png";
 import { SrbfError } from "./errors";
 import type { ByteImage } from "./image";

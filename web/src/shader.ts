@@ -1,13 +1,13 @@
 /** What every engine's shader of an asset is made of: its text, its defines, and the numbers that change with the lights. */
 import type { Asset } from "./asset";
-import { type LampUniforms, lampUniforms } from "./lamp";
-import { isLamp, type Light, moved } from "./lights";
+import { type PointLightUniforms, pointLightUniforms } from "./point_light";
+import { isPunctual, type Light, moved } from "./lights";
 import type { Method } from "./manifest";
 import { SrbfError } from "./errors";
 import clusteredEigenMap from "./shaders/clustered_eigen_map.glsl";
 import eigenMap from "./shaders/eigen_map.glsl";
 import relightingMap from "./shaders/relighting_map.glsl";
-import { foldedWeights } from "./weights";
+import { projectedWeights } from "./weights";
 
 const SOURCES: Record<Method, string> = {
   "relighting-map": relightingMap,
@@ -18,28 +18,28 @@ const SOURCES: Record<Method, string> = {
 /** Numbers of a frame: `weights` is vec4 after vec4, K of relighting maps, C rows of S + 1 of eigen maps. */
 export interface FrameValues {
   readonly weights: Float32Array;
-  readonly lamps: readonly LampUniforms[];
+  readonly pointLights: readonly PointLightUniforms[];
 }
 
 /** The frame's numbers under `lights`, which are in the asset's world. @throws SrbfError on lamps where the asset does not know where its receivers are. */
 export function frameValues(asset: Asset, lights: readonly Light[]): FrameValues {
-  const folded = foldedWeights(asset, lights, asset.assetFromWorld);
-  const weights = new Float32Array((folded.length / 3) * 4);
-  for (let i = 0, j = 0; i < folded.length; i += 3, j += 4) weights.set([folded[i], folded[i + 1], folded[i + 2]], j);
-  const lamps = lights.filter(isLamp).map((light) => lampUniforms(moved(light, asset.assetFromWorld)));
-  return { weights, lamps };
+  const projected = projectedWeights(asset, lights, asset.assetFromWorld);
+  const weights = new Float32Array((projected.length / 3) * 4);
+  for (let i = 0, j = 0; i < projected.length; i += 3, j += 4) weights.set([projected[i], projected[i + 1], projected[i + 2]], j);
+  const pointLights = lights.filter(isPunctual).map((light) => pointLightUniforms(moved(light, asset.assetFromWorld)));
+  return { weights, pointLights };
 }
 
 /** @throws SrbfError where lamps need a position map and the asset has none. */
-export function needPositions(asset: Asset, lamps: number): void {
-  if (lamps > 0 && !asset.position) {
+export function needPositions(asset: Asset, pointLights: number): void {
+  if (pointLights > 0 && !asset.position) {
     throw new SrbfError("point and spot lights need a position map, and this asset has none; relight it by directional lights");
   }
 }
 
 /**
  * GLSL that declares an asset's uniforms and `vec3 srbfRelit(vec2 uv, float level, vec3 receiver)`: uv with v downwards, receiver in the asset's frame,
- * metres, `room` for lamps. `srbfRelitSurface(uv, receiver)` finds the level of mip maps itself.
+ * meters, `room` for lamps. `srbfRelitSurface(uv, receiver)` finds the level of mip maps itself.
  */
 export function shaderText(asset: Asset, room: number): string {
   const lines = Object.entries(shaderDefines(asset, room)).map(([name, value]) => `#define ${name} ${value}`);
@@ -53,8 +53,8 @@ export function shaderBody(asset: Asset): string {
 
 export function shaderDefines(asset: Asset, room: number): Record<string, number> {
   const own: Record<string, number> =
-    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_SCALARS: asset.basis.scalars, SRBF_LAYERS: asset.layers.count };
-  return { ...own, SRBF_LAMPS: room };
+    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_COMPONENTS: asset.basis.scalars, SRBF_LAYERS: asset.layers.count };
+  return { ...own, SRBF_POINT_LIGHTS: room };
 }
 
 /** vec4 of uniforms that the fragment shader of an asset needs, without the engine's own. */

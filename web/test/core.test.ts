@@ -4,7 +4,7 @@ import {
   directionalLight,
   environmentLight,
   IDENTITY,
-  lampUniforms,
+  pointLightUniforms,
   loadAsset,
   moved,
   multiplied,
@@ -35,7 +35,7 @@ const MANIFEST = {
 };
 
 describe("lights", () => {
-  it("normalises directions and refuses zero ones", () => {
+  it("normalizes directions and refuses zero ones", () => {
     expect(directionalLight([0, 3, 4]).direction).toEqual([0, 0.6, 0.8]);
     expect(directionalLight([0, 3e200, 4e200]).direction).toEqual([0, 0.6, 0.8]);
     expect(() => directionalLight([0, 0, 0])).toThrow("expected a direction of non-zero, finite length");
@@ -61,14 +61,14 @@ describe("lights", () => {
 
   it("keeps what single precision drops of a position", () => {
     const position: Triple = [1e4 + 1e-5, -1 / 3, 0];
-    const { position: high, positionLow: low } = lampUniforms(pointLight(position));
+    const { position: high, positionLow: low } = pointLightUniforms(pointLight(position));
     expect(high).toEqual(position.map(Math.fround));
     expect(high.map((x, i) => x + low[i])).toEqual(position);
   });
 });
 
 describe("tables and images", () => {
-  it("mixes neighbouring entries and clips cosines", () => {
+  it("mixes neighboring entries and clips cosines", () => {
     const table = new Float32Array([0, 1, 4]);
     expect([-2, -1, -0.5, 0, 0.5, 1, 2].map((x) => lookup(table, x))).toEqual([0, 0, 0.5, 1, 2.5, 4, 4]);
   });
@@ -139,7 +139,7 @@ describe("shader text", () => {
   it("is the pack's, each function once, with the sizes of the asset", () => {
     const asset = { manifest: MANIFEST, layers: { count: 3 }, basis: { kind: "gaussian" } } as unknown as Asset;
     const text = shaderText(asset, 2);
-    expect(text).toContain("#define SRBF_K 3\n#define SRBF_LAMPS 2");
+    expect(text).toContain("#define SRBF_K 3\n#define SRBF_POINT_LIGHTS 2");
     expect(text.match(/float srbfVersine\(/g)).toHaveLength(1);
     expect(text).not.toMatch(/#include|#version/);
   });

@@ -50,14 +50,14 @@ process.stdout.write(`${JSON.stringify({ ready: await browser.version() })}\n`);
 
 for await (const line of createInterface({ input: process.stdin })) {
   said.length = 0;
-  let answer;
+  let response;
   try {
     const late = new Promise((_, reject) => setTimeout(() => reject(new Error(`no answer within ${PATIENCE} ms`)), PATIENCE).unref());
-    answer = await Promise.race([page.evaluate((job) => window.runJob(job), JSON.parse(line)), late]);
+    response = await Promise.race([page.evaluate((job) => window.runJob(job), JSON.parse(line)), late]);
   } catch (error) {
-    answer = { error: String(error) };
+    response = { error: String(error) };
   }
-  process.stdout.write(`${JSON.stringify({ ...answer, console: said })}\n`);
+  process.stdout.write(`${JSON.stringify({ ...response, console: said })}\n`);
 }
 await browser.close();
 server.close();

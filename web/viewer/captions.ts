@@ -1,8 +1,8 @@
-/** What the page says beside the picture: title, status, the sun's bearing, and what false colours mean. */
+/** What the page says beside the picture: title, status, the sun's bearing, and what false colors mean. */
 import type { Light, Triple } from "../src";
 import type { Comparison } from "./comparison";
 import type { Facts } from "./loading";
-import type { COLOURS } from "./screen";
+import type { COLORS } from "./screen";
 import type { State } from "./state";
 import type { Subject } from "./subject";
 
@@ -46,16 +46,16 @@ export function bearing(place: HTMLElement, direction: Triple | undefined, insid
   place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · the capture saw no light there"}`;
 }
 
-/** What the colours of a picture that is no picture mean, up to `most`; hidden where it is one. */
-export function legend(place: HTMLElement, colour: keyof typeof COLOURS, most: number): void {
+/** What the colors of a picture that is no picture mean, up to `most`; hidden where it is one. */
+export function legend(place: HTMLElement, color: keyof typeof COLORS, most: number): void {
   const text = (x: number) => String(Number(x.toPrecision(3)));
-  place.hidden = colour !== "magnitude" && colour !== "signed" && colour !== "negative";
+  place.hidden = color !== "magnitude" && color !== "signed" && color !== "negative";
   if (place.hidden) return;
   const bars = {
     magnitude: ["linear-gradient(90deg,#30123b,#4668e0,#1bcfd4,#61fc6c,#d1e834,#fe9b2d,#d93806,#7a0402)", "0", "luminance", text(most)],
     signed: ["linear-gradient(90deg,#d9f0ff,#2e80ff,#121315,#ff4729,#ffedcc)", text(-most), "0", text(most)],
     negative: ["linear-gradient(90deg,#590d6b,#ff59ff)", "0", "below 0, cut off", text(-most / 8)],
   } as const;
-  const [bar, left, middle, right] = bars[colour as keyof typeof bars];
+  const [bar, left, middle, right] = bars[color as keyof typeof bars];
   place.innerHTML = `<i style="background:${bar}"></i><div><span>${left}</span><span>${middle}</span><span>${right}</span></div>`;
 }

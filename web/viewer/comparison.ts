@@ -49,7 +49,7 @@ export class Comparison {
     this.error = "";
     this.want(references.nearest(sun.direction));
     const color = linearColor(sun);
-    this.uniforms.referenceColour.value = color;
+    this.uniforms.referenceColor.value = color;
     return this.compared < 0 ? undefined : { kind: "directional", direction: references.lights[this.compared].direction, color };
   }
 

@@ -40,7 +40,7 @@ import directFragment from "../../glsl/stages/direct.frag";
 import fullscreenVertex from "../../glsl/stages/fullscreen.vert";
 import heightFragment from "../../glsl/stages/shadow_height.frag";
 import shadowVertex from "../../glsl/stages/shadow.vert";
-import tintFragment from "../../glsl/stages/shadow_tint.frag";
+import tintFragment from "../../glsl/stages/shadow_transmittance.frag";
 import { type Asset, type DirectionalLight, type FloatImage, type Light, SrbfError, type Triple } from "../src";
 import { turned } from "../src/matrix";
 import { type DirectReceivers, directReceivers } from "./direct_points";
@@ -110,7 +110,7 @@ export class DirectLight {
     this.lookup = new RawShaderMaterial({
       glslVersion: GLSL3,
       vertexShader: fullscreenVertex,
-      fragmentShader: coloured(directFragment),
+      fragmentShader: colored(directFragment),
       uniforms: {
         ...this.frame,
         points: { value: null },
@@ -225,9 +225,9 @@ export class DirectLight {
     });
   }
 
-  /** In the asset's frame, z up, about the receivers' centre. */
+  /** In the asset's frame, z up, about the receivers' center. */
   private geometry(mesh: Mesh): BufferGeometry {
-    const { centre } = this.receivers;
+    const { center } = this.receivers;
     const source = mesh.geometry;
     const position = source.getAttribute("position");
     const normal = source.getAttribute("normal");
@@ -237,7 +237,7 @@ export class DirectLight {
     const place = new Vector3();
     for (let i = 0; i < position.count; ++i) {
       const p = fromThree(place.fromBufferAttribute(position, i).applyMatrix4(mesh.matrixWorld));
-      corner.set([p[0] - centre[0], p[1] - centre[1], p[2] - centre[2]], 3 * i);
+      corner.set([p[0] - center[0], p[1] - center[1], p[2] - center[2]], 3 * i);
       if (normal) cornerNormal.set(fromThree(place.fromBufferAttribute(normal, i).transformDirection(normalMatrix)), 3 * i);
     }
     const geometry = new BufferGeometry();
@@ -249,8 +249,8 @@ export class DirectLight {
   }
 }
 
-/** The pack's stage with a light's colour, and with what a texel answers to irradiance. */
-function coloured(stage: string): string {
+/** The pack's stage with a light's color, and with what a texel answers to irradiance. */
+function colored(stage: string): string {
   return stage
     .replace("uniform float weight;", "uniform vec3 weight;\nuniform sampler2D reflectance;")
     .replace("visibility) * weight", "visibility) * weight * texelFetch(reflectance, at, 0).rgb");

@@ -1,9 +1,9 @@
 /** Where an asset's texels are lit: four points of each texel's footprint, with their normals. `srbf/visibility/receivers.py` says the same in numpy. */
 import type { Asset, FloatImage } from "../src";
 
-const SAME_SURFACE_COS = 0.9; // of the normals of two neighbours that lie on one smooth surface
-const OFF_PLANE = 0.2; // of their distance: how far a neighbour may lie off the tangent plane
-const LONGER = 2.0; // a neighbour farther off than this many times the other side's lies across a seam
+const SAME_SURFACE_COS = 0.9; // of the normals of two neighbors that lie on one smooth surface
+const OFF_PLANE = 0.2; // of their distance: how far a neighbor may lie off the tangent plane
+const LONGER = 2.0; // a neighbor farther off than this many times the other side's lies across a seam
 const FEW = 1 << 14; // texels
 const BLOCK = 8; // texels a side
 const CORNERS = [
@@ -13,7 +13,7 @@ const CORNERS = [
   [0.25, 0.25],
 ];
 
-/** Points less `centre`, and unit normals, RGBA floats of every texel. */
+/** Points less `center`, and unit normals, RGBA floats of every texel. */
 export interface LitPoints {
   points: Float32Array;
   normals: Float32Array;
@@ -21,7 +21,7 @@ export interface LitPoints {
 
 export interface DirectReceivers {
   /** Metres, of the covered texels: single precision is finest about the origin. */
-  centre: [number, number, number];
+  center: [number, number, number];
   corners: LitPoints[];
   /** Points, xyz, whose bounds along any axis hold those of all covered texels' points. */
   bounds: Float32Array;
@@ -33,14 +33,14 @@ export function directReceivers(asset: Asset, position: FloatImage, normal: Floa
   const real = (i: number) => coverage === undefined || coverage.data[coverage.channels * i] > 0;
   const some = coverage === undefined || coverage.data.some((value, i) => i % coverage.channels === 0 && value > 0);
   const covered = some ? real : () => true;
-  const centre: [number, number, number] = [0, 0, 0];
+  const center: [number, number, number] = [0, 0, 0];
   let count = 0;
   for (let i = 0; i < width * height; ++i) {
     if (!covered(i)) continue;
-    for (let c = 0; c < 3; ++c) centre[c] += position.data[position.channels * i + c];
+    for (let c = 0; c < 3; ++c) center[c] += position.data[position.channels * i + c];
     ++count;
   }
-  for (let c = 0; c < 3; ++c) centre[c] /= count;
+  for (let c = 0; c < 3; ++c) center[c] /= count;
   const along = gradients(width, height, position, normal, real);
   const corners = CORNERS.map(([x, y]) => {
     const points = new Float32Array(4 * width * height);
@@ -48,7 +48,7 @@ export function directReceivers(asset: Asset, position: FloatImage, normal: Floa
     for (let i = 0; i < width * height; ++i) {
       const turned = [0, 0, 0];
       for (let c = 0; c < 3; ++c) {
-        points[4 * i + c] = position.data[position.channels * i + c] - centre[c] + footprint * (x * along.position[0][3 * i + c] + y * along.position[1][3 * i + c]);
+        points[4 * i + c] = position.data[position.channels * i + c] - center[c] + footprint * (x * along.position[0][3 * i + c] + y * along.position[1][3 * i + c]);
         turned[c] = normal.data[normal.channels * i + c] + footprint * (x * along.normal[0][3 * i + c] + y * along.normal[1][3 * i + c]);
       }
       const length = Math.max(Math.hypot(...turned), 1e-20);
@@ -56,7 +56,7 @@ export function directReceivers(asset: Asset, position: FloatImage, normal: Floa
     }
     return { points, normals };
   });
-  return { centre, corners, bounds: bounding(width, height, corners, covered) };
+  return { center, corners, bounds: bounding(width, height, corners, covered) };
 }
 
 /** All points where they are few, else the corners of a box about each block of texels. */
@@ -89,13 +89,13 @@ function bounding(width: number, height: number, corners: readonly LitPoints[], 
 
 type Pair = [Float32Array, Float32Array];
 
-/** Change of position and normal a texel to the right, and a texel down; 0 where no neighbour lies on the same surface. */
+/** Change of position and normal a texel to the right, and a texel down; 0 where no neighbor lies on the same surface. */
 function gradients(width: number, height: number, position: FloatImage, normal: FloatImage, real: (i: number) => boolean): { position: Pair; normal: Pair } {
   const of = (image: FloatImage, i: number, c: number) => image.data[image.channels * i + c];
   const pair = (): Pair => [new Float32Array(3 * width * height), new Float32Array(3 * width * height)];
   const found = { position: pair(), normal: pair() };
-  /** The neighbour's index, and how far it is where it lies on the same surface, else -1. */
-  const neighbour = (r: number, c: number, axis: number, sign: number): { at: number; length: number; same: boolean } => {
+  /** The neighbor's index, and how far it is where it lies on the same surface, else -1. */
+  const neighbor = (r: number, c: number, axis: number, sign: number): { at: number; length: number; same: boolean } => {
     const [row, column] = axis === 0 ? [r, c + sign] : [r + sign, c];
     const i = r * width + c;
     if (row < 0 || column < 0 || row >= height || column >= width) return { at: i, length: 0, same: false };
@@ -116,7 +116,7 @@ function gradients(width: number, height: number, position: FloatImage, normal: 
     for (let c = 0; c < width; ++c) {
       const i = r * width + c;
       for (const axis of [0, 1]) {
-        const [ahead, behind] = [neighbour(r, c, axis, 1), neighbour(r, c, axis, -1)];
+        const [ahead, behind] = [neighbor(r, c, axis, 1), neighbor(r, c, axis, -1)];
         const useAhead = ahead.same && !(behind.same && ahead.length > LONGER * behind.length);
         const useBehind = behind.same && !(useAhead && behind.length > LONGER * ahead.length);
         const weight = Math.max(1, Number(useAhead) + Number(useBehind));

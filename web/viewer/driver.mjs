@@ -127,12 +127,12 @@ process.stdout.write(`${JSON.stringify({ ready: browser.version() })}\n`);
 for await (const line of createInterface({ input: process.stdin })) {
   said.length = 0;
   const { do: what, ...job } = JSON.parse(line);
-  let answer;
+  let response;
   try {
-    answer = { value: await commands[what](job) };
+    response = { value: await commands[what](job) };
   } catch (error) {
-    answer = { error: String(error) };
+    response = { error: String(error) };
   }
-  process.stdout.write(`${JSON.stringify({ ...answer, said })}\n`);
+  process.stdout.write(`${JSON.stringify({ ...response, said })}\n`);
 }
 await browser.close();

@@ -45,7 +45,7 @@ function readHdr(buffer: ArrayBuffer, name: string): Environment {
 
 function rgb(width: number, height: number, channels: number, data: ArrayLike<number>): Environment {
   const pixels = new Float32Array(3 * width * height);
-  const grey = channels < 3;
-  for (let i = 0; i < width * height; ++i) for (let c = 0; c < 3; ++c) pixels[3 * i + c] = data[channels * i + (grey ? 0 : c)];
+  const gray = channels < 3;
+  for (let i = 0; i < width * height; ++i) for (let c = 0; c < 3; ++c) pixels[3 * i + c] = data[channels * i + (gray ? 0 : c)];
   return { width, height, pixels };
 }

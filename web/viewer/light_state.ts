@@ -6,11 +6,11 @@ interface Common {
   on: boolean;
   /** sRGB, #rrggbb. */
   color: string;
-  /** Times the colour, linear: irradiance of a directional light, of a lamp at a0; an environment's scale. */
+  /** Times the color, linear: irradiance of a directional light, of a lamp at a0; an environment's scale. */
   intensity: number;
 }
 
-interface Lamp extends Common {
+interface PointLight extends Common {
   position: Triple;
   a0: number;
   falloff: "linear" | "inverse-square";
@@ -22,12 +22,12 @@ export interface DirectionalState extends Common {
   direction: Triple;
 }
 
-export interface PointState extends Lamp {
+export interface PointState extends PointLight {
   kind: "point";
 }
 
 /** Half-angles in degrees; it shines at `target`. */
-export interface SpotState extends Lamp {
+export interface SpotState extends PointLight {
   kind: "spot";
   target: Triple;
   inner: number;
@@ -39,8 +39,8 @@ export interface EnvironmentState extends Common {
   file: string;
 }
 
-export type LampState = PointState | SpotState;
-export type LightState = DirectionalState | LampState | EnvironmentState;
+export type PointLightState = PointState | SpotState;
+export type LightState = DirectionalState | PointLightState | EnvironmentState;
 
 const COMMON = { on: true, color: "#ffffff", intensity: 1 };
 
@@ -65,7 +65,7 @@ export const spotState = (position: Triple, target: Triple, a0: number): SpotSta
 
 export const environmentState = (file: string): EnvironmentState => ({ kind: "environment", ...COMMON, file });
 
-export function isLampState(light: LightState | undefined): light is LampState {
+export function isPointLightState(light: LightState | undefined): light is PointLightState {
   return light?.kind === "point" || light?.kind === "spot";
 }
 

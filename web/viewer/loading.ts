@@ -97,14 +97,14 @@ async function readImage(folder: string, name: string, fetcher: Fetcher): Promis
 async function readDirect(asset: Asset, coverage: FloatImage | undefined, folder: string, fetcher: Fetcher): Promise<DirectInputs | undefined> {
   const { transport, scene, normal, albedo, quantity } = asset.manifest;
   if (transport !== "indirect" || !scene || !normal || !asset.position || (quantity === "radiance" && !albedo)) return undefined;
-  const [normals, colours, casters] = await Promise.all([
+  const [normals, colors, casters] = await Promise.all([
     readImage(folder, normal, fetcher),
     quantity === "radiance" && albedo ? readImage(folder, albedo, fetcher) : undefined,
     fetched(fetcher, folder + insidePath(scene))
       .then((response) => response.arrayBuffer())
       .then((buffer) => new GLTFLoader().parseAsync(buffer, "")),
   ]);
-  return { normal: normals, coverage, albedo: colours, scene: casters.scene };
+  return { normal: normals, coverage, albedo: colors, scene: casters.scene };
 }
 
 async function readModel(url: string, notes: string[]): Promise<Object3D | undefined> {

@@ -1,4 +1,4 @@
-/** How large a map's values are: what its false colour is scaled to. */
+/** How large a map's values are: what its false color is scaled to. */
 import { DataUtils } from "three";
 import type { Asset } from "../src";
 

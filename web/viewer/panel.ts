@@ -1,7 +1,7 @@
 /** The controls beside the picture: chips of the lights, and folders of numbers. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
-import { directionalState, isLampState, type LightState, pointState, rounded, spotState } from "./light_state";
+import { directionalState, isPointLightState, type LightState, pointState, rounded, spotState } from "./light_state";
 import type { Bounds } from "./receivers";
 import { type Changed, COMPARES, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
 
@@ -114,15 +114,15 @@ export class Panel {
 
   /** A lamp at a place that hangs `height` above what it lights first. */
   add(kind: LightState["kind"], at?: Triple, height = 0.5 * this.facts.bounds.radius): void {
-    const { centre } = this.facts.bounds;
-    const place: Triple = at ?? [centre[0], centre[1], centre[2] + height];
+    const { center } = this.facts.bounds;
+    const place: Triple = at ?? [center[0], center[1], center[2] + height];
     if (kind === "environment") {
       this.actions.chooseEnvironment();
       this.drawChips(true);
       return;
     }
     const light =
-      kind === "directional" ? directionalState([-0.5, -0.5, 0.70711]) : kind === "point" ? pointState(place, height) : spotState(place, centre, height);
+      kind === "directional" ? directionalState([-0.5, -0.5, 0.70711]) : kind === "point" ? pointState(place, height) : spotState(place, center, height);
     this.state.selected = this.state.lights.push(light) - 1;
     this.actions.changed({ lights: true, panel: true });
   }
@@ -132,10 +132,10 @@ export class Panel {
     if (!light || !this.gui) return;
     const folder = this.gui.addFolder("Light");
     folder.add(light, "on").name("On").onChange(this.relight);
-    folder.addColor(light, "color").name("Colour").onChange(this.relight);
+    folder.addColor(light, "color").name("Color").onChange(this.relight);
     folder.add(light, "intensity", 0, 10, 0.01).name("Intensity").onChange(this.relight);
     if (light.kind === "environment") folder.add(light, "file").name("File").disable();
-    if (isLampState(light)) this.lamp(folder, light);
+    if (isPointLightState(light)) this.pointLight(folder, light);
     const remove = {
       remove: () => {
         this.state.lights.splice(this.state.selected, 1);
@@ -146,8 +146,8 @@ export class Panel {
     folder.add(remove, "remove").name("Remove");
   }
 
-  private lamp(folder: GUI, light: Extract<LightState, { kind: "point" | "spot" }>): void {
-    const { centre, radius } = this.facts.bounds;
+  private pointLight(folder: GUI, light: Extract<LightState, { kind: "point" | "spot" }>): void {
+    const { center, radius } = this.facts.bounds;
     const step = 10 ** Math.floor(Math.log10(radius / 100));
     const coordinates = (name: string, get: () => Triple, set: (place: Triple) => void) => {
       ["x", "y", "z"].forEach((axis, c) => {
@@ -160,12 +160,12 @@ export class Panel {
           },
         };
         folder
-          .add(proxy, "place", centre[c] - 3 * radius, centre[c] + 3 * radius, step)
+          .add(proxy, "place", center[c] - 3 * radius, center[c] + 3 * radius, step)
           .name(`${name} ${axis} (m)`)
           .onChange(this.relight);
       });
     };
-    coordinates("Lamp", () => light.position, (place) => (light.position = place));
+    coordinates("Point light", () => light.position, (place) => (light.position = place));
     folder.add(light, "a0", step, 4 * radius, step).name("a₀ (m)").onChange(this.relight);
     folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
     folder.add(light, "radius", 0.0001, radius, 0.0001).name("Radius (m)").onChange(this.relight);
@@ -199,7 +199,7 @@ export class Panel {
     if (hasDirect) folder.add(this.state, "terms", { All: TERMS[0], Direct: TERMS[1], Indirect: TERMS[2] }).name("Light").onChange(this.relight);
     folder.add(this.state, "exposure", -8, 8, 0.05).name("Exposure (stops)").onChange(this.redraw);
     folder.add(this.state, "tone", { Linear: TONES[0], AgX: TONES[1], ACES: TONES[2] }).name("Tone").onChange(this.redraw);
-    folder.add(this.state, "show", { Picture: SHOWS[0], "False colour": SHOWS[1], "Negative values": SHOWS[2], "A map": SHOWS[3] }).name("Show").onChange(this.relight);
+    folder.add(this.state, "show", { Picture: SHOWS[0], "False color": SHOWS[1], "Negative values": SHOWS[2], "A map": SHOWS[3] }).name("Show").onChange(this.relight);
     folder
       .add(this.state, "map", 0, this.facts.maps - 1, 1)
       .name("Map")

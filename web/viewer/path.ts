@@ -5,17 +5,17 @@ import type { State } from "./state";
 
 const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
 
-/** `light` after `turns` rounds of `path`; lamps turn about `centre`, and swing along x by the scene's `radius`. */
-export function along(light: LightState, path: State["path"], turns: number, centre: Triple, radius: number): LightState {
+/** `light` after `turns` rounds of `path`; lamps turn about `center`, and swing along x by the scene's `radius`. */
+export function along(light: LightState, path: State["path"], turns: number, center: Triple, radius: number): LightState {
   const angle = 2 * Math.PI * turns;
   if (path === "none" || light.kind === "environment") return light;
   if (light.kind === "directional") {
     return { ...light, direction: rounded(path === "turn" ? turned(light.direction, angle) : swung(light.direction, angle)) };
   }
   if (path === "turn") {
-    const from: Triple = [light.position[0] - centre[0], light.position[1] - centre[1], light.position[2]];
+    const from: Triple = [light.position[0] - center[0], light.position[1] - center[1], light.position[2]];
     const [x, y, z] = turned(from, angle);
-    return { ...light, position: rounded([x + centre[0], y + centre[1], z]) };
+    return { ...light, position: rounded([x + center[0], y + center[1], z]) };
   }
   return { ...light, position: rounded([light.position[0] + 0.5 * radius * Math.sin(angle), light.position[1], light.position[2]]) };
 }

@@ -3,8 +3,8 @@ import { type Asset, type FloatImage, IDENTITY, type Triple } from "../src";
 import { carried, type Matrix4 } from "../src/matrix";
 
 export interface Bounds {
-  centre: Triple;
-  /** Of a sphere about the centre. */
+  center: Triple;
+  /** Of a sphere about the center. */
   radius: number;
 }
 
@@ -45,14 +45,14 @@ export class Receivers {
     for (let i = 0; this.asset.position && i < width * height; i += every) {
       if (this.covered(i)) this.position(i).forEach((x, c) => axes[c].push(x));
     }
-    if (axes[0].length === 0) return { centre: [0, 0, 0], radius: 1 };
+    if (axes[0].length === 0) return { center: [0, 0, 0], radius: 1 };
     const ends = axes.map((values) => {
       values.sort((a, b) => a - b);
       const outer = this.asset.manifest.source?.receiver?.kind === "view" ? Math.floor(values.length / 20) : 0;
       return [values[outer], values[values.length - 1 - outer]];
     });
-    const centre = ends.map(([least, most]) => (least + most) / 2) as unknown as Triple;
-    return { centre, radius: Math.max(1e-3, Math.hypot(...ends.map(([least, most]) => (most - least) / 2))) };
+    const center = ends.map(([least, most]) => (least + most) / 2) as unknown as Triple;
+    return { center, radius: Math.max(1e-3, Math.hypot(...ends.map(([least, most]) => (most - least) / 2))) };
   }
 }
 

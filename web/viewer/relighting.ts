@@ -6,7 +6,7 @@ import { SrbfRelightingMap } from "../src/three";
 export class ViewerRelighting extends SrbfRelightingMap {
   private readonly skies = new WeakMap<object, Float32Array>();
 
-  /** Weights are linear in a light's colour: an environment's are integrated once, for white. */
+  /** Weights are linear in a light's color: an environment's are integrated once, for white. */
   protected override frame(): FrameValues {
     const lights = this.currentLights();
     const frame = frameValues(this.asset, lights.filter((light) => light.kind !== "environment"));
@@ -34,7 +34,7 @@ export class ViewerRelighting extends SrbfRelightingMap {
   }
 }
 
-/** The lights with their colours negated: relit by them, an asset shows what the clamp of the picture cuts off. */
+/** The lights with their colors negated: relit by them, an asset shows what the clamp of the picture cuts off. */
 export function negated(lights: readonly Light[]): Light[] {
   return lights.map((light) => ({ ...light, color: light.color.map((x) => -x) as unknown as Triple }));
 }

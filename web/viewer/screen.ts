@@ -1,9 +1,9 @@
-/** What the screen shows of a texel: the relit picture, a map, or how it differs from the reference; exposure, tone, false colour. */
+/** What the screen shows of a texel: the relit picture, a map, or how it differs from the reference; exposure, tone, false color. */
 import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
 
 export const VALUES = { picture: 0, reference: 1, difference: 2, map: 3, negative: 4 } as const;
-export const COLOURS = { linear: 0, agx: 1, aces: 2, magnitude: 3, signed: 4, negative: 5 } as const;
+export const COLORS = { linear: 0, agx: 1, aces: 2, magnitude: 3, signed: 4, negative: 5 } as const;
 
 export const BACKGROUND = new Color(0x0f1114);
 
@@ -16,8 +16,8 @@ in vec2 vUv;
 uniform sampler2D relit, negative, reference, ambient, coverage;
 uniform sampler2DArray layers;
 uniform vec4 layerScale, layerBias;
-uniform int layer, channel, value, colour;
-uniform vec3 referenceColour;
+uniform int layer, channel, value, color;
+uniform vec3 referenceColor;
 uniform float split; // in pixels of the drawing buffer; left of it is the reference
 uniform bool nearest;
 uniform vec3 background; // linear, behind a view
@@ -37,7 +37,7 @@ float coverageAt() {
     return textureLod(coverage, place(textureSize(coverage, 0)), 0.0).r;
 #endif
 }
-vec3 referenceAt() { return textureLod(reference, place(textureSize(reference, 0)), 0.0).rgb * referenceColour + ambientAt(); }
+vec3 referenceAt() { return textureLod(reference, place(textureSize(reference, 0)), 0.0).rgb * referenceColor + ambientAt(); }
 
 vec3 valueAt() {
     if (value == ${VALUES.reference} || gl_FragCoord.x < split) return referenceAt();
@@ -63,7 +63,7 @@ vec3 turbo(float x) {
 }
 
 // Blue below 0, red above, dark between.
-vec3 signedColour(float x) {
+vec3 signedColor(float x) {
     float s = clamp(abs(x), 0.0, 1.0);
     vec3 end = x < 0.0 ? vec3(0.18, 0.50, 1.0) : vec3(1.0, 0.28, 0.16);
     vec3 light = x < 0.0 ? vec3(0.85, 0.94, 1.0) : vec3(1.0, 0.93, 0.80);
@@ -86,16 +86,16 @@ void main() {
     vec3 v = valueAt();
 #endif
     vec3 c;
-    if (colour == ${COLOURS.magnitude}) c = turbo(luminance(v) * toneMappingExposure);
-    else if (colour == ${COLOURS.signed}) c = signedColour(luminance(v) * toneMappingExposure);
-    else if (colour == ${COLOURS.negative}) {
+    if (color == ${COLORS.magnitude}) c = turbo(luminance(v) * toneMappingExposure);
+    else if (color == ${COLORS.signed}) c = signedColor(luminance(v) * toneMappingExposure);
+    else if (color == ${COLORS.negative}) {
         vec3 below = max(textureLod(negative, place(textureSize(negative, 0)), 0.0).rgb - ambientAt(), 0.0);
         float depth = max(below.r, max(below.g, below.b)) * toneMappingExposure;
-        vec3 grey = vec3(srgb(vec3(luminance(v) * toneMappingExposure)) * 0.55);
-        c = depth > 0.0005 ? mix(vec3(0.35, 0.05, 0.42), vec3(1.0, 0.35, 1.0), clamp(depth * 8.0, 0.0, 1.0)) : grey;
+        vec3 gray = vec3(srgb(vec3(luminance(v) * toneMappingExposure)) * 0.55);
+        c = depth > 0.0005 ? mix(vec3(0.35, 0.05, 0.42), vec3(1.0, 0.35, 1.0), clamp(depth * 8.0, 0.0, 1.0)) : gray;
     }
-    else if (colour == ${COLOURS.agx}) c = srgb(AgXToneMapping(v));
-    else if (colour == ${COLOURS.aces}) c = srgb(ACESFilmicToneMapping(v));
+    else if (color == ${COLORS.agx}) c = srgb(AgXToneMapping(v));
+    else if (color == ${COLORS.aces}) c = srgb(ACESFilmicToneMapping(v));
     else c = srgb(LinearToneMapping(v));
     float alpha = coverageAt();
     if (cutOut) shown = vec4(alpha > 0.0 ? c : vec3(0.0), alpha);
@@ -147,8 +147,8 @@ export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage:
     layer: { value: 0 },
     channel: { value: -1 },
     value: { value: 0 },
-    colour: { value: 0 },
-    referenceColour: { value: [1, 1, 1] },
+    color: { value: 0 },
+    referenceColor: { value: [1, 1, 1] },
     split: { value: 0 },
     nearest: { value: false },
     toneMappingExposure: { value: 1 },

@@ -174,15 +174,15 @@ export class SkyWidget {
     if (marked) this.ring(x, y, 5, "#7fd1ff", 2);
   }
 
-  private ring(x: number, y: number, radius: number, colour: string, width: number): void {
-    this.context.strokeStyle = colour;
+  private ring(x: number, y: number, radius: number, color: string, width: number): void {
+    this.context.strokeStyle = color;
     this.context.lineWidth = width;
     this.context.beginPath();
     this.context.arc(x, y, radius, 0, 2 * Math.PI);
     this.context.stroke();
   }
 
-  /** What the colours of errors mean. */
+  /** What the colors of errors mean. */
   private scale([worst, best]: [number, number]): void {
     const c = this.context;
     const { clientHeight: height } = this.canvas;

@@ -17,10 +17,10 @@ import {
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Light, Triple } from "../src";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
-import { LampGizmos } from "./lamp_gizmos";
+import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
 import type { Receivers } from "./receivers";
-import { BACKGROUND, COLOURS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
+import { BACKGROUND, COLORS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
 import { Surroundings } from "./surroundings";
 
@@ -28,7 +28,7 @@ const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three enco
 const MOST_PIXEL_RATIO = 2;
 
 export class Stage {
-  readonly gizmos: LampGizmos;
+  readonly gizmos: PointLightGizmos;
   private readonly scene = new Scene();
   private readonly picture = new Scene();
   private readonly orbit: OrbitControls;
@@ -70,7 +70,7 @@ export class Stage {
       this.state.eye = [rounded(fromThree(this.orbitCamera.position)), rounded(fromThree(this.orbit.target))];
       changed();
     });
-    this.gizmos = new LampGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
+    this.gizmos = new PointLightGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
       this.orbit.enabled = !dragging && this.hasMesh;
     });
     this.panByPointer(canvas, changed);
@@ -88,8 +88,8 @@ export class Stage {
 
   /** Whether the mesh is shown in its scene: what is shown of the lightmap alone, such as a map, is shown on the mesh alone. */
   private get inScene(): boolean {
-    const { value, colour } = this.uniforms;
-    return this.canShowScene && this.state.view === "scene" && value.value === VALUES.picture && colour.value !== COLOURS.negative;
+    const { value, color } = this.uniforms;
+    return this.canShowScene && this.state.view === "scene" && value.value === VALUES.picture && color.value !== COLORS.negative;
   }
 
   /** Turn the orbit camera about its target, by so many rad. */
@@ -196,7 +196,7 @@ export class Stage {
     return this.receivers.at((x - left) / wide, (y - top) / high);
   }
 
-  /** From the eye to a place, metres; where no eye is known, as if the whole scene were seen. */
+  /** From the eye to a place, meters; where no eye is known, as if the whole scene were seen. */
   distance(place: Triple): number {
     const eye = this.hasMesh ? fromThree(this.orbitCamera.position) : this.fitted?.position;
     return eye ? Math.hypot(...place.map((x, i) => x - eye[i])) : 3 * this.receivers.bounds.radius;
@@ -251,16 +251,16 @@ export class Stage {
 
   /** From where the file's own camera stands, else from above and in front; it looks at the receivers' middle. */
   private firstView(): [Triple, Triple] {
-    const { centre, radius } = this.receivers.bounds;
+    const { center, radius } = this.receivers.bounds;
     const farther = Math.max(1, 1.15 / this.orbitCamera.aspect); // where the window is narrow
     const own = (this.model?.userData.cameras as Object3D[] | undefined)?.[0];
     if (own) {
       own.updateWorldMatrix(true, false);
       const eye = fromThree(new Vector3().setFromMatrixPosition(own.matrixWorld));
-      return [eye.map((x, i) => centre[i] + (x - centre[i]) * farther) as unknown as Triple, centre];
+      return [eye.map((x, i) => center[i] + (x - center[i]) * farther) as unknown as Triple, center];
     }
     const away = radius * farther;
-    return [[centre[0] - 0.9 * away, centre[1] - 2.1 * away, centre[2] + 1.9 * away], centre];
+    return [[center[0] - 0.9 * away, center[1] - 2.1 * away, center[2] + 1.9 * away], center];
   }
 
   /** Meshes with the extension take the relit light; what else a file holds is left out. */

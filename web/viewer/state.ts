@@ -3,7 +3,7 @@ import { SrbfError, type Triple } from "../src";
 import { checkLight, type LightState, round } from "./light_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
-export const SHOWS = ["picture", "false colour", "negative", "map"] as const;
+export const SHOWS = ["picture", "false color", "negative", "map"] as const;
 export const COMPARES = ["off", "slider", "difference", "reference"] as const;
 export const PATHS = ["none", "turn", "swing"] as const;
 export const TERMS = ["both", "direct", "indirect"] as const;

@@ -35,12 +35,12 @@ import {
   type WebGLRenderer,
   WebGLRenderTarget,
 } from "three";
-import type { EnvironmentLight, LampLight, Light } from "../src";
+import type { EnvironmentLight, PunctualLight, Light } from "../src";
 import { toThree } from "./frames";
 import type { ScreenUniforms } from "./screen";
 
 const SHADOW_SIZE = 2048;
-const SHADOWED_LAMPS = 2; // lamps that cast shadows on what is no receiver; each draws the scene six times
+const SHADOWED_POINT_LIGHTS = 2; // lamps that cast shadows on what is no receiver; each draws the scene six times
 const FILL = 0.12; // of the lights' irradiance: a dim sky for what the lightmap does not light, and for glass to reflect
 const SAMPLES = 4;
 
@@ -118,7 +118,7 @@ export class Surroundings {
       (light as DirectionalLight).dispose?.();
     }
     this.lit.length = 0;
-    let lamps = 0;
+    let pointLights = 0;
     let fill = 0;
     let sky: EnvironmentLight | undefined;
     for (const light of lights) {
@@ -126,7 +126,7 @@ export class Surroundings {
         sky ??= light;
         continue;
       }
-      const made = light.kind === "directional" ? this.sun(light.direction, light.color) : this.lamp(light, lamps++ < SHADOWED_LAMPS);
+      const made = light.kind === "directional" ? this.sun(light.direction, light.color) : this.pointLight(light, pointLights++ < SHADOWED_POINT_LIGHTS);
       const strength = (light.color[0] + light.color[1] + light.color[2]) / 3;
       fill += light.kind === "directional" ? strength * Math.max(0, light.direction[2]) : 0.3 * strength;
       this.lit.push(made);
@@ -155,24 +155,24 @@ export class Surroundings {
   }
 
   /** Irradiance color at the distance a0, as three has candelas. */
-  private lamp(light: LampLight, shadow: boolean): PointLight | SpotLight {
+  private pointLight(light: PunctualLight, shadow: boolean): PointLight | SpotLight {
     const [decay, intensity] = light.falloff === "linear" ? [1, light.a0] : [2, light.a0 ** 2];
     const color = new Color(...(light.color as [number, number, number]));
-    const lamp =
+    const pointLight =
       light.kind === "spot"
         ? new SpotLight(color, intensity, 0, Math.min(light.outer, Math.PI / 2 - 1e-3), 1 - Math.min(1, light.inner / Math.max(light.outer, 1e-6)), decay)
         : new PointLight(color, intensity, 0, decay);
-    lamp.position.copy(toThree(light.position as never));
-    if (lamp instanceof SpotLight && light.kind === "spot") {
-      lamp.target.position.copy(lamp.position).add(toThree(light.direction as never));
-      lamp.target.updateMatrixWorld();
+    pointLight.position.copy(toThree(light.position as never));
+    if (pointLight instanceof SpotLight && light.kind === "spot") {
+      pointLight.target.position.copy(pointLight.position).add(toThree(light.direction as never));
+      pointLight.target.updateMatrixWorld();
     }
-    lamp.castShadow = shadow;
-    lamp.shadow.mapSize.set(SHADOW_SIZE / 2, SHADOW_SIZE / 2);
-    lamp.shadow.camera.near = this.bounds.radius * 0.005;
-    lamp.shadow.camera.far = this.bounds.radius * 6;
-    lamp.shadow.normalBias = (6 * this.bounds.radius) / SHADOW_SIZE;
-    return lamp;
+    pointLight.castShadow = shadow;
+    pointLight.shadow.mapSize.set(SHADOW_SIZE / 2, SHADOW_SIZE / 2);
+    pointLight.shadow.camera.near = this.bounds.radius * 0.005;
+    pointLight.shadow.camera.far = this.bounds.radius * 6;
+    pointLight.shadow.normalBias = (6 * this.bounds.radius) / SHADOW_SIZE;
+    return pointLight;
   }
 
   /** A dropped environment, its top row +z and its middle column +x of Blender's world. */
@@ -224,7 +224,7 @@ void main() {
 const RECEIVER_VERTEX = `precision highp float;
 in vec3 position;
 in vec2 lightmapUv;
-#ifdef COLOURED
+#ifdef COLORED
 in vec4 color;
 #endif
 uniform mat4 modelViewMatrix, projectionMatrix;
@@ -234,12 +234,12 @@ uniform mat3 surfaceTransform;
 out vec2 vSurfaceUv;
 #endif
 out vec2 vUv;
-out vec3 vColour;
+out vec3 vColor;
 void main() {
     vUv = lightmapUv;
-    vColour = vec3(1.0);
-#ifdef COLOURED
-    vColour = color.rgb;
+    vColor = vec3(1.0);
+#ifdef COLORED
+    vColor = color.rgb;
 #endif
 #ifdef TEXTURED
     vSurfaceUv = (surfaceTransform * vec3(surfaceUv, 1.0)).xy;
@@ -250,9 +250,9 @@ void main() {
 const RECEIVER_FRAGMENT = `precision highp float;
 precision highp sampler2D;
 in vec2 vUv;
-in vec3 vColour;
+in vec3 vColor;
 uniform sampler2D relit, reference, ambient;
-uniform vec3 referenceColour, albedo;
+uniform vec3 referenceColor, albedo;
 uniform float split;
 #ifdef TEXTURED
 in vec2 vSurfaceUv;
@@ -261,10 +261,10 @@ uniform sampler2D surface;
 out vec4 radiance;
 void main() {
     vec3 light = gl_FragCoord.x < split
-        ? textureLod(reference, vUv, 0.0).rgb * referenceColour + textureLod(ambient, vUv, 0.0).rgb
+        ? textureLod(reference, vUv, 0.0).rgb * referenceColor + textureLod(ambient, vUv, 0.0).rgb
         : textureLod(relit, vUv, 0.0).rgb;
 #ifdef IRRADIANCE
-    light *= albedo * vColour / 3.14159265358979;
+    light *= albedo * vColor / 3.14159265358979;
 #ifdef TEXTURED
     light *= texture(surface, vSurfaceUv).rgb;
 #endif
@@ -272,7 +272,7 @@ void main() {
     radiance = vec4(max(light, vec3(0.0)), 1.0);
 }`;
 
-/** The relit lightmap in the colours of the material that the mesh had: irradiance × albedo / π; radiance as it is. */
+/** The relit lightmap in the colors of the material that the mesh had: irradiance × albedo / π; radiance as it is. */
 function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): RawShaderMaterial {
   const surface = mesh.userData.surface as MeshStandardMaterial | undefined;
   const { geometry } = mesh;
@@ -289,7 +289,7 @@ function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irrad
   const defines: Record<string, string> = {};
   if (quantity === "irradiance") defines.IRRADIANCE = "";
   if (map && uv) defines.TEXTURED = "";
-  if (geometry.getAttribute("color")) defines.COLOURED = "";
+  if (geometry.getAttribute("color")) defines.COLORED = "";
   return new RawShaderMaterial({
     glslVersion: GLSL3,
     defines,

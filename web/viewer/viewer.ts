@@ -6,7 +6,7 @@ import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
-import { directionalState, type DirectionalState, environmentState, isLampState, lightOf, type LightState, rounded } from "./light_state";
+import { directionalState, type DirectionalState, environmentState, isPointLightState, lightOf, type LightState, rounded } from "./light_state";
 import { listen, tabled } from "./keys";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange } from "./map_range";
@@ -16,7 +16,7 @@ import { along } from "./path";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng } from "./saving";
-import { COLOURS, screenUniforms, VALUES } from "./screen";
+import { COLORS, screenUniforms, VALUES } from "./screen";
 import { type SkyPoint, SkyWidget } from "./sky_widget";
 import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
@@ -24,7 +24,7 @@ import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type Sta
 import { type Subject, Subjects } from "./subject";
 import { Surroundings } from "./surroundings";
 
-const FRAMES_A_SECOND = 24;
+const FRAMES_PER_SECOND = 24;
 const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const PACES = 15; // frames whose median is told
 const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
@@ -275,8 +275,8 @@ export class Viewer {
   }
 
   private moved(light: LightState, turns: number): LightState {
-    const { centre, radius } = this.receivers.bounds;
-    return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, centre, radius);
+    const { center, radius } = this.receivers.bounds;
+    return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, center, radius);
   }
 
   private relight(): void {
@@ -296,7 +296,7 @@ export class Viewer {
     return this.state.compare !== "off" && this.comparison.possible && this.sun() !== undefined;
   }
 
-  /** The lights, or what they are compared by: the baked one that is nearest to the sun, in the sun's colour. */
+  /** The lights, or what they are compared by: the baked one that is nearest to the sun, in the sun's color. */
   private lights(): Light[] {
     const sun = this.sun();
     if (!sun || !this.comparing()) {
@@ -322,8 +322,8 @@ export class Viewer {
     const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
     uniforms.value.value = VALUES[value as keyof typeof VALUES];
     const signed = value === "difference" || value === "map";
-    const colour = signed ? "signed" : state.show === "false colour" ? "magnitude" : state.show === "negative" && !comparing ? "negative" : state.tone;
-    uniforms.colour.value = COLOURS[colour];
+    const color = signed ? "signed" : state.show === "false color" ? "magnitude" : state.show === "negative" && !comparing ? "negative" : state.tone;
+    uniforms.color.value = COLORS[color];
     const most = value === "map" ? mapRange(this.subject.asset, state.map) : 1;
     uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
     uniforms.split.value = comparing && state.compare === "slider" ? state.split * this.renderer.domElement.clientWidth : 0;
@@ -335,7 +335,7 @@ export class Viewer {
     this.panel.refresh();
     const shown = this.comparison.direction ?? this.sun()?.direction;
     bearing(element("bearing"), shown, shown !== undefined && this.sky.inside(shown));
-    legend(element("legend"), colour, most * 2 ** -state.exposure);
+    legend(element("legend"), color, most * 2 ** -state.exposure);
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
@@ -459,7 +459,7 @@ export class Viewer {
     if (!place) return;
     const light = this.state.lights[this.state.selected];
     const over = rounded([place[0], place[1], place[2] + ABOVE * this.stage.distance(place)]);
-    if (isLampState(light)) {
+    if (isPointLightState(light)) {
       light.position = over;
       if (light.kind === "spot") light.target = rounded(place as Triple);
       this.changed({ lights: true });
@@ -491,7 +491,7 @@ export class Viewer {
 
   private savePath(): void {
     const { lights, selected, seconds } = this.state;
-    const count = Math.max(1, Math.round(seconds * FRAMES_A_SECOND));
+    const count = Math.max(1, Math.round(seconds * FRAMES_PER_SECOND));
     const frame = (i: number) => lights.map((light, j) => (j === selected ? this.moved(light, i / count) : light));
     saveFrames("FRAMES.json", Array.from({ length: count }, (_, i) => frame(i)));
   }

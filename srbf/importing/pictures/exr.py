@@ -10,11 +10,11 @@ from srbf.errors import ImageError
 from srbf.importing.pictures.found import Found, Tags, stripped
 from srbf.io.image import Part, parts_of, read_channels
 
-PICTURES = {"combined", "rgb", "rgba", "beauty", "color", "colour", "final"}
+PICTURES = {"combined", "rgb", "rgba", "beauty", "color", "final"}
 VIEWS = {"left", "right"}
 DATA = {"ao", "ambientocclusion", "ambient", "depth", "z", "mist", "normal", "normals", "n", "position", "p", "pos", "uv", "st", "vector"}
 DATA |= {"motion", "velocity", "indexob", "indexma", "id", "mask", "matte", "shadow", "denoising", "noisy", "albedo", "debug", "variance"}
-GRAY = ("Y", "L", "I", "gray", "grey", "luminance")
+GRAY = ("Y", "L", "I", "gray", "gray", "luminance")
 
 
 @dataclass(frozen=True)

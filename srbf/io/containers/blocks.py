@@ -18,7 +18,7 @@ from srbf.io.image import read_stored
 BlockFormat = Literal["bc7", "bc1"]
 BLOCK_BYTES: dict[str, int] = {"bc7": 16, "bc1": 8}  # 8 and 4 bits a texel
 SIDE = 4
-ROWS_AT_A_TIME = 1 << 14  # of one picture that OpenImageIO decodes
+ROW_BATCH = 1 << 14  # of one picture that OpenImageIO decodes
 
 
 def encode(pixels: ndarray, form: BlockFormat) -> ndarray:
@@ -38,7 +38,7 @@ def decode(blocks: ndarray, form: BlockFormat, width: int, height: int) -> ndarr
     """(N, height, width, 4) uint8 of N layers' blocks, (N, bytes) uint8, by OpenImageIO's reader of DDS files."""
     high, wide = -(-height // SIDE) * SIDE, -(-width // SIDE) * SIDE
     pixels = np.empty((len(blocks), height, width, 4), np.uint8)
-    at_a_time = max(1, ROWS_AT_A_TIME // high)
+    at_a_time = max(1, ROW_BATCH // high)
     with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
         path = Path(folder) / "blocks.dds"
         for start in range(0, len(blocks), at_a_time):

@@ -15,7 +15,7 @@ from srbf.io.containers.texture_array import TextureArray, level_bytes, level_si
 from srbf.io.image import read_image
 
 FORMS = ("bc7", "bc1", "uint8", "half")
-BC7_ERROR, BC1_ERROR = 3.0, 9.0  # rms in bytes on a smooth picture; one block's colours lie on one or two lines
+BC7_ERROR, BC1_ERROR = 3.0, 9.0  # rms in bytes on a smooth picture; one block's colors lie on one or two lines
 
 
 def picture(width: int, height: int, channels: int = 3, seed: int = 0) -> np.ndarray:

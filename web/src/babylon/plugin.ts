@@ -25,14 +25,14 @@ export interface PluginOptions {
 /** Numbers that the plugins of an asset share. */
 export interface SharedFrame {
   weights: Float32Array;
-  lamps: Float32Array;
-  lampCount: number;
+  pointLights: Float32Array;
+  pointLightCount: number;
   room: number;
   /** Column by column. */
   assetFromScene: Float32Array;
 }
 
-const UNIFORMS = ["srbfWeights", "srbfCenters", "srbfScale", "srbfBias", "srbfLamps", "srbfLampCount", "srbfTableSize", "srbfAssetFromScene"];
+const UNIFORMS = ["srbfWeights", "srbfCenters", "srbfScale", "srbfBias", "srbfPointLights", "srbfPointLightCount", "srbfTableSize", "srbfAssetFromScene"];
 
 export class SrbfPlugin extends MaterialPluginBase {
   private readonly constants: Record<string, Float32Array>;
@@ -82,8 +82,8 @@ export class SrbfPlugin extends MaterialPluginBase {
     for (const [name, values] of Object.entries(this.constants)) effect.setFloatArray4(name, values);
     if (this.asset.basis.kind === "gaussian") effect.setFloatArray4("srbfWeights", this.frame.weights);
     else effect.setInt("srbfTableSize", this.asset.basis.tableSize);
-    effect.setFloatArray4("srbfLamps", this.frame.lamps);
-    effect.setInt("srbfLampCount", this.frame.lampCount);
+    effect.setFloatArray4("srbfPointLights", this.frame.pointLights);
+    effect.setInt("srbfPointLightCount", this.frame.pointLightCount);
     effect.setMatrices("srbfAssetFromScene", this.frame.assetFromScene);
   }
 

@@ -3,7 +3,7 @@ import { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";
 import type { Scene } from "@babylonjs/core/scene.js";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
-import { lampRoom, packedLamps } from "../lamp";
+import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
 import { columnMajor, type Matrix4, multiplied, Z_UP_FROM_Y_UP } from "../matrix";
 import { frameValues, needPositions } from "../shader";
@@ -20,7 +20,7 @@ export const Z_UP_FROM_LEFT_HANDED: Matrix4 = [
 
 /** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` when they have changed, `dispose` at the end. */
 export class SrbfRelightingMap {
-  /** In the asset's world: Blender's, z up, metres. */
+  /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
   /** Blender's world from the scene's; where meshes of the asset were moved, with the inverse of that. */
   worldFromScene: Matrix4;
@@ -39,7 +39,7 @@ export class SrbfRelightingMap {
     }
     this.worldFromScene = scene.useRightHandedSystem ? Z_UP_FROM_Y_UP : Z_UP_FROM_LEFT_HANDED;
     this.textures = new BabylonTextures(asset, scene, options.filter ?? "linear");
-    this.frame = { weights: new Float32Array(0), lamps: new Float32Array(16), lampCount: 0, room: 1, assetFromScene: new Float32Array(16) };
+    this.frame = { weights: new Float32Array(0), pointLights: new Float32Array(16), pointLightCount: 0, room: 1, assetFromScene: new Float32Array(16) };
     this.update();
   }
 
@@ -63,11 +63,11 @@ export class SrbfRelightingMap {
   /** Bring the uniforms to the lights as they are now. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
-    const room = lampRoom(values.lamps.length);
+    const room = pointLightRoom(values.pointLights.length);
     const changed = room !== this.frame.room;
     this.frame.weights = values.weights;
-    this.frame.lamps = packedLamps(values.lamps, room);
-    this.frame.lampCount = values.lamps.length;
+    this.frame.pointLights = packedPointLights(values.pointLights, room);
+    this.frame.pointLightCount = values.pointLights.length;
     this.frame.room = room;
     this.frame.assetFromScene = new Float32Array(columnMajor(multiplied(this.asset.assetFromWorld, this.worldFromScene)));
     this.textures.weights?.update(values.weights);

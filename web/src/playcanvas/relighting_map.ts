@@ -2,7 +2,7 @@
 import { BLEND_NORMAL, type GraphicsDevice, SEMANTIC_POSITION, SEMANTIC_TEXCOORD0, SEMANTIC_TEXCOORD1, ShaderMaterial } from "playcanvas";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { SrbfError } from "../errors";
-import { lampRoom, packedLamps } from "../lamp";
+import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
 import { columnMajor, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { frameValues, needPositions, paddedCenters } from "../shader";
@@ -23,7 +23,7 @@ interface Shown {
 
 /** An asset that PlayCanvas shows under WebGL2 by materials of its own. Set `lights`, call `update` when they have changed, `dispose` at the end. */
 export class SrbfRelightingMap {
-  /** In the asset's world: Blender's, z up, metres. */
+  /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
   /** Blender's world from the scene's; where meshes of the asset were moved, with the inverse of that. */
   worldFromScene: Matrix4 = Z_UP_FROM_Y_UP;
@@ -74,7 +74,7 @@ export class SrbfRelightingMap {
   /** Bring the materials to the lights as they are now. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
-    const room = lampRoom(values.lamps.length);
+    const room = pointLightRoom(values.pointLights.length);
     if (room !== this.room) {
       this.room = room;
       for (const shown of this.shown) this.compile(shown);
@@ -86,8 +86,8 @@ export class SrbfRelightingMap {
     }
     for (const { material } of this.shown) {
       if (this.asset.basis.kind === "gaussian") material.setParameter("srbfWeights[0]", values.weights);
-      material.setParameter("srbfLamps[0]", packedLamps(values.lamps, room));
-      material.setParameter("srbfLampCount", values.lamps.length);
+      material.setParameter("srbfPointLights[0]", packedPointLights(values.pointLights, room));
+      material.setParameter("srbfPointLightCount", values.pointLights.length);
       material.setParameter("srbfAssetFromScene", assetFromScene);
     }
   }

@@ -37,7 +37,7 @@ varying vec3 vSrbfReceiver;
 uniform vec3 srbfAlbedo;
 ${receivers === "map" ? "uniform highp sampler2D srbfPositions;" : ""}
 ${asset.alpha ? "uniform sampler2D srbfAlpha;" : ""}
-${shaderText(asset, room).replaceAll("4 * SRBF_LAMPS", String(4 * room))}
+${shaderText(asset, room).replaceAll("4 * SRBF_POINT_LIGHTS", String(4 * room))}
 void main(void) {
     vec3 outgoing = ${asset.manifest.quantity === "irradiance" ? `srbfAlbedo * ${light} * 0.3183098861837907` : light};
     gl_FragColor = vec4(gammaCorrectOutput(toneMap(outgoing)), ${asset.alpha ? "textureLod(srbfAlpha, vSrbfUv, 0.0).r" : "1.0"});

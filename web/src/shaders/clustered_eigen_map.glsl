@@ -13,14 +13,14 @@ uniform highp sampler2D srbfClusters;
 uniform int srbfTableSize;
 uniform vec4 srbfScale[SRBF_LAYERS];
 uniform vec4 srbfBias[SRBF_LAYERS];
-uniform vec4 srbfLamps[4 * SRBF_LAMPS];
-uniform int srbfLampCount;
+uniform vec4 srbfPointLights[4 * SRBF_POINT_LIGHTS];
+uniform int srbfPointLightCount;
 
 // Signed: before the clamp.
 vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
     ivec2 texel = ivec2(uv * vec2(textureSize(srbfLayers, 0).xy));
     return srbfClusteredLights(srbfLayers, srbfClusters, texel, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias, receiver,
-                               srbfLamps, srbfLampCount);
+                               srbfPointLights, srbfPointLightCount);
 }
 
 vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {

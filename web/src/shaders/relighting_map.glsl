@@ -10,13 +10,13 @@ uniform vec4 srbfWeights[SRBF_K];
 uniform vec4 srbfCenters[SRBF_K];
 uniform vec4 srbfScale[SRBF_K];
 uniform vec4 srbfBias[SRBF_K];
-uniform vec4 srbfLamps[4 * SRBF_LAMPS];
-uniform int srbfLampCount;
+uniform vec4 srbfPointLights[4 * SRBF_POINT_LIGHTS];
+uniform int srbfPointLightCount;
 
 // Signed: before the clamp.
 vec3 srbfSum(vec2 uv, float level, vec3 receiver) {
     return srbfRelightLights(srbfLayers, uv, level, 0, srbfWeights, srbfTable, srbfCenters, srbfScale, srbfBias, receiver,
-                             srbfLamps, srbfLampCount);
+                             srbfPointLights, srbfPointLightCount);
 }
 
 vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {

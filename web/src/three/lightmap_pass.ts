@@ -79,7 +79,7 @@ export class LightmapPass {
   draw(renderer: WebGLRenderer, added?: Added): void {
     if (added?.texture !== this.added?.texture || added?.alone !== this.added?.alone) this.room = 0;
     this.added = added;
-    const room = (this.uniforms.srbfLamps.value as Float32Array).length / 16;
+    const room = (this.uniforms.srbfPointLights.value as Float32Array).length / 16;
     if (room !== this.room) this.compile(room);
     const kept = { target: renderer.getRenderTarget(), autoClear: renderer.autoClear, xr: renderer.xr.enabled, shadows: renderer.shadowMap.autoUpdate };
     renderer.autoClear = false;

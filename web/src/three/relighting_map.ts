@@ -3,7 +3,7 @@ import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
-import { lampRoom } from "../lamp";
+import { pointLightRoom } from "../point_light";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
@@ -110,14 +110,14 @@ export class SrbfRelightingMap extends SceneAsset {
    */
   update(renderer?: WebGLRenderer): void {
     const frame = this.frame();
-    if (this.pass) needPositions(this.asset, frame.lamps.length);
+    if (this.pass) needPositions(this.asset, frame.pointLights.length);
     if (renderer) {
       checkCompression(this.asset, (encoding) => renderer.extensions.has(EXTENSIONS[encoding]));
-      this.checkUniforms(renderer, lampRoom(frame.lamps.length));
+      this.checkUniforms(renderer, pointLightRoom(frame.pointLights.length));
     }
     setFrame(this.uniforms, this.textures, frame);
     (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(this.assetFromScene());
-    const room = lampRoom(frame.lamps.length);
+    const room = pointLightRoom(frame.pointLights.length);
     if (room !== this.room) this.recompile(room);
     if (this.pass) this.redraw(frame, renderer);
   }
@@ -129,7 +129,7 @@ export class SrbfRelightingMap extends SceneAsset {
 
   private redraw(frame: FrameValues, renderer: WebGLRenderer | undefined): void {
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
-    const state = JSON.stringify([[...frame.weights], frame.lamps]);
+    const state = JSON.stringify([[...frame.weights], frame.pointLights]);
     if (state === this.drawn) return;
     this.pass?.draw(renderer, this.added);
     this.drawn = state;

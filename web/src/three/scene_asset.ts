@@ -9,7 +9,7 @@ import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 
 /** An asset, and the lights that shine on it: three's own by `follow`, in three's world, and those of the library in `lights`. */
 export class SceneAsset {
-  /** Lights of the library beside the followed ones, in the asset's world: Blender's, z up, metres. */
+  /** Lights of the library beside the followed ones, in the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
   /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
   readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
@@ -43,7 +43,7 @@ export class SceneAsset {
     return frameValues(this.asset, this.currentLights());
   }
 
-  /** From three's world to the asset's frame, metres. */
+  /** From three's world to the asset's frame, meters. */
   protected assetFromScene(): Matrix4 {
     return threeMatrix(multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene)));
   }

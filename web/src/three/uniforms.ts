@@ -1,7 +1,7 @@
 /** The uniforms of `shaderText` as three.js has them; every material and pass of an asset shares these objects. */
 import { type IUniform, Matrix4 } from "three";
 import type { Asset } from "../asset";
-import { lampRoom, packedLamps } from "../lamp";
+import { pointLightRoom, packedPointLights } from "../point_light";
 import { type FrameValues, paddedCenters } from "../shader";
 import type { SrbfTextures } from "./textures";
 
@@ -15,8 +15,8 @@ export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
     srbfTable: { value: textures.table },
     srbfScale: { value: asset.scale },
     srbfBias: { value: asset.bias },
-    srbfLamps: { value: packedLamps([], 1) },
-    srbfLampCount: { value: 0 },
+    srbfPointLights: { value: packedPointLights([], 1) },
+    srbfPointLightCount: { value: 0 },
     srbfAssetFromScene: { value: new Matrix4() },
   };
   if (textures.alpha) uniforms.srbfAlpha = { value: textures.alpha };
@@ -40,6 +40,6 @@ export function setFrame(uniforms: Uniforms, textures: SrbfTextures, frame: Fram
   } else {
     (uniforms.srbfWeights.value as Float32Array).set(frame.weights);
   }
-  uniforms.srbfLamps.value = packedLamps(frame.lamps, lampRoom(frame.lamps.length));
-  uniforms.srbfLampCount.value = frame.lamps.length;
+  uniforms.srbfPointLights.value = packedPointLights(frame.pointLights, pointLightRoom(frame.pointLights.length));
+  uniforms.srbfPointLightCount.value = frame.pointLights.length;
 }

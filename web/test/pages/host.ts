@@ -1,13 +1,13 @@
 /** Jobs without a GPU: what the core computes and decodes. */
 import { frameValues, loadAsset } from "../../src";
-import { foldedWeights } from "../../src/weights";
+import { projectedWeights } from "../../src/weights";
 import { type Job, lightOfJson } from "./job";
 
 /** Folded weights in double precision, and the lamps' uniforms. */
 export async function host(job: Job) {
   const asset = await loadAsset(job.asset, { verify: true });
   const lights = job.lights.map(lightOfJson);
-  return { weights: [...foldedWeights(asset, lights, asset.assetFromWorld)], lamps: frameValues(asset, lights).lamps };
+  return { weights: [...projectedWeights(asset, lights, asset.assetFromWorld)], pointLights: frameValues(asset, lights).pointLights };
 }
 
 /** The layers as they were decoded, level after level. */

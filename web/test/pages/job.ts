@@ -22,11 +22,11 @@ export interface Picture {
 }
 
 export function lightOfJson(json: LightJson): Light {
-  const lamp = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number };
+  const options = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number };
   if (json.kind === "directional") return directionalLight(json.direction as Triple, json.color);
-  if (json.kind === "point") return pointLight(json.position as Triple, lamp);
+  if (json.kind === "point") return pointLight(json.position as Triple, options);
   if (json.kind === "spot") {
-    return spotLight(json.position as Triple, json.direction as Triple, { inner: json.inner as number, outer: json.outer as number }, lamp);
+    return spotLight(json.position as Triple, json.direction as Triple, { inner: json.inner as number, outer: json.outer as number }, options);
   }
   return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color);
 }

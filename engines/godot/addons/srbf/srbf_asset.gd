@@ -126,7 +126,7 @@ func defines() -> String:
 	if method == "relighting-map":
 		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
 	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
-	return kind + "#define %s\n#define SRBF_SCALARS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
+	return kind + "#define %s\n#define SRBF_COMPONENTS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
 ## One weight a map, or a light function of every cluster, for all far lights together: the sum of color w(direction), w = 1.

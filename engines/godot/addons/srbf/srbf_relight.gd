@@ -4,10 +4,10 @@ extends Node3D
 ## Lights its surfaces by an asset, and follows Godot's lights.
 ##
 ## The node stands where the asset's origin is, turned and scaled alike. A light of energy 1 gives a white diffuse surface what Godot's
-## own light gives it: π times its linear colour as irradiance, from an omni or spot light at 1 m.
+## own light gives it: π times its linear color as irradiance, from an omni or spot light at 1 m.
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
-const RADIUS := 1e-4  # metres: no receiver is nearer to a lamp, as in Godot
+const RADIUS := 1e-4  # meters: no receiver is nearer to a lamp, as in Godot
 const SKY_WIDTH := 32
 const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 
@@ -20,7 +20,7 @@ const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
 @export var sky: Texture2D
 @export var sky_energy := 1.0
 ## How many omni and spot lights a shader has room for.
-@export_range(1, 64) var most_lamps := 4
+@export_range(1, 64) var most_point_lights := 4
 ## Eigen maps: weigh directional lights by the table, as omni and spot lights are, where they move every frame.
 @export var suns_by_table := false
 ## For canvas items, in stops.
@@ -78,7 +78,7 @@ func _process(_delta: float) -> void:
 		return
 	_last = now
 	_set_far(found, asset_from_godot)
-	_set_lamps(found, asset_from_godot)
+	_set_point_lights(found, asset_from_godot)
 	for material in _materials:
 		material.set_shader_parameter("srbf_asset_from_world", asset_from_godot)
 		material.set_shader_parameter("srbf_exposure", exposure)
@@ -128,27 +128,27 @@ func _follow_sky(asset_from_godot: Transform3D) -> void:
 	_sky_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
 
 
-func _set_lamps(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
-	var lamps := PackedVector4Array()
-	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # of the asset's metres a metre of Godot's
+func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
+	var point_lights := PackedVector4Array()
+	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # of the asset's meters a meter of Godot's
 	for light in found:
 		if light is DirectionalLight3D or not asset.position:
 			continue
-		if lamps.size() == 4 * most_lamps:
-			push_warning("expected at most %d omni and spot lights, found more; raise most_lamps" % most_lamps)
+		if point_lights.size() == 4 * most_point_lights:
+			push_warning("expected at most %d omni and spot lights, found more; raise most_point_lights" % most_point_lights)
 			break
 		var squared := _decay(light) >= 1.5
 		var place := asset_from_godot * light.global_position
 		var color := irradiance(light) * (unit * unit if squared else unit)
 		var axis := -(asset_from_godot.basis * light.global_basis.z).normalized()
 		var cone := _cone_of(light)
-		lamps.append(Vector4(place.x, place.y, place.z, RADIUS * unit))
-		lamps.append(Vector4(0.0, 0.0, 0.0, 1.0 if squared else 0.0))
-		lamps.append(Vector4(color.x, color.y, color.z, cone.x))
-		lamps.append(Vector4(axis.x, axis.y, axis.z, cone.y))
-	_give("srbf_lamp_count", lamps.size() / 4)
-	lamps.resize(4 * most_lamps)
-	_give("srbf_lamps", lamps)
+		point_lights.append(Vector4(place.x, place.y, place.z, RADIUS * unit))
+		point_lights.append(Vector4(0.0, 0.0, 0.0, 1.0 if squared else 0.0))
+		point_lights.append(Vector4(color.x, color.y, color.z, cone.x))
+		point_lights.append(Vector4(axis.x, axis.y, axis.z, cone.y))
+	_give("srbf_point_light_count", point_lights.size() / 4)
+	point_lights.resize(4 * most_point_lights)
+	_give("srbf_point_lights", point_lights)
 
 
 ## What a light gives a surface that faces it, of an omni or spot light at 1 m: linear, in Godot's unit times π.
@@ -174,8 +174,8 @@ static func _decay(light: Light3D) -> float:
 
 func _material(type: String, file: String) -> ShaderMaterial:
 	var shader := Shader.new()
-	shader.code = "shader_type %s;\n%s#define SRBF_LAMPS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
-		type, asset.defines(), most_lamps, file
+	shader.code = "shader_type %s;\n%s#define SRBF_POINT_LIGHTS %d\n#include \"res://addons/srbf/shaders/%s.gdshaderinc\"\n" % [
+		type, asset.defines(), most_point_lights, file
 	]
 	var material := ShaderMaterial.new()
 	material.shader = shader

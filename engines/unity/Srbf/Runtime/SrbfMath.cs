@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What relighting computes on the host, without a line of Unity in it: axes, light functions, weights. Doubles; metres, radians.
+// What relighting computes on the host, without a line of Unity in it: axes, light functions, weights. Doubles; meters, radians.
 using System;
 using System.Collections.Generic;
 
@@ -21,7 +21,7 @@ namespace Srbf
     }
 
     /// <summary>A directional light in the asset's frame: the unit direction towards it, and its irradiance as linear RGB.</summary>
-    public struct FarLight
+    public struct DistantLight
     {
         public Vector ToLight;
         public Vector Color;
@@ -61,12 +61,12 @@ namespace Srbf
             return pairs;
         }
 
-        /// <summary>The sum over far lights of colour times R_i, RGBA a map with A = 1: what _SrbfWeights holds.</summary>
-        public static float[] MapWeights(double[] centers, float[] table, IList<FarLight> lights)
+        /// <summary>The sum over far lights of color times R_i, RGBA a map with A = 1: what _SrbfWeights holds.</summary>
+        public static float[] MapWeights(double[] centers, float[] table, IList<DistantLight> lights)
         {
             int count = centers.Length / 3;
             var sums = new double[count * 3];
-            foreach (FarLight light in lights)
+            foreach (DistantLight light in lights)
                 for (int i = 0; i < count; i++)
                 {
                     var center = new Vector(centers[3 * i], centers[3 * i + 1], centers[3 * i + 2]).Normalized();
@@ -76,14 +76,14 @@ namespace Srbf
         }
 
         /// <summary>
-        /// The sum over far lights of colour times w_f(L), RGBA a function with A = 1: a row of (scalars + 1) texels a cluster.
+        /// The sum over far lights of color times w_f(L), RGBA a function with A = 1: a row of (scalars + 1) texels a cluster.
         /// w_f(L) is the sum over b of coefficients[f, b] exp(-acos(L.Q_b)^2 / (2 spread_f^2)).
         /// </summary>
-        public static float[] PlaneWeights(double[] centers, double[] spreads, float[] coefficients, IList<FarLight> lights)
+        public static float[] PlaneWeights(double[] centers, double[] spreads, float[] coefficients, IList<DistantLight> lights)
         {
             int count = centers.Length / 3;
             var sums = new double[spreads.Length * 3];
-            foreach (FarLight light in lights)
+            foreach (DistantLight light in lights)
             {
                 var angles = new double[count];
                 for (int b = 0; b < count; b++)
@@ -118,10 +118,10 @@ namespace Srbf
         public static double Versine(double halfAngle) { return 2 * Math.Sin(halfAngle / 2) * Math.Sin(halfAngle / 2); }
 
         /// <summary>
-        /// Sixteen floats of a lamp in the asset's frame, as srbfUnpackLamp takes them: its colour becomes the irradiance at 1 m. Angles are
+        /// Sixteen floats of a lamp in the asset's frame, as srbfUnpackPointLight takes them: its color becomes the irradiance at 1 m. Angles are
         /// Unity's, whole and in degrees; below 0 for a point light.
         /// </summary>
-        public static float[] PackedLamp(Vector place, Vector color, Vector axis, double a0, double radius, bool linear, double innerDegrees, double outerDegrees)
+        public static float[] PackedPointLight(Vector place, Vector color, Vector axis, double a0, double radius, bool linear, double innerDegrees, double outerDegrees)
         {
             double atOne = linear ? a0 : a0 * a0;
             double inner = outerDegrees < 0 ? 3 : Versine(innerDegrees * 0.5 * Math.PI / 180), outer = outerDegrees < 0 ? 4 : Versine(outerDegrees * 0.5 * Math.PI / 180);

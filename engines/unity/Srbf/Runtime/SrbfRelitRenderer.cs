@@ -12,23 +12,23 @@ namespace Srbf
     [RequireComponent(typeof(Renderer))]
     public sealed class SrbfRelitRenderer : MonoBehaviour
     {
-        public const int MostLamps = 8;  // SRBF_LAMPS of SrbfAsset.hlsl
+        public const int MostPointLights = 8;  // SRBF_POINT_LIGHTS of SrbfAsset.hlsl
 
         public SrbfAsset asset;
         [Tooltip("The imported scene's root, whose space is Blender's world turned to Unity's axes; none: Unity's world.")]
         public Transform root;
         [Tooltip("The lights to follow; none: all that are enabled in the scene.")]
         public Light[] lights;
-        [Tooltip("Distance in metres at which a lamp gives its colour.")]
+        [Tooltip("Distance in meters at which a lamp gives its color.")]
         public float falloffDistance = 1;
         [Tooltip("a0/|L| instead of its square.")]
         public bool linearFalloff;
         [Tooltip("Metres; a receiver counts as no nearer to a lamp than this.")]
-        public float lampRadius = 0.05f;
+        public float pointLightRadius = 0.05f;
 
-        readonly List<FarLight> far = new List<FarLight>();
-        readonly List<FarLight> known = new List<FarLight>();
-        readonly Vector4[] lamps = new Vector4[4 * MostLamps];
+        readonly List<DistantLight> far = new List<DistantLight>();
+        readonly List<DistantLight> known = new List<DistantLight>();
+        readonly Vector4[] pointLights = new Vector4[4 * MostPointLights];
         MaterialPropertyBlock block;
         Vector4[] weights;
         Texture2D rows;
@@ -41,13 +41,13 @@ namespace Srbf
             Matrix4x4 assetFromUnity = AssetFromUnity();
             far.Clear();
             int count = 0;
-            foreach (Light lamp in lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
+            foreach (Light pointLight in lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
             {
-                if (lamp == null || !lamp.isActiveAndEnabled) continue;
-                Color color = lamp.color.linear * lamp.intensity;
-                if (lamp.useColorTemperature) color *= Mathf.CorrelatedColorTemperatureToRGB(lamp.colorTemperature);
-                if (lamp.type == LightType.Directional) far.Add(Far(assetFromUnity, lamp, color));
-                else if ((lamp.type == LightType.Point || lamp.type == LightType.Spot) && count < MostLamps) SetLamp(assetFromUnity, lamp, color, count++);
+                if (pointLight == null || !pointLight.isActiveAndEnabled) continue;
+                Color color = pointLight.color.linear * pointLight.intensity;
+                if (pointLight.useColorTemperature) color *= Mathf.CorrelatedColorTemperatureToRGB(pointLight.colorTemperature);
+                if (pointLight.type == LightType.Directional) far.Add(Far(assetFromUnity, pointLight, color));
+                else if ((pointLight.type == LightType.Point || pointLight.type == LightType.Spot) && count < MostPointLights) SetPointLight(assetFromUnity, pointLight, color, count++);
             }
             if (weighed != asset) GetComponent<Renderer>().SetPropertyBlock(null);  // arrays of a block never grow
             if (weighed != asset || Changed()) Weigh();
@@ -59,8 +59,8 @@ namespace Srbf
             if (asset.IsMaps) block.SetVectorArray("_SrbfWeights", weights);
             else block.SetTexture("_SrbfWeightRows", rows);
             block.SetMatrix("_SrbfAssetFromWorld", assetFromUnity);
-            block.SetFloat("_SrbfLampCount", count);
-            block.SetVectorArray("_SrbfLamps", lamps);
+            block.SetFloat("_SrbfPointLightCount", count);
+            block.SetVectorArray("_SrbfPointLights", pointLights);
             GetComponent<Renderer>().SetPropertyBlock(block);
         }
 
@@ -83,20 +83,20 @@ namespace Srbf
             return matrix;
         }
 
-        static FarLight Far(Matrix4x4 assetFromUnity, Light lamp, Color color)
+        static DistantLight Far(Matrix4x4 assetFromUnity, Light pointLight, Color color)
         {
-            Vector3 toLight = assetFromUnity.MultiplyVector(-lamp.transform.forward);  // Unity's lights shine along +z
-            return new FarLight { ToLight = new Vector(toLight.x, toLight.y, toLight.z).Normalized(), Color = new Vector(color.r, color.g, color.b) };
+            Vector3 toLight = assetFromUnity.MultiplyVector(-pointLight.transform.forward);  // Unity's lights shine along +z
+            return new DistantLight { ToLight = new Vector(toLight.x, toLight.y, toLight.z).Normalized(), Color = new Vector(color.r, color.g, color.b) };
         }
 
-        void SetLamp(Matrix4x4 assetFromUnity, Light lamp, Color color, int i)
+        void SetPointLight(Matrix4x4 assetFromUnity, Light pointLight, Color color, int i)
         {
-            Vector3 place = assetFromUnity.MultiplyPoint3x4(lamp.transform.position), axis = assetFromUnity.MultiplyVector(lamp.transform.forward).normalized;
-            bool spot = lamp.type == LightType.Spot;
-            float[] packed = SrbfMath.PackedLamp(
+            Vector3 place = assetFromUnity.MultiplyPoint3x4(pointLight.transform.position), axis = assetFromUnity.MultiplyVector(pointLight.transform.forward).normalized;
+            bool spot = pointLight.type == LightType.Spot;
+            float[] packed = SrbfMath.PackedPointLight(
                 new Vector(place.x, place.y, place.z), new Vector(color.r, color.g, color.b), new Vector(axis.x, axis.y, axis.z), falloffDistance,
-                Mathf.Max(lampRadius, 1e-4f), linearFalloff, spot ? lamp.innerSpotAngle : -1, spot ? lamp.spotAngle : -1);
-            for (int row = 0; row < 4; row++) lamps[4 * i + row] = new Vector4(packed[4 * row], packed[4 * row + 1], packed[4 * row + 2], packed[4 * row + 3]);
+                Mathf.Max(pointLightRadius, 1e-4f), linearFalloff, spot ? pointLight.innerSpotAngle : -1, spot ? pointLight.spotAngle : -1);
+            for (int row = 0; row < 4; row++) pointLights[4 * i + row] = new Vector4(packed[4 * row], packed[4 * row + 1], packed[4 * row + 2], packed[4 * row + 3]);
         }
 
         bool Changed()

@@ -19,11 +19,11 @@ float4 _SrbfWeights[SRBF_K];
 Texture2D _SrbfWeightRows;
 #endif
 float4x4 _SrbfAssetFromWorld;
-float4 _SrbfLamps[4 * SRBF_LAMPS];  // four a lamp, as srbfUnpackLamp takes them, in the asset's frame
-float _SrbfLampCount;
+float4 _SrbfPointLights[4 * SRBF_POINT_LIGHTS];  // four a lamp, as srbfUnpackPointLight takes them, in the asset's frame
+float _SrbfPointLightCount;
 
 // The light that leaves a white surface, in Unity's units: a white Lambert surface that faces a light of intensity 1 gives 1.
-// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, metres. In fragment shaders: it takes derivatives.
+// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, meters. In fragment shaders: it takes derivatives.
 float3 SrbfRelitFrom(Texture2DArray layers, SamplerState layersSampler, float2 uv, float3 worldPosition)
 {
     float2 place = float2(uv.x, 1.0 - uv.y);
@@ -33,11 +33,11 @@ float3 SrbfRelitFrom(Texture2DArray layers, SamplerState layersSampler, float2 u
     float level = srbfMipLevel(ddx(place) * size, ddy(place) * size);
 #endif
 #if defined(SRBF_K)
-    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeights, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeights, _SrbfTable, receiver, _SrbfPointLights, int(_SrbfPointLightCount));
 #elif defined(SRBF_CLUSTERED)
-    float3 sum = srbfAssetLights(layers, layersSampler, _SrbfClusters, place, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
+    float3 sum = srbfAssetLights(layers, layersSampler, _SrbfClusters, place, _SrbfWeightRows, _SrbfTable, receiver, _SrbfPointLights, int(_SrbfPointLightCount));
 #else
-    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeightRows, _SrbfTable, receiver, _SrbfLamps, int(_SrbfLampCount));
+    float3 sum = srbfAssetLights(layers, layersSampler, place, level, _SrbfWeightRows, _SrbfTable, receiver, _SrbfPointLights, int(_SrbfPointLightCount));
 #endif
     float3 ambient = _SrbfAmbient.SampleLevel(sampler_SrbfAmbient, place, 0.0).rgb / 3.14159265;  // in Blender's units
     return srbfFinish(sum, ambient) * SRBF_UNITY_SCALE;

@@ -3,10 +3,10 @@ import { Matrix4, Vector4 } from "three";
 import { int, ivec2, texture, textureLoad, uniform, uniformArray } from "three/tsl";
 import type { Asset } from "../../asset";
 import { SrbfError } from "../../errors";
-import { packedLamps } from "../../lamp";
+import { packedPointLights } from "../../point_light";
 import { type FrameValues, paddedCenters } from "../../shader";
 import type { Filter, SrbfTextures } from "../textures";
-import { LAMP_ROWS, type N, texelAt } from "./nodes";
+import { POINT_LIGHT_ROWS, type N, texelAt } from "./nodes";
 
 export class NodeInputs {
   readonly scale: N;
@@ -14,17 +14,17 @@ export class NodeInputs {
   readonly centers?: N;
   /** vec4 a map, of relighting maps. */
   readonly weights?: N;
-  readonly lamps: N;
-  readonly lampCount: N = uniform(0, "int");
+  readonly pointLights: N;
+  readonly pointLightCount: N = uniform(0, "int");
   readonly assetFromScene: N = uniform(new Matrix4());
   private readonly weightVectors: Vector4[];
-  private readonly lampVectors: Vector4[];
+  private readonly pointLightVectors: Vector4[];
 
   constructor(
     readonly asset: Asset,
     readonly textures: SrbfTextures,
     private readonly filter: Filter,
-    private readonly maxLamps: number,
+    private readonly maxPointLights: number,
   ) {
     this.scale = uniformArray(vectors(asset.scale), "vec4");
     this.bias = uniformArray(vectors(asset.bias), "vec4");
@@ -33,8 +33,8 @@ export class NodeInputs {
       this.weights = uniformArray(this.weightVectors, "vec4");
       this.centers = uniformArray(vectors(paddedCenters(asset)), "vec4");
     }
-    this.lampVectors = Array.from({ length: LAMP_ROWS * maxLamps }, () => new Vector4());
-    this.lamps = uniformArray(this.lampVectors, "vec4");
+    this.pointLightVectors = Array.from({ length: POINT_LIGHT_ROWS * maxPointLights }, () => new Vector4());
+    this.pointLights = uniformArray(this.pointLightVectors, "vec4");
   }
 
   /** Four channels of layer `i`, as stored, at a place with v downwards. */
@@ -58,8 +58,8 @@ export class NodeInputs {
 
   /** Write the numbers of a frame. @throws SrbfError on more lamps than there is room for. */
   set(frame: FrameValues): void {
-    if (frame.lamps.length > this.maxLamps) {
-      throw new SrbfError(`expected at most ${this.maxLamps} lamps, found ${frame.lamps.length}; set maxLamps when the asset is loaded`);
+    if (frame.pointLights.length > this.maxPointLights) {
+      throw new SrbfError(`expected at most ${this.maxPointLights} lamps, found ${frame.pointLights.length}; set maxPointLights when the asset is loaded`);
     }
     this.weightVectors.forEach((vector, i) => vector.fromArray(frame.weights, 4 * i));
     const weights = this.textures.weights;
@@ -67,9 +67,9 @@ export class NodeInputs {
       (weights.image.data as Float32Array).set(frame.weights);
       weights.needsUpdate = true;
     }
-    const packed = packedLamps(frame.lamps, this.maxLamps);
-    this.lampVectors.forEach((vector, i) => vector.fromArray(packed, 4 * i));
-    this.lampCount.value = frame.lamps.length;
+    const packed = packedPointLights(frame.pointLights, this.maxPointLights);
+    this.pointLightVectors.forEach((vector, i) => vector.fromArray(packed, 4 * i));
+    this.pointLightCount.value = frame.pointLights.length;
   }
 }
 

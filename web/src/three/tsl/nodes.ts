@@ -63,12 +63,12 @@ function lookup(table: N, size: number, columns: number, index: N, place: N): N 
   return mix(mix(fetch(0, 0), fetch(1, 0), fraction.x), mix(fetch(0, 1), fetch(1, 1), fraction.x), fraction.y);
 }
 
-/** Where lamps lie in their uniform array: four vec4 each, as `packedLamps` writes them. */
-export const LAMP_ROWS = 4;
+/** Where lamps lie in their uniform array: four vec4 each, as `packedPointLights` writes them. */
+export const POINT_LIGHT_ROWS = 4;
 
-/** A lamp's strength times its colour, and the unit direction to it, at a receiver (metres, the asset's frame). */
-export function lampAt(lamps: N, lamp: N, receiver: N): { light: N; direction: N } {
-  const row = (i: number) => lamps.element(lamp.mul(LAMP_ROWS).add(i));
+/** A lamp's strength times its color, and the unit direction to it, at a receiver (meters, the asset's frame). */
+export function pointLightAt(pointLights: N, pointLight: N, receiver: N): { light: N; direction: N } {
+  const row = (i: number) => pointLights.element(pointLight.mul(POINT_LIGHT_ROWS).add(i));
   const [place, low, color, axis] = [0, 1, 2, 3].map(row);
   const lightVector = place.xyz.sub(receiver).add(low.xyz).toVar();
   const direction = lightDirection(lightVector).toVar();

@@ -19,7 +19,7 @@ export interface RelightingNodesOptions extends TargetOptions {
   /** As of `SrbfRelightingMap`. */
   source?: "maps" | "lightmap";
   /** Room for point and spot lights; their number may change without compiling anew. */
-  maxLamps?: number;
+  maxPointLights?: number;
 }
 
 /** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once a frame. */
@@ -42,7 +42,7 @@ export class SrbfRelightingNodes extends SceneAsset {
     }
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
-    this.inputs = new NodeInputs(asset, this.textures, filter, options.maxLamps ?? 16);
+    this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16);
     if (this.source === "lightmap") {
       this.target = lightmapTarget(asset, options);
       this.quad = new QuadMesh(this.passMaterial());
@@ -80,17 +80,17 @@ export class SrbfRelightingNodes extends SceneAsset {
   /**
    * Bring the nodes, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
    *
-   * @throws SrbfError on lamps where the asset has no positions for them, and on more lamps than `maxLamps`.
+   * @throws SrbfError on lamps where the asset has no positions for them, and on more lamps than `maxPointLights`.
    */
   update(renderer?: Renderer): void {
     const frame = this.frame();
     if (renderer) checkCompression(this.asset, (encoding) => reads(renderer, encoding));
-    if (this.target) needPositions(this.asset, frame.lamps.length);
+    if (this.target) needPositions(this.asset, frame.pointLights.length);
     this.inputs.set(frame);
     this.inputs.assetFromScene.value.copy(this.assetFromScene());
     if (!this.target || !this.quad) return;
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
-    const state = JSON.stringify([[...frame.weights], frame.lamps]);
+    const state = JSON.stringify([[...frame.weights], frame.pointLights]);
     if (state === this.drawn) return;
     const kept = renderer.getRenderTarget();
     renderer.setRenderTarget(this.target);

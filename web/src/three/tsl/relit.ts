@@ -2,9 +2,9 @@
 import type { DataTexture } from "three";
 import { Fn, If, int, ivec2, Loop, max, textureLoad, vec3 } from "three/tsl";
 import type { NodeInputs } from "./inputs";
-import { lampAt, least, type N, octahedralEncode, octahedralLookup, texelAt, versine, weight } from "./nodes";
+import { pointLightAt, least, type N, octahedralEncode, octahedralLookup, texelAt, versine, weight } from "./nodes";
 
-/** vec3 at `uv` (v downwards), `receiver` in the asset's frame (metres). Of clustered assets it is the light of the texel that `uv` lies in. */
+/** vec3 at `uv` (v downwards), `receiver` in the asset's frame (meters). Of clustered assets it is the light of the texel that `uv` lies in. */
 export function relit(inputs: NodeInputs, uv: N, receiver: N): N {
   return (Fn as N)(() => {
     const place = uv.toVar();
@@ -21,16 +21,16 @@ function relightingMap(inputs: NodeInputs, uv: N, receiver: N, sum: N): void {
   if (basis.kind !== "gaussian") return;
   const { table } = inputs.textures;
   each(layers.count, "k", (k) => sum.addAssign(inputs.decoded(uv, k).rgb.mul(inputs.weights.element(k).rgb)));
-  each(inputs.lampCount, "l", (l) => {
-    const { light, direction } = lampAt(inputs.lamps, l, receiver);
+  each(inputs.pointLightCount, "l", (l) => {
+    const { light, direction } = pointLightAt(inputs.pointLights, l, receiver);
     const color = light.toVar();
     If(color.length().greaterThan(0), () => {
-      const answer = vec3(0).toVar();
+      const response = vec3(0).toVar();
       each(layers.count, "m", (m) => {
         const cosine = versine(direction, inputs.centers.element(m).xyz).oneMinus();
-        answer.addAssign(inputs.decoded(uv, m).rgb.mul(weight(table, basis.table.length, cosine)));
+        response.addAssign(inputs.decoded(uv, m).rgb.mul(weight(table, basis.table.length, cosine)));
       });
-      sum.addAssign(color.mul(answer));
+      sum.addAssign(color.mul(response));
     });
   });
 }
@@ -46,18 +46,18 @@ function scalarPlanes(inputs: NodeInputs, uv: N, receiver: N, sum: N): void {
   const cluster = inputs.textures.clusters ? int((textureLoad(inputs.textures.clusters, texel) as N).r.mul(255).add(0.5)).toVar() : int(0).toVar();
   /** w_0 plus the sum over scalars of a_j w_j, `function_` giving w_j. */
   const combined = (function_: (j: N) => N, loop: string) => {
-    const answer = function_(int(0)).toVar();
+    const response = function_(int(0)).toVar();
     each(layers.count, loop, (i) => {
       const values = inputs.decoded(uv, i).toVar();
       [values.x, values.y, values.z, values.w].forEach((value, c) => {
-        answer.addAssign(function_(least(i.mul(4).add(c + 1), scalars)).mul(value)); // an unused channel is 0 and takes the last weight
+        response.addAssign(function_(least(i.mul(4).add(c + 1), scalars)).mul(value)); // an unused channel is 0 and takes the last weight
       });
     });
-    return answer;
+    return response;
   };
   sum.addAssign(combined((j) => (textureLoad(weights, ivec2(j, cluster)) as N).rgb, "k"));
-  each(inputs.lampCount, "l", (l) => {
-    const { light, direction } = lampAt(inputs.lamps, l, receiver);
+  each(inputs.pointLightCount, "l", (l) => {
+    const { light, direction } = pointLightAt(inputs.pointLights, l, receiver);
     const color = light.toVar();
     If(color.length().greaterThan(0), () => {
       const place = octahedralEncode(direction).toVar();

@@ -21,7 +21,6 @@ from uuid import uuid4
 
 import srbf
 from srbf.bake import folder
-from srbf.bake.crew import TRIES, Answer, Committed, Crew, CrewSettings, Take, Task
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
@@ -29,6 +28,7 @@ from srbf.bake.light_pass import add_pass
 from srbf.bake.settings import BakeSettings
 from srbf.bake.sums import LATE, Sums
 from srbf.bake.worker import Worker
+from srbf.bake.worker_pool import TRIES, RemoteResult, Response, Take, Task, WorkerPool, WorkerPoolSettings
 from srbf.compute.dask_client import Cluster, ClusterError, scratch_root
 from srbf.errors import BakeError
 from srbf.io import files
@@ -51,7 +51,7 @@ class RemoteBake:
     folder: Path
     settings: BakeSettings
     blender: Path | None
-    crew: CrewSettings
+    crew: WorkerPoolSettings
     version: str
 
     @property
@@ -66,15 +66,15 @@ class Report:
     `said`: lines for the user.
     """
 
-    lights: dict[int, Committed]
+    lights: dict[int, RemoteResult]
     failed: dict[int, str]
     said: list[str]
 
 
-class DaskCrew:
-    """A `Crew` whose lights are rendered, and taken into the folder, by the workers of a dask scheduler. The scene is prepared here."""
+class DaskWorkerPool:
+    """A `WorkerPool` of a dask scheduler's workers: they render lights and take them into the folder. The scene is prepared here."""
 
-    def __init__(self, address: str, bake: Bake, identity: dict[str, Any], here: Crew, say: Callable[[str], None]) -> None:
+    def __init__(self, address: str, bake: Bake, identity: dict[str, Any], here: WorkerPool, say: Callable[[str], None]) -> None:
         self._cluster = Cluster(address, say)
         self._here, self._say = here, say
         self._bake = RemoteBake(
@@ -84,14 +84,14 @@ class DaskCrew:
             bake.folder.resolve(),
             bake.settings,
             bake.blender,
-            CrewSettings(1, bake.crew.lights_a_worker, bake.crew.hang_after),
+            WorkerPoolSettings(1, bake.crew.lights_per_worker, bake.crew.worker_timeout),
             srbf.__version__,
         )
         self._refused: Counter[int] = Counter()
         self._stop = False
         self.failed: dict[int, str] = {}
 
-    def __enter__(self) -> DaskCrew:
+    def __enter__(self) -> DaskWorkerPool:
         self._cluster.__enter__()
         self._bake.fence.touch()
         return self
@@ -162,7 +162,7 @@ class DaskCrew:
         return []
 
 
-class _Station:
+class _RemoteWorker:
     """One machine's Blender for one bake, kept from task to task."""
 
     def __init__(self, bake: RemoteBake) -> None:
@@ -180,39 +180,41 @@ class _Station:
         self.bake = bake
         self.timer: threading.Timer | None = None
         self._scratch = Path(tempfile.mkdtemp(prefix="srbf-", dir=scratch_root()))
-        self._crew = Crew(bake.crew, self._scratch, self._start, self._ready, self._said.append)
+        self._worker_pool = WorkerPool(bake.crew, self._scratch, self._start, self._ready, self._said.append)
 
     def close(self) -> None:
-        self._crew.__exit__(None, None, None)
+        self._worker_pool.__exit__(None, None, None)
         shutil.rmtree(self._scratch, ignore_errors=True)
 
     def render(self, tasks: list[Task]) -> Report:
         """Render and commit what is not in yet."""
         self._said.clear()
         sums = Sums(self.bake.folder, [task.light for task in tasks])
-        lights: dict[int, Committed] = {}
+        lights: dict[int, RemoteResult] = {}
         due = []
         for task in tasks:
             if sums.refresh(task.light, task.before, LATE):
                 if sums.passes(task.light) == task.before:
                     due.append(task)
                 else:
-                    lights[task.light.index] = Committed(0.0)
+                    lights[task.light.index] = RemoteResult(0.0)
 
-        def take(task: Task, answer: Answer | Committed) -> None:
-            assert isinstance(answer, Answer)
+        def take(task: Task, response: Response | RemoteResult) -> None:
+            assert isinstance(response, Response)
             try:
                 with self._alone(task) as allowed:
                     sums.refresh(task.light)
                     if allowed and sums.passes(task.light) == task.before:
-                        add_pass(self._images, sums, task, answer)
+                        add_pass(self._images, sums, task, response)
                     if sums.passes(task.light) > task.before:
-                        lights[task.light.index] = Committed(answer.seconds)
+                        lights[task.light.index] = RemoteResult(response.seconds)
             except BakeError as error:
-                lights[task.light.index] = Committed(answer.seconds, str(error))
+                lights[task.light.index] = RemoteResult(response.seconds, str(error))
 
-        self._crew.render(due, take)
-        failed = {task.light.index: self._crew.failed.pop(task.light.index) for task in due if task.light.index in self._crew.failed}
+        self._worker_pool.render(due, take)
+        failed = {
+            task.light.index: self._worker_pool.failed.pop(task.light.index) for task in due if task.light.index in self._worker_pool.failed
+        }
         return Report(lights, failed, list(self._said))
 
     @contextmanager
@@ -242,7 +244,7 @@ class _Station:
             self._images.require_receiver(event)
 
 
-_idle: list[_Station] = []  # of this process
+_idle: list[_RemoteWorker] = []  # of this process
 _mutex = threading.Lock()
 
 
@@ -250,7 +252,7 @@ def render_lights(bake: RemoteBake, tasks: list[Task]) -> Report:
     """What a dask worker does: one pass of some lights, by a Blender that it opens once a bake."""
     if (bake.folder / SCRATCH / STOP).exists():
         return Report({}, {}, [])
-    station = _from_idle(bake) or _Station(bake)
+    station = _from_idle(bake) or _RemoteWorker(bake)
     try:
         report = station.render(tasks)
     except BaseException:
@@ -275,7 +277,7 @@ def close_idle(token: str) -> None:
         station.close()
 
 
-def _from_idle(bake: RemoteBake) -> _Station | None:
+def _from_idle(bake: RemoteBake) -> _RemoteWorker | None:
     with _mutex:
         station = next((station for station in _idle if station.bake.token == bake.token), None)
         if station is not None:

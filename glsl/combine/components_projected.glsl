@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombinePlanesFolded: an offset plus the sum over stored scalars of their weights, decoding folded in: the least that far lights cost.
-   use:    vec3 srbfCombinePlanesFolded(sampler2DArray planes, vec2 uv, float level, int firstLayer, vec4 weights[3 * SRBF_LAYERS],
+/* srbfCombineComponentsProjected: an offset plus the sum over stored scalars of their weights, decoding folded in: the least that far lights cost.
+   use:    vec3 srbfCombineComponentsProjected(sampler2DArray planes, vec2 uv, float level, int firstLayer, vec4 weights[3 * SRBF_LAYERS],
                                         vec3 offset)
    domain: weights: three vec4 a layer, the red, green and blue weights of its four scalars, each w_j times the channel's scale; offset:
            w_0 plus the sum of w_j times bias, with one pass alone; level: of mip maps, 0 without; result signed, before the clamp
    twin:   srbf.methods.coefficient_maps.linear_response
    cite:   Sloan2003 */
-#ifndef SRBF_SCALARS
-#error define SRBF_SCALARS: how many scalars a texel has
+#ifndef SRBF_COMPONENTS
+#error define SRBF_COMPONENTS: how many scalars a texel has
 #endif
 #ifndef SRBF_LAYERS
-#define SRBF_LAYERS ((SRBF_SCALARS + 3) / 4)
+#define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)
 #endif
 
-vec3 srbfCombinePlanesFolded(highp sampler2DArray planes, vec2 uv, float level, int firstLayer, vec4 weights[3 * SRBF_LAYERS],
+vec3 srbfCombineComponentsProjected(highp sampler2DArray planes, vec2 uv, float level, int firstLayer, vec4 weights[3 * SRBF_LAYERS],
                              vec3 offset) {
     vec3 sum = offset;
     for (int i = 0; i < SRBF_LAYERS; ++i) {

@@ -1,8 +1,8 @@
-/** Members of the shaders' SrbfLamp: `srbf/gl/uniforms.py`. */
-import type { LampLight } from "./lights";
+/** Members of the shaders' SrbfPointLight: `srbf/gl/uniforms.py`. */
+import type { PunctualLight } from "./lights";
 import type { Triple } from "./matrix";
 
-export interface LampUniforms {
+export interface PointLightUniforms {
   position: Triple;
   /** What single precision dropped of the position. */
   positionLow: Triple;
@@ -18,7 +18,7 @@ export interface LampUniforms {
 }
 
 /** The uniforms of a lamp that is already in the asset's frame. */
-export function lampUniforms(light: LampLight): LampUniforms {
+export function pointLightUniforms(light: PunctualLight): PointLightUniforms {
   const high = light.position.map(Math.fround) as unknown as Triple;
   return {
     position: high,
@@ -34,21 +34,21 @@ export function lampUniforms(light: LampLight): LampUniforms {
 }
 
 /**
- * Lamps as the shaders' arrays hold them, four vec4 each, zeros up to `room` lamps: (position, radius), (positionLow, falloff), (colour at 1 m,
+ * Lamps as the shaders' arrays hold them, four vec4 each, zeros up to `room` lamps: (position, radius), (positionLow, falloff), (color at 1 m,
  * versineInner), (axis, versineOuter).
  */
-export function packedLamps(lamps: readonly LampUniforms[], room: number): Float32Array {
+export function packedPointLights(pointLights: readonly PointLightUniforms[], room: number): Float32Array {
   const out = new Float32Array(16 * room);
-  lamps.forEach((lamp, i) => {
-    const atOne = lamp.falloff === 1 ? lamp.a0 ** 2 : lamp.a0;
-    const color = lamp.color.map((component) => component * atOne);
-    out.set([...lamp.position, lamp.radius, ...lamp.positionLow, lamp.falloff, ...color, lamp.versineInner, ...lamp.axis, lamp.versineOuter], 16 * i);
+  pointLights.forEach((pointLight, i) => {
+    const atOne = pointLight.falloff === 1 ? pointLight.a0 ** 2 : pointLight.a0;
+    const color = pointLight.color.map((component) => component * atOne);
+    out.set([...pointLight.position, pointLight.radius, ...pointLight.positionLow, pointLight.falloff, ...color, pointLight.versineInner, ...pointLight.axis, pointLight.versineOuter], 16 * i);
   });
   return out;
 }
 
 /** Room for `count` lamps in a program: a power of two, so that few programs serve any number. */
-export function lampRoom(count: number): number {
+export function pointLightRoom(count: number): number {
   return 2 ** Math.ceil(Math.log2(Math.max(count, 1)));
 }
 

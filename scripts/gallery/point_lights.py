@@ -20,23 +20,23 @@ SHOWN = 3  # lamps, evenly along the path
 WORST = 100  # one pixel in so many, those that err most, is left out of `rest`
 
 
-def evaluate_lamps(places: Places, fit: Fit) -> None:
+def evaluate_point_lights(places: Places, fit: Fit) -> None:
     """The relit lamps' error as `srbf evaluate` has it on a capture of lamps, and beside it, of them and of their direct light `alone`:
     relative RMSE of all pixels, of the `rest` but the worst in every picture, and the mean brightness over the true one."""
-    asset, capture = Asset.open(places.asset(fit)), Capture.open(places.true_lamps)
+    asset, capture = Asset.open(places.asset(fit)), Capture.open(places.true_point_lights)
     errors = evaluate(asset, capture, direct=fit.direct, roles=("train",))
     covered = capture.coverage() >= COVERED
     true, relit, alone = [], [], []
     with Added(asset, fit.direct) as added:
         for index, position in enumerate(capture.positions()):
-            lamp = _lamp(position)
-            direct = added.answer([lamp])
+            point_light = _point_light(position)
+            direct = added.response([point_light])
             assert direct is not None
             true.append(np.maximum(capture.image(index), 0)[covered])
-            relit.append(np.maximum(linear_response(asset, [lamp]) + direct, 0)[covered])
+            relit.append(np.maximum(linear_response(asset, [point_light]) + direct, 0)[covered])
             alone.append(direct[covered])
     compared = {"relit": _compared(relit, true), "alone": _compared(alone, true)}
-    files.write_json(places.lamp_errors(fit), {**errors, **compared})
+    files.write_json(places.point_light_errors(fit), {**errors, **compared})
 
 
 def _compared(pictures: list[ndarray], true: list[ndarray]) -> dict[str, float]:
@@ -53,18 +53,18 @@ def _compared(pictures: list[ndarray], true: list[ndarray]) -> dict[str, float]:
 
 def draw(places: Places, fit: Fit) -> None:
     """Write the strip of some lamps: Cycles, relit, and the direct light alone."""
-    asset, capture = Asset.open(places.asset(fit)), Capture.open(places.true_lamps)
-    errors = files.read_json(places.lamp_errors(fit))
+    asset, capture = Asset.open(places.asset(fit)), Capture.open(places.true_point_lights)
+    errors = files.read_json(places.point_light_errors(fit))
     count = len(capture.lights)
     rows = []
     with Added(asset, fit.direct) as added:
         for index in sorted({round(i * count / SHOWN) % count for i in range(SHOWN)}):
-            lamp = _lamp(capture.positions([index])[0])
-            direct = added.answer([lamp])
+            point_light = _point_light(capture.positions([index])[0])
+            direct = added.response([point_light])
             assert direct is not None
-            relit = np.maximum(linear_response(asset, [lamp]) + direct, 0)
+            relit = np.maximum(linear_response(asset, [point_light]) + direct, 0)
             true = np.maximum(capture.image(index), 0)
-            x, y, z = lamp.position
+            x, y, z = point_light.position
             strength = float(np.sqrt((true.astype(np.float64) ** 2).mean()))
             relative = errors["lights"][index]["rmse"] / strength
             rows.append(
@@ -76,9 +76,9 @@ def draw(places: Places, fit: Fit) -> None:
                     drawing.gain_of(true, 0.98),
                 )
             )
-    drawing.save(strip.sheet(["rendered by Cycles", fit.label, "rays alone"], rows), places.lamp_strip)
+    drawing.save(strip.sheet(["rendered by Cycles", fit.label, "rays alone"], rows), places.point_light_strip)
 
 
-def _lamp(position: np.ndarray) -> PointLight:
+def _point_light(position: np.ndarray) -> PointLight:
     x, y, z = (float(value) for value in position)
     return PointLight((x, y, z), falloff="inverse-square")

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-/* srbfDecodePlanes: four scalars of a texel as they were fitted: value = stored * scale + bias.
-   use:    vec4 srbfDecodePlanes(vec4 stored, vec4 scale, vec4 bias)
+/* srbfDecodeComponents: four scalars of a texel as they were fitted: value = stored * scale + bias.
+   use:    vec4 srbfDecodeComponents(vec4 stored, vec4 scale, vec4 bias)
    domain: stored as the texture unit returns it (8-bit planes as byte / 255); scale, bias of this layer, from asset.json;
            channels past the last scalar have scale 0 and bias 0, and come out as 0; SRBF_PLAIN says that scales are 1
            and biases 0, and those channels 0 as stored
    twin:   srbf.asset.Asset.coefficients
    cite:   - */
-vec4 srbfDecodePlanes(vec4 stored, vec4 scale, vec4 bias) {
+vec4 srbfDecodeComponents(vec4 stored, vec4 scale, vec4 bias) {
 #ifdef SRBF_PLAIN
     return stored;  // all scales 1, all biases 0: floats need no decoding
 #else

@@ -17,14 +17,14 @@ import {
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 import { fromThree, toThree } from "./frames";
-import { isLampState, type LightState, rounded, type SpotState } from "./light_state";
+import { isPointLightState, type LightState, rounded, type SpotState } from "./light_state";
 import type { Bounds } from "./receivers";
 import type { Changed, State } from "./state";
 
 const BULB = 0.013; // of the distance to the eye
 const SUN = 1.5; // scene radii from the middle
 
-export class LampGizmos {
+export class PointLightGizmos {
   /** What the handles move of a spot. */
   moving: "position" | "target" = "position";
   private drawing = false; // the handles tell of every change, of those too that drawing makes
@@ -52,7 +52,7 @@ export class LampGizmos {
     });
     this.controls.addEventListener("objectChange", () => {
       const light = this.state.lights[this.state.selected];
-      if (!isLampState(light)) return;
+      if (!isPointLightState(light)) return;
       const place = rounded(fromThree(this.proxy.position));
       if (light.kind === "spot" && this.moving === "target") light.target = place;
       else light.position = place;
@@ -81,7 +81,7 @@ export class LampGizmos {
   /** Hide the handles: no light of the scene is selected, or there is no camera to see it by. */
   private attach(): void {
     const light = this.state.lights[this.state.selected];
-    if (!isLampState(light) || !light.on) {
+    if (!isPointLightState(light) || !light.on) {
       if (this.controls.object) this.controls.detach();
       return;
     }
@@ -95,8 +95,8 @@ export class LampGizmos {
     const color = new Color(light.color);
     if (light.kind === "directional") {
       if (!suns) return;
-      const { centre, radius } = this.bounds;
-      const from = toThree(centre);
+      const { center, radius } = this.bounds;
+      const from = toThree(center);
       const to = from.clone().addScaledVector(toThree(light.direction).normalize(), SUN * radius);
       this.bulb(to, color, camera, selected ? 1.1 : 0.9);
       this.lines([from.clone().lerp(to, 0.12), from.clone().lerp(to, 0.94)], color, selected ? 0.55 : 0.25);

@@ -7,16 +7,16 @@ precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
 
-#include "combine/planes_folded.glsl"
+#include "combine/components_projected.glsl"
 
 uniform sampler2DArray planes;
 uniform int firstLayer;
 uniform vec4 weights[3 * SRBF_LAYERS];
 uniform vec3 offset;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(planes, 0).xy);
-    answer = vec4(srbfCombinePlanesFolded(planes, uv, 0.0, firstLayer, weights, offset), 1.0);
+    response = vec4(srbfCombineComponentsProjected(planes, uv, 0.0, firstLayer, weights, offset), 1.0);
 }

@@ -13,17 +13,24 @@ from srbf.asset import Asset
 from srbf.gl.context import Limits
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
-from srbf.gl.uniforms import VECTORS_A_LAMP, lamp_groups, lamp_uniforms, lamps_a_pass, packed_lamps, vectors_free
+from srbf.gl.uniforms import (
+    VECTORS_PER_POINT_LIGHT,
+    packed_point_lights,
+    point_light_groups,
+    point_light_uniforms,
+    point_lights_per_pass,
+    vectors_free,
+)
 from srbf.lights import PointLight
 
 if TYPE_CHECKING:
     import moderngl
 
-VECTORS_A_LAYER = 2  # scale, bias
-VECTORS_FOLDED = 3  # the weights of four scalars, a colour each
+VECTORS_PER_LAYER = 2  # scale, bias
+VECTORS_PROJECTED = 3  # the weights of four scalars, a color each
 
 
-class PlanePasses:
+class ComponentPasses:
     """Passes over an asset of scalar planes; each adds to the target in use. Their light functions have no formula."""
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
@@ -31,27 +38,27 @@ class PlanePasses:
         self._method = asset.method.replace("-", "_")
         self._clustered = "cluster_index" in asset.tables
         self._free = vectors_free(limits)
-        self._lamps = lamps_a_pass(self._free, VECTORS_A_LAYER)
+        self._point_lights = point_lights_per_pass(self._free, VECTORS_PER_LAYER)
         self._defines = {"SRBF_PLAIN": 1} if textures.plain() else {}
 
-    def check_lamps(self) -> None:
+    def check_point_lights(self) -> None:
         """Scalar planes have light functions for every direction."""
 
-    def layers_a_pass(self, lamps: int) -> int:
+    def layers_per_pass(self, point_lights: int) -> int:
         """Layers of four scalars that a pass of so many lamps holds the uniforms of."""
-        vectors = VECTORS_A_LAYER if lamps else VECTORS_FOLDED
-        return max(1, (self._free - VECTORS_A_LAMP * lamps) // vectors)
+        vectors = VECTORS_PER_LAYER if point_lights else VECTORS_PROJECTED
+        return max(1, (self._free - VECTORS_PER_POINT_LIGHT * point_lights) // vectors)
 
     def far(self, weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """All directional and environment lights; `units` layers of four scalars a pass as plain textures, or all that uniforms hold."""
-        rows = folded_rows(self._asset, weights)
+        rows = projected_rows(self._asset, weights)
         if self._clustered:
             with self._textures.passing(rows) as texture:
                 texture.use(0)
                 self._textures.clusters().use(1)
                 self._far_clustered(units)
             return
-        for first, count in ranges(len(self._asset.scale), units or self.layers_a_pass(0)):
+        for first, count in ranges(len(self._asset.scale), units or self.layers_per_pass(0)):
             offset = rows[0, 0, :3] if first == 0 else np.zeros(3)
             values = {"firstLayer": first, "weights": rows[0, 1 + 3 * first :][: 3 * count], "offset": tuple(offset.tolist())}
             self._run_far(first, count, units, values)
@@ -59,24 +66,24 @@ class PlanePasses:
     def weighted(self, weights: moderngl.Texture) -> None:
         """All directional and environment lights, by weights that are on the GPU."""
         weights.use(2)
-        self._over_layers("directional.frag", {}, {"weights": 2}, self.layers_a_pass(1))
+        self._over_layers("directional.frag", {}, {"weights": 2}, self.layers_per_pass(1))
 
-    def lamps(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
+    def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Point and spot lights, and the far lights' `weights` with the first of them; `units` layers of four scalars a pass."""
         self._textures.w_table().use(2)
         where, values = self._textures.receivers(3)
         values |= {"wTable": 2, "tableSize": self._asset.manifest["w_table"]["size"]}
         if len(lights) == 1 and not weights.any() and not where:
-            values |= {f"lamp.{name}": value for name, value in lamp_uniforms(lights[0]).items()}
-            self._over_layers("point.frag", {}, values, units or self.layers_a_pass(1))
+            values |= {f"pointLight.{name}": value for name, value in point_light_uniforms(lights[0]).items()}
+            self._over_layers("point.frag", {}, values, units or self.layers_per_pass(1))
             return
         far = np.ones((self._asset.clusters, self._asset.scalars + 1, 4), np.float32)
         far[..., :3] = weights.reshape(*far.shape[:2], 3)
-        for group, places in lamp_groups(lights, self._lamps):
-            values |= {"lamps": packed_lamps(group, places), "lampCount": len(group), "weights": 4}
+        for group, places in point_light_groups(lights, self._point_lights):
+            values |= {"pointLights": packed_point_lights(group, places), "pointLightCount": len(group), "weights": 4}
             with self._textures.passing(far) as texture:
                 texture.use(4)
-                self._over_layers("lights.frag", {"SRBF_LAMPS": places} | where, values, units or self.layers_a_pass(places))
+                self._over_layers("lights.frag", {"SRBF_POINT_LIGHTS": places} | where, values, units or self.layers_per_pass(places))
             far = np.zeros_like(far)
 
     def _far_clustered(self, units: int | None) -> None:
@@ -86,8 +93,8 @@ class PlanePasses:
     def _run_far(self, first: int, count: int, units: int | None, values: dict[str, Any]) -> None:
         if units is None:
             self._textures.layers().use(2)
-            defines = {"SRBF_SCALARS": self._asset.scalars, "SRBF_LAYERS": count}
-            self._programs.run(f"{self._method}_folded.frag", defines, values | {"planes": 2})
+            defines = {"SRBF_COMPONENTS": self._asset.scalars, "SRBF_LAYERS": count}
+            self._programs.run(f"{self._method}_projected.frag", defines, values | {"planes": 2})
             return
         for unit in range(count):
             self._textures.layer(first + unit).use(2 + unit)
@@ -103,11 +110,11 @@ class PlanePasses:
         scale, bias = self._asset.scale, self._asset.bias
         for first, count in ranges(len(scale), size):
             own = {"firstLayer": first, "scale": scale[first : first + count], "bias": bias[first : first + count]}
-            counts = {"SRBF_SCALARS": self._asset.scalars, "SRBF_LAYERS": count}
+            counts = {"SRBF_COMPONENTS": self._asset.scalars, "SRBF_LAYERS": count}
             self._programs.run(f"{self._method}_{lights}", counts | defines | self._defines, values | own)
 
 
-def folded_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[ndarray, "C n 4"]:
+def projected_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[ndarray, "C n 4"]:
     """Weights of stored scalars, a row a cluster: the offset w_0 + sum w_j bias_j, then three vec4 a layer, w_j times the channel's scale.
 
     n = 3 layers + 1; the three are the red, green and blue weights of the layer's four scalars.
@@ -118,6 +125,6 @@ def folded_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[ndarr
     own[:, : asset.scalars] = by_cluster[:, 1:]
     rows = np.ones((asset.clusters, 3 * layers + 1, 4), np.float32)
     rows[:, 0, :3] = by_cluster[:, 0] + np.einsum("mjc,j->mc", own, asset.bias.ravel().astype(np.float64))
-    folded = own * asset.scale.ravel().astype(np.float64)[:, None]
-    rows[:, 1:] = folded.reshape(asset.clusters, layers, 4, 3).transpose(0, 1, 3, 2).reshape(asset.clusters, -1, 4)
+    projected = own * asset.scale.ravel().astype(np.float64)[:, None]
+    rows[:, 1:] = projected.reshape(asset.clusters, layers, 4, 3).transpose(0, 1, 3, 2).reshape(asset.clusters, -1, 4)
     return rows

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Glossy things in a coloured room: a stage with a red wall, a green wall and a pale floor, seen by one fixed camera.
+"""Glossy things in a colored room: a stage with a red wall, a green wall and a pale floor, seen by one fixed camera.
 
 What it shows is light that has met something before: red and green that bleed on the floor, on the pale wall and on a
 matte block and ball, and their reflections in steel, copper and gold of several roughnesses, in glaze and in lacquer. The
@@ -9,7 +9,7 @@ anywhere above finds a way in: over the walls as a slanted edge, through them as
 Nothing is smoother than POLISH, and metals not by far: what shines finds a sun of angle 0 only by the width of its own
 highlight, and the narrower that is, the more it outshines all else. Metals cast no caustics, so that few samples are clean.
 
-    python data/scenes/coloured_room.py OUT.blend
+    python data/scenes/colored_room.py OUT.blend
 """
 
 import sys
@@ -69,7 +69,7 @@ def smoothed(points, times=3):
 
 
 def curve(text, times=3):
-    """A smooth outline of (radius, height) in metres from "radius height, ..." in centimetres."""
+    """A smooth outline of (radius, height) in meters from "radius height, ..." in centimetres."""
     return smoothed([Vector([float(n) / 100 for n in pair.split()]) for pair in text.split(",")], times)
 
 
@@ -321,4 +321,4 @@ def build():
 
 
 if __name__ == "__main__":
-    sys.exit(write("coloured_room", build, sys.argv[1:]))
+    sys.exit(write("colored_room", build, sys.argv[1:]))

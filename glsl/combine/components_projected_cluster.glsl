@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombinePlanesFoldedCluster: the same for a cluster, whose offset and weights are a row of a texture.
-   use:    vec3 srbfCombinePlanesFoldedCluster(sampler2DArray planes, vec2 uv, int firstLayer, sampler2D weights, int cluster)
+/* srbfCombineComponentsProjectedCluster: the same for a cluster, whose offset and weights are a row of a texture.
+   use:    vec3 srbfCombineComponentsProjectedCluster(sampler2DArray planes, vec2 uv, int firstLayer, sampler2D weights, int cluster)
    domain: weights: RGBA32F, nearest, 3 (all layers) + 1 texels wide, a row a cluster: the offset, then three texels a layer, the red,
            green and blue weights of its four scalars, each w_j times the channel's scale; the offset counts with firstLayer 0; result
            signed, before the clamp
    twin:   srbf.methods.coefficient_maps.linear_response
    cite:   Sloan2003 */
-#ifndef SRBF_SCALARS
-#error define SRBF_SCALARS: how many scalars a texel has
+#ifndef SRBF_COMPONENTS
+#error define SRBF_COMPONENTS: how many scalars a texel has
 #endif
 #ifndef SRBF_LAYERS
-#define SRBF_LAYERS ((SRBF_SCALARS + 3) / 4)
+#define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)
 #endif
 
-vec3 srbfCombinePlanesFoldedCluster(highp sampler2DArray planes, vec2 uv, int firstLayer, highp sampler2D weights, int cluster) {
+vec3 srbfCombineComponentsProjectedCluster(highp sampler2DArray planes, vec2 uv, int firstLayer, highp sampler2D weights, int cluster) {
     vec3 sum = firstLayer == 0 ? texelFetch(weights, ivec2(0, cluster), 0).rgb : vec3(0.0);
     for (int i = 0; i < SRBF_LAYERS; ++i) {
         vec4 stored = textureLod(planes, vec3(uv, float(firstLayer + i)), 0.0);

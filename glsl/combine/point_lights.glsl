@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombineLamps: sum over SRBF_K maps of coefficient times the weight of all lights together, each texel fetched once.
-   use:    vec3 srbfCombineLamps(sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], sampler2D rTable,
+/* srbfCombinePointLights: sum over SRBF_K maps of coefficient times the weight of all lights together, each texel fetched once.
+   use:    vec3 srbfCombinePointLights(sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], sampler2D rTable,
                                  vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K],
-                                 vec4 directions[SRBF_LAMPS], vec4 colors[SRBF_LAMPS], int shining)
+                                 vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining)
    domain: weights, scale, bias as in srbfCombineDirectional, weights 0 where no directional or environment light shines; level: of mip
-           maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfLampsAt; result signed
+           maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfPointLightsAt; result signed
    twin:   srbf.methods.relighting_map.linear_response
    cite:   Wong2005, fig. 6 and 8 */
 #include "combine/center_weight.glsl"
@@ -13,13 +13,13 @@
 #ifndef SRBF_K
 #error define SRBF_K: how many maps this pass combines
 #endif
-#ifndef SRBF_LAMPS
-#error define SRBF_LAMPS: how many lamps a pass takes at most
+#ifndef SRBF_POINT_LIGHTS
+#error define SRBF_POINT_LIGHTS: how many pointLights a pass takes at most
 #endif
 
-vec3 srbfCombineLamps(highp sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], highp sampler2D rTable,
+vec3 srbfCombinePointLights(highp sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], highp sampler2D rTable,
                       vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K],
-                      vec4 directions[SRBF_LAMPS], vec4 colors[SRBF_LAMPS], int shining) {
+                      vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining) {
     vec3 sum = vec3(0.0);
     for (int i = 0; i < SRBF_K; ++i) {
         vec3 weight = weights[i].rgb;

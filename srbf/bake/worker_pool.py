@@ -49,7 +49,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Response:
     """What a worker rendered for a task; `direct` where the capture keeps the direct light apart."""
 
     whole: ndarray
@@ -58,19 +58,19 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Committed:
+class RemoteResult:
     """What another machine says of a task: its pass is in the folder, after so many seconds; or `error` kept it from that."""
 
     seconds: float
     error: str | None = None
 
 
-Take = Callable[[Task, Answer | Committed], None]
+Take = Callable[[Task, Response | RemoteResult], None]
 
 
 @runtime_checkable
 class Renderer(Protocol):
-    """Whoever renders a bake's tasks: a `Crew` of this machine, or others."""
+    """Whoever renders a bake's tasks: a `WorkerPool` of this machine, or others."""
 
     failed: dict[int, str]
 
@@ -82,12 +82,12 @@ class Renderer(Protocol):
 
 
 @dataclass(frozen=True)
-class CrewSettings:
+class WorkerPoolSettings:
     """How the work is spread, none of which changes a pixel."""
 
     workers: int = 1
-    lights_a_worker: int = 500  # then its process is replaced: Blender's memory grows
-    hang_after: float | None = None  # seconds without an answer; by default learnt from the lights before
+    lights_per_worker: int = 500  # then its process is replaced: Blender's memory grows
+    worker_timeout: float | None = None  # seconds without an answer; by default learned from the lights before
 
 
 class Patience:
@@ -107,12 +107,12 @@ class Patience:
         return FIRST_LIGHT if self._slowest is None else LEAST_PATIENCE + PATIENCE * self._slowest * samples
 
 
-class Crew:
+class WorkerPool:
     """Workers of one bake, alive until it is left. `start` makes one in a scratch folder, `ready` sees all its events until it serves."""
 
     def __init__(
         self,
-        settings: CrewSettings,
+        settings: WorkerPoolSettings,
         scratch: Path,
         start: Callable[[Path], Worker],
         ready: Callable[[dict[str, Any], Path], None],
@@ -121,7 +121,7 @@ class Crew:
         self._settings = settings
         self._start, self._ready, self._say = start, ready, say
         self._slots = [_Slot(scratch / f"worker{i}") for i in range(settings.workers)]
-        self._patience = Patience(settings.hang_after)
+        self._patience = Patience(settings.worker_timeout)
         self._lock = threading.Lock()
         self._waiting: deque[Task] = deque()
         self._deaths: Counter[int] = Counter()
@@ -130,7 +130,7 @@ class Crew:
         self._error: BaseException | None = None
         self.failed: dict[int, str] = {}  # lights given up, and why
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> WorkerPool:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
@@ -195,7 +195,7 @@ class Crew:
         asked: deque[Task] = deque()
         try:
             while True:
-                while len(asked) < AHEAD and slot.answered + len(asked) < self._settings.lights_a_worker:
+                while len(asked) < AHEAD and slot.answered + len(asked) < self._settings.lights_per_worker:
                     task = self._next()
                     if task is None:
                         break
@@ -209,17 +209,17 @@ class Crew:
                 if self._stop and len(asked) > 1 and slot.worker is not None:
                     slot.worker.end()  # drops what it has not begun
                 if not asked:
-                    if slot.answered >= self._settings.lights_a_worker:
+                    if slot.answered >= self._settings.lights_per_worker:
                         slot.close()
                         return True
                     return False
-                answer = self._answer(slot, asked[0])
-                if answer is None:
+                response = self._response(slot, asked[0])
+                if response is None:
                     slot.close()
                     return False
                 task = asked.popleft()
-                self._patience.learn(answer.seconds, task.samples)
-                take(task, answer)
+                self._patience.learn(response.seconds, task.samples)
+                take(task, response)
         except WorkerDiedError as error:
             slot.close()
             self._died(asked, error)
@@ -230,7 +230,7 @@ class Crew:
         files.make_folder(slot.scratch)
         slot.worker = self._start(slot.scratch)
         try:
-            while (event := slot.worker.event(self._settings.hang_after or OPENING)) is not None:
+            while (event := slot.worker.event(self._settings.worker_timeout or OPENING)) is not None:
                 if event["event"] == "ready":
                     self._lost_openings = 0
                     return
@@ -244,7 +244,7 @@ class Crew:
             raise
         raise BakeError("Blender's worker ended before it was ready")
 
-    def _answer(self, slot: _Slot, task: Task) -> Answer | None:
+    def _response(self, slot: _Slot, task: Task) -> Response | None:
         """The next image; None where the worker was told to end before it began the task."""
         assert slot.worker is not None
         while (event := slot.worker.event(self._patience.of(task.samples))) is not None:
@@ -255,7 +255,7 @@ class Crew:
                     raise BakeError(f"expected light {task.light.index} from Blender, found {event['light']}")
                 slot.answered += 1
                 direct = _taken(slot.scratch / event["direct"]) if "direct" in event else None
-                return Answer(_taken(slot.scratch / event["file"]), direct, event["seconds"])
+                return Response(_taken(slot.scratch / event["file"]), direct, event["seconds"])
         return None
 
     def _next(self) -> Task | None:

@@ -6,7 +6,7 @@ using System.Globalization;
 using System.IO;
 using Srbf;
 
-static class Answers
+static class Responses
 {
     static void Main(string[] arguments)
     {
@@ -26,12 +26,12 @@ static class Answers
         SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
         Show("table", table);
         if (manifest.ClusterFile != null) Show("clusters", SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)));
-        var lights = new List<FarLight>();
+        var lights = new List<DistantLight>();
         for (int i = 1; i + 5 < arguments.Length; i += 6)
         {
             var n = new double[6];
             for (int j = 0; j < 6; j++) n[j] = double.Parse(arguments[i + j], CultureInfo.InvariantCulture);
-            lights.Add(new FarLight { ToLight = new Vector(n[0], n[1], n[2]).Normalized(), Color = new Vector(n[3], n[4], n[5]) });
+            lights.Add(new DistantLight { ToLight = new Vector(n[0], n[1], n[2]).Normalized(), Color = new Vector(n[3], n[4], n[5]) });
         }
         Print("pairs", SrbfMath.Pairs(table.Values));
         if (manifest.Method == "relighting-map") Print("weights", SrbfMath.MapWeights(manifest.Centers, table.Values, lights));
@@ -43,8 +43,8 @@ static class Answers
         }
         Print("axes", SrbfMath.Axes);
         Print("versines", SrbfMath.Versine(0.001), SrbfMath.Versine(0.3), SrbfMath.Versine(2));
-        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0.6, -0.8), 0.8, 0.05, false, 40, 70));
-        Print("lamp", SrbfMath.PackedLamp(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0, 1), 0.7, 0.01, true, -1, -1));
+        Print("pointLight", SrbfMath.PackedPointLight(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0.6, -0.8), 0.8, 0.05, false, 40, 70));
+        Print("pointLight", SrbfMath.PackedPointLight(new Vector(0.4, -0.3, 1.1), new Vector(0.5, 1, 2), new Vector(0, 0, 1), 0.7, 0.01, true, -1, -1));
         var halves = new List<double>();
         for (int bits = 0; bits < 65536; bits++)
             if ((bits & 0x7C00) != 0x7C00 && SrbfImage.ToHalf(SrbfImage.FromHalf((ushort)bits)) != bits) halves.Add(bits);

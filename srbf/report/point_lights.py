@@ -15,16 +15,16 @@ from srbf.lights import Light, PointLight, SpotLight, Triple, moved
 
 COUNT = 6  # lamps a strip
 MARGIN_QUANTILE = 0.02  # of the positions at either end do not count: a far horizon must not push the lamp away
-INWARD = 0.15  # mean of n . (centre - p) over the two horizontal axes, in half sizes: above this walls look inwards, as in a room
+INWARD = 0.15  # mean of n . (center - p) over the two horizontal axes, in half sizes: above this walls look inwards, as in a room
 TOP_QUANTILE = 0.995  # of the receivers' height along the way out: the lamp stands above it
 FLAT_NORMAL = 0.15  # a mean normal shorter than this says nothing about where the front is
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Where receivers are: centre, `out` the way they face, `along` their longest side across it, half sizes and top (m)."""
+    """Where receivers are: center, `out` the way they face, `along` their longest side across it, half sizes and top (m)."""
 
-    centre: Float64[ndarray, " 3"]
+    center: Float64[ndarray, " 3"]
     out: Float64[ndarray, " 3"]
     along: Float64[ndarray, " 3"]
     half_along: float
@@ -33,25 +33,25 @@ class Stage:
     radius: float
     inside: bool
 
-    def lamp_at(self, t: float, lift: float = 1.0) -> Float64[ndarray, " 3"]:
+    def point_light_at(self, t: float, lift: float = 1.0) -> Float64[ndarray, " 3"]:
         """A position on the arc, t from 0 to 1: over the front of the receivers, or inside them where they look inwards."""
         side = -np.cos(np.pi * (0.12 + 0.76 * t)) * self.half_along * (0.6 if self.inside else 0.95)
         bow = np.sin(np.pi * (0.12 + 0.76 * t))
         height = 0.35 * bow * self.half_out if self.inside else self.top + lift * self.radius * (0.16 + 0.14 * bow)
-        return self.centre + side * self.along + height * self.out
+        return self.center + side * self.along + height * self.out
 
 
 def stage_of(asset: Asset, covered: ndarray) -> Stage:
     """The stage of the covered positions, in the asset's frame; the way out is the mean normal, or +z where there is none."""
     positions = asset.images["position"][covered].astype(np.float64)
     low, high = np.quantile(positions, [MARGIN_QUANTILE, 1 - MARGIN_QUANTILE], axis=0)
-    centre, half = (low + high) / 2, (high - low) / 2
+    center, half = (low + high) / 2, (high - low) / 2
     radius = max(float(np.linalg.norm(half)), 1e-3)
     out, inside = np.array([0.0, 0.0, 1.0]), False
     if "normal" in asset.images:
         normals = asset.images["normal"][covered].astype(np.float64)
         mean = normals.mean(axis=0)
-        inward = (normals * (centre - positions) / np.maximum(half, 1e-3 * radius)).mean(axis=0)
+        inward = (normals * (center - positions) / np.maximum(half, 1e-3 * radius)).mean(axis=0)
         inside = float(inward[:2].sum()) > INWARD
         if np.linalg.norm(mean) > FLAT_NORMAL and not inside:
             axis = int(np.argmax(np.abs(mean)))
@@ -59,18 +59,18 @@ def stage_of(asset: Asset, covered: ndarray) -> Stage:
     if asset.domain == "hemisphere" and out[2] < 0:
         out = np.array([0.0, 0.0, 1.0])
     across = half * (1 - np.abs(out))
-    top = float(np.quantile((positions - centre) @ out, TOP_QUANTILE))
+    top = float(np.quantile((positions - center) @ out, TOP_QUANTILE))
     along = np.eye(3)[int(np.argmax(across))]
-    return Stage(centre, out, along, max(float(across.max()), 1e-3), float(half @ np.abs(out)), top, radius, inside)
+    return Stage(center, out, along, max(float(across.max()), 1e-3), float(half @ np.abs(out)), top, radius, inside)
 
 
-def demonstration_lamps(
+def demonstration_point_lights(
     asset: Asset, covered: ndarray, given: Sequence[Light] | None
 ) -> tuple[tuple[PointLight, ...], tuple[SpotLight, ...]]:
     """(point lights, spot lights) in world space: those of `given`, else derived; none without covered positions.
 
-    A derived lamp has a0 at the distance from the middle of its way to the receivers' centre: from there its irradiance at the
-    centre is 1, as of a captured light.
+    A derived lamp has a0 at the distance from the middle of its way to the receivers' center: from there its irradiance at the
+    center is 1, as of a captured light.
     """
     if "position" not in asset.images or not covered.any():
         return (), ()
@@ -92,16 +92,16 @@ def moving_point(asset: Asset, covered: ndarray, t: float) -> PointLight:
 
 
 def _point(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> PointLight:
-    position = stage.lamp_at(t)
-    a0 = max(float(np.linalg.norm(stage.lamp_at(0.5) - stage.centre)), 1e-3)
+    position = stage.point_light_at(t)
+    a0 = max(float(np.linalg.norm(stage.point_light_at(0.5) - stage.center)), 1e-3)
     return cast(PointLight, moved(PointLight(_triple(position), a0=a0), world))
 
 
 def _spot(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> SpotLight:
-    position = stage.lamp_at(0.5, lift=2.0)
-    target = stage.centre + (2 * t - 1) * 0.7 * stage.half_along * stage.along - stage.half_out * stage.out
+    position = stage.point_light_at(0.5, lift=2.0)
+    target = stage.center + (2 * t - 1) * 0.7 * stage.half_along * stage.along - stage.half_out * stage.out
     ray = target - position
-    distance = max(float(np.linalg.norm(position - stage.centre)), 1e-3)
+    distance = max(float(np.linalg.norm(position - stage.center)), 1e-3)
     outer = float(np.arctan(0.4 * stage.radius / distance))
     spot = SpotLight(_triple(position), a0=distance, direction=_triple(ray), inner=0.6 * outer, outer=outer)
     return cast(SpotLight, moved(spot, world))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small scenes with known answers: `python known_answers.py NAME OUT.blend`, or `python known_answers.py hdri IN.blend SKY.exr OUT.npy`."""
+"""Small scenes whose light has a closed form.
+
+`python closed_form_scenes.py NAME OUT.blend`, or `python closed_form_scenes.py hdri IN.blend SKY.exr OUT.npy`.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +65,7 @@ def camera(kind="PERSP", location=(0, -4, 3)):
     return obj
 
 
-def lamp(name="Lamp", energy=500, location=(0, 0, 2)):
+def point_light(name="PointLight", energy=500, location=(0, 0, 2)):
     obj = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
     obj.data.energy = energy
     obj.location = location
@@ -72,7 +75,7 @@ def lamp(name="Lamp", energy=500, location=(0, 0, 2)):
 def plane():
     """A white square, z = 0, moved to (10, 5, 0), with a bright lamp and world that a bake must switch off."""
     quad("Plane", location=(10, 5, 0))
-    lamp(location=(10, 5, 2))
+    point_light(location=(10, 5, 2))
     camera()
     world = bpy.data.worlds.new("World")
     world.use_nodes = True
@@ -88,7 +91,7 @@ def occluder():
 
 
 def view(kind="PERSP"):
-    """A coloured plane before a camera, empty sky around it."""
+    """A colored plane before a camera, empty sky around it."""
     quad("Plane", color=(0.8, 0.4, 0.2))
     camera(kind)
 
@@ -113,7 +116,7 @@ def leaves():
 
 
 def sharp(kind="PERSP"):
-    """A coloured plane and the wall before a camera without depth of field."""
+    """A colored plane and the wall before a camera without depth of field."""
     quad("Plane", color=(0.8, 0.4, 0.2))
     quad("Wall", corners=[(0, 0, 0), (0, 1, 0), (0, 1, 0.5), (0, 0, 0.5)], color=(0.3, 0.5, 0.7))
     camera(kind)
@@ -125,7 +128,7 @@ def emissive():
     quad("Plane")
     glow = quad("Glow", corners=[(-0.2, -0.2, 1), (-0.2, 0.2, 1), (0.2, 0.2, 1), (0.2, -0.2, 1)])
     glow.data.materials[0] = material("glow", (1, 0.5, 0.25), "ShaderNodeEmission", 5)
-    lamp(energy=100, location=(0.5, 0, 1.5))
+    point_light(energy=100, location=(0.5, 0, 1.5))
     camera()
 
 
@@ -245,7 +248,7 @@ def torus(around=48, across=24):
     camera()
 
 
-def folded():
+def projected():
     """Three squares side by side that share no vertices, in UV apart: the second of another material, the third folded up by 40 degrees."""
     mesh = bpy.data.meshes.new("Strip")
     up, out = math.sin(math.radians(40)), 2 + math.cos(math.radians(40))
@@ -328,7 +331,7 @@ SCENES = {
     "subdivided": subdivided,
     "scattered": scattered,
     "torus": torus,
-    "folded": folded,
+    "projected": projected,
     "blocks": blocks,
     "overriding": overriding,
     "no camera": lambda: quad("Plane"),

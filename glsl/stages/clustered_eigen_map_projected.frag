@@ -8,17 +8,17 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 
 #include "combine/cluster_index.glsl"
-#include "combine/planes_folded_cluster.glsl"
+#include "combine/components_projected_cluster.glsl"
 
 uniform sampler2DArray planes;
 uniform sampler2D clusters;
 uniform int firstLayer;
 uniform sampler2D weights;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(planes, 0).xy);
     int cluster = srbfClusterIndex(clusters, ivec2(gl_FragCoord.xy));
-    answer = vec4(srbfCombinePlanesFoldedCluster(planes, uv, firstLayer, weights, cluster), 1.0);
+    response = vec4(srbfCombineComponentsProjectedCluster(planes, uv, firstLayer, weights, cluster), 1.0);
 }

@@ -7,16 +7,16 @@ precision highp int;
 precision highp sampler2D;
 precision highp sampler2DArray;
 
-#include "combine/folded.glsl"
+#include "combine/projected.glsl"
 
 uniform sampler2DArray maps;
 uniform int firstMap;
 uniform vec4 weights[SRBF_K];
 uniform vec3 offset;
 
-layout(location = 0) out vec4 answer;
+layout(location = 0) out vec4 response;
 
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
-    answer = vec4(srbfCombineFolded(maps, uv, 0.0, firstMap, weights, offset), 1.0);
+    response = vec4(srbfCombineProjected(maps, uv, 0.0, firstMap, weights, offset), 1.0);
 }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+/* srbfPointLightsAt: which of many lamps shine on a receiver, from where and how brightly.
+   use:    int srbfPointLightsAt(vec4 lamps[4 * SRBF_POINT_LIGHTS], int pointLightCount, vec3 receiver,
+                           out vec4 directions[SRBF_POINT_LIGHTS], out vec4 colors[SRBF_POINT_LIGHTS])
+   domain: lamps in fours as srbfUnpackPointLight takes them, the first pointLightCount of them in use; receiver in their frame, meters; result:
+           how many shine there. So many entries hold, in .xyz, the unit direction (0 where the receiver lies in the lamp) and color
+           times strength; the rest are 0. Lamps whose cone passes by are left out
+   twin:   srbf.methods.receivers.light_vectors
+   cite:   Wong2005, fig. 8 to 10 */
+#include "lights/point_light_strength.glsl"
+#include "lights/light_direction.glsl"
+#include "lights/light_vector.glsl"
+#include "lights/unpack_point_light.glsl"
+
+#ifndef SRBF_POINT_LIGHTS
+#error define SRBF_POINT_LIGHTS: how many pointLights a pass takes at most
+#endif
+
+int srbfPointLightsAt(vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount, vec3 receiver,
+                out vec4 directions[SRBF_POINT_LIGHTS], out vec4 colors[SRBF_POINT_LIGHTS]) {
+    for (int j = 0; j < SRBF_POINT_LIGHTS; ++j) {
+        directions[j] = vec4(0.0);
+        colors[j] = vec4(0.0);
+    }
+    int shining = 0;
+    for (int j = 0; j < min(pointLightCount, SRBF_POINT_LIGHTS); ++j) {
+        SrbfPointLight pointLight = srbfUnpackPointLight(pointLights[4 * j], pointLights[4 * j + 1], pointLights[4 * j + 2], pointLights[4 * j + 3]);
+        vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, receiver);
+        float strength = srbfPointLightStrength(pointLight, lightVector);
+        if (strength > 0.0) {
+            directions[shining] = vec4(srbfLightDirection(lightVector), 0.0);
+            colors[shining] = vec4(pointLight.color * strength, 0.0);
+            ++shining;
+        }
+    }
+    return shining;
+}
