@@ -122,7 +122,7 @@ def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, r
 
 def components_of(method: Method) -> int:
     """Numbers a texel."""
-    return 3 * method.k if isinstance(method, RelightingMap) else method.scalars
+    return 3 * method.k if isinstance(method, RelightingMap) else method.components
 
 
 def row(*cells: object) -> None:

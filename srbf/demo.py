@@ -19,6 +19,7 @@ from srbf.evaluation.errors_by_role import TrainWatch, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
 from srbf.io import files
+from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 
@@ -112,7 +113,7 @@ def run_demo(
     started = clock()
     method = within_budget(capture, say=reporter.say)
     watch = TrainWatch(capture)
-    asset = method.encode(capture, lambda done, total: progress(done, total, "fit"), watch.look)
+    asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
     timings["fit"] = clock() - started
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)

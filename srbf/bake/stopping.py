@@ -12,7 +12,6 @@ from srbf.bake.sums import Sum
 from srbf.capture import Capture
 from srbf.encode.light_function_fit import choose_functions, dense_centers
 from srbf.encode.model_selection import TexelSample
-from srbf.sphere import domain_of
 
 TEXELS = 4096
 WORTH = 0.02  # of the error: a doubling that lowers it by less was the last
@@ -38,8 +37,8 @@ def measure(capture: Capture, samples: int, sums: Sequence[Sum]) -> Measure:
     sensitive to noise. With v = t + n the error seen is E|f - t|^2 + E|n|^2, and the second is known from how the passes of v differ.
     """
     sample = TexelSample.of(capture, TEXELS)
-    train = sample.directions[: sample.train]
-    choice = choose_functions(sample, dense_centers(train, domain_of(train)))
+    train = sample.coordinates[: sample.train]
+    choice = choose_functions(sample, dense_centers(train, sample.domain))
     noise = float(np.mean([total.noise_variance().reshape(-1, 3)[sample.texels].mean(dtype=np.float64) for total in sums]))
     power = float((sample.responses[:, sample.train :].astype(np.float64) ** 2).mean()) - noise
     power = max(power, 1e-30)

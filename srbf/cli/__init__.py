@@ -8,6 +8,7 @@ import typer
 
 import srbf
 from srbf.cli import bake, demo, evaluate, export, fit, import_, info, mesh, relight, report, view
+from srbf.cli.method_flags import FitCommand
 from srbf.cli.terminal import Commands
 
 app = typer.Typer(
@@ -28,9 +29,9 @@ def main(version: Annotated[bool, typer.Option("--version", callback=_version, i
 
 app.command("bake")(bake.bake)
 app.command("import")(import_.import_capture)
-app.command("fit")(fit.fit)
+app.command("fit", cls=FitCommand)(fit.fit)
 app.command("relight")(relight.relight)
-app.command("evaluate")(evaluate.evaluate)
+app.command("evaluate", cls=FitCommand)(evaluate.evaluate)
 app.command("report")(report.report)
 app.command("export")(export.export)
 app.command("mesh")(mesh.mesh)

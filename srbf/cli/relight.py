@@ -18,7 +18,7 @@ from srbf.errors import InputError
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
 from srbf.lights import Light
-from srbf.methods.receivers import outside_domain
+from srbf.methods import outside_domain
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, chosen
 from srbf.relighting.relighter import Relighter

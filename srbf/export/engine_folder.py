@@ -5,13 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from srbf.asset import GEOMETRY, LAYERS, MANIFEST, Asset
+from srbf.asset import GEOMETRY, MANIFEST, Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.settings import Settings, Target
 from srbf.io import files
-
-ENTRIES = ("r_table", "w_table", "light_coefficients", "cluster_index")  # keys of asset.json that hold a file among other things
+from srbf.registry import method_named
 
 
 def engine_root(name: str) -> Path:
@@ -37,9 +36,10 @@ def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, conta
 def below(data: str, manifest: dict[str, Any]) -> dict[str, Any]:
     """asset.json of files that lie in `data` beside it."""
     moved = dict(manifest)
-    layers = LAYERS[manifest["method"]]
+    method = method_named(manifest["method"])
+    layers = method.layers
     moved[layers] = [{**entry, "file": f"{data}/{entry['file']}"} for entry in manifest[layers]]
-    for key in ENTRIES:
+    for key in method.tables:
         if key in manifest:
             moved[key] = {**manifest[key], "file": f"{data}/{manifest[key]['file']}"}
     for key in (*GEOMETRY, "scene"):

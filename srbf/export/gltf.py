@@ -64,7 +64,7 @@ def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Do
 def _document(asset: Asset, notes: list[str]) -> Document:
     """One node of one primitive: a view's picture, or the lightmap's texels. Adds to `notes` which."""
     document = Document()
-    kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
+    kind = asset.receiver.get("kind")
     if kind == "vertices":
         raise InputError("expected a lightmap or a view, found an asset of vertices; give the mesh with a UV for each: --mesh FILE.glb")
     if kind == "view":
@@ -89,7 +89,7 @@ def _document(asset: Asset, notes: list[str]) -> Document:
     attributes["TEXCOORD_0"] = document.accessor(uv)
     primitive = {"attributes": attributes, "indices": document.accessor(triangles.astype(np.uint32).ravel())}
     mesh_index = document.add("meshes", {"primitives": [primitive]})
-    name = asset.manifest.get("source", {}).get("receiver", {}).get("object", "receiver")
+    name = asset.receiver.get("object", "receiver")
     document.json["scenes"] = [{"nodes": [document.add("nodes", {"name": str(name), "mesh": mesh_index})]}]
     document.json["scene"] = 0
     return document
@@ -141,9 +141,7 @@ def _light_up(document: Document, asset: Asset, picture: int, path: Path | None)
 
 def _receivers(document: Document, asset: Asset) -> set[int]:
     """The meshes of the nodes that are named as the asset's receivers; all of them where none is."""
-    source = asset.manifest.get("source", {})
-    told = [source.get("receiver", {}), *source.get("receivers", [])]
-    names = {receiver["object"] for receiver in told if "object" in receiver}
+    names = {receiver["object"] for receiver in asset.receivers if "object" in receiver}
     named = {node["mesh"] for node in document.json.get("nodes", []) if "mesh" in node and node.get("name") in names}
     return named or set(range(len(document.json["meshes"])))
 

@@ -7,18 +7,19 @@ import shutil
 from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
-from srbf.errors import InputError, ShaderError
+from srbf.errors import ShaderError
 from srbf.export import dds, exr, uint8
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
 from srbf.io import files
+from srbf.methods import method_of
+from srbf.registry import all_methods
 
 DATA = "asset"  # the folder of the asset's images, which Godot's own importers are told to leave alone
 IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
 MODEL = "model.glb"  # what the example shows in place of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
-METHODS = {"relighting-map": "relighting_map", "eigen-map": "eigen_map", "clustered-eigen-map": "clustered_eigen_map"}
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
@@ -34,10 +35,9 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     `settings` say otherwise. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
     maps of other functions than Gaussians, which no shader knows.
     """
-    if asset.method == "relighting-map" and asset.manifest["basis"]["kind"] != "gaussian":
-        raise InputError(f"expected relighting maps of Gaussians for Godot, found {asset.manifest['basis']['kind']}; fit without --basis")
+    method_of(asset).shader_parts(asset)  # refuses what no shader knows
     shutil.copytree(engine_root("godot"), folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".godot", "*.uid", "*.import"))
-    for name in METHODS.values():
+    for name in (method.stem() for method in all_methods() if method.has_shader):
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held

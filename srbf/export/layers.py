@@ -10,7 +10,7 @@ from srbf.asset import Asset
 from srbf.encode.quantization import quantize, quantize_together, ranges_together
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.sphere import all_around
+from srbf.methods import method_of
 
 
 def finite_layers(asset: Asset) -> Float32[ndarray, "N H W C"]:
@@ -23,8 +23,8 @@ def finite_layers(asset: Asset) -> Float32[ndarray, "N H W C"]:
 
 
 def functions_of(asset: Asset) -> Float64[ndarray, "M K"] | None:
-    """What weighs the relighting maps, over the domain; None of planes, which are orthogonal and rounded alone."""
-    return asset.map_functions.evaluate(all_around(asset.domain)) if asset.method == "relighting-map" else None
+    """Functions over the domain through whose sums alone the layers are seen; None where each layer is rounded alone."""
+    return method_of(asset).rounding_functions(asset)
 
 
 def in_encoding(asset: Asset, encoding: Encoding) -> tuple[ndarray, Float32[ndarray, "N C"], Float32[ndarray, "N C"]]:

@@ -8,14 +8,8 @@ from typing import Any
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.asset import LAYERS, SCENE_FILE, Asset
-
-TABLE_FILES = {
-    "r_table": "r_table.exr",
-    "light_coefficients": "light_coefficients.exr",
-    "w_table": "w_table.exr",
-    "cluster_index": "cluster_index.png",
-}
+from srbf.asset import SCENE_FILE, Asset
+from srbf.methods import method_of
 
 
 def with_layers(
@@ -42,12 +36,12 @@ def with_layers(
     }
     for name, table in asset.tables.items():
         told = {"size": table.size} if name == "r_table" else {"mapping": "octahedral"} if name == "w_table" else {}
-        manifest[name] = {**told, **manifest.get(name, {}), "file": TABLE_FILES[name]}
-    manifest[LAYERS[asset.method]] = entries
+        manifest[name] = {**told, **manifest.get(name, {}), "file": method_of(asset).tables[name]}
+    manifest[asset.layers_key] = entries
     manifest["source"] = {**manifest.get("source", {}), "export": {"target": target}}
     return replace(asset, manifest=manifest, stored=stored, scale=scale, bias=bias)
 
 
 def stem(asset: Asset) -> str:
     """What the files of its layers are called: `map` or `plane`."""
-    return LAYERS[asset.method][:-1]
+    return asset.layers_key[:-1]

@@ -71,7 +71,7 @@ def levels_without_bleeding(asset: Asset) -> int:
     """The most levels, full size included, with GUTTER of their own texels between any two charts, so that a bilinear sample of one chart
     never takes of another; 1 where a texel's neighbor is not its neighbor on the surface (vertices) or means another thing (clusters).
     """
-    kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
+    kind = asset.receiver.get("kind")
     if "cluster_index" in asset.tables or kind == "vertices":
         return 1
     levels = max(asset.width, asset.height).bit_length()

@@ -34,7 +34,7 @@ def write(suffix: str, asset: Asset, folder: Path, settings: Settings = PLAIN) -
     form = settings.encoding or "bc7"
     if form == "float":
         raise InputError(f"expected --encoding {', '.join(get_args(TexelFormat))} for a texture array, found {form}")
-    if form == "bc1" and asset.method != "relighting-map":
+    if form == "bc1" and asset.stored.shape[3] > 3:
         raise InputError(
             f"expected bc7 for scalar planes, four to a layer, found bc1, which has three channels; export {asset.method} as bc7"
         )

@@ -58,8 +58,8 @@ def custom_node(asset: Asset, name: str) -> dict[str, Any]:
     The result is what a surface sends out, to be added to the emissive color: of irradiance assets for a white surface, so that the
     material multiplies by its base color, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
     """
-    clustered = asset.method == "clustered-eigen-map"
-    textures = {"Table": asset.manifest["r_table" if asset.method == "relighting-map" else "w_table"]["file"]}
+    clustered = "cluster_index" in asset.tables
+    textures = {"Table": asset.manifest["r_table" if "r_table" in asset.tables else "w_table"]["file"]}
     if clustered:
         textures["Clusters"] = asset.manifest["cluster_index"]["file"]
     if "ambient" in asset.images:

@@ -11,6 +11,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.gl.context import Limits
+from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import (
@@ -30,7 +31,7 @@ VECTORS_PER_LAYER = 2  # scale, bias
 VECTORS_PROJECTED = 3  # the weights of four scalars, a color each
 
 
-class ComponentPasses:
+class ComponentPasses(Passes):
     """Passes over an asset of scalar planes; each adds to the target in use. Their light functions have no formula."""
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
@@ -49,7 +50,7 @@ class ComponentPasses:
         vectors = VECTORS_PER_LAYER if point_lights else VECTORS_PROJECTED
         return max(1, (self._free - VECTORS_PER_POINT_LIGHT * point_lights) // vectors)
 
-    def far(self, weights: Float64[ndarray, "F 3"], units: int | None) -> None:
+    def distant(self, weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """All directional and environment lights; `units` layers of four scalars a pass as plain textures, or all that uniforms hold."""
         rows = projected_rows(self._asset, weights)
         if self._clustered:
@@ -77,7 +78,7 @@ class ComponentPasses:
             values |= {f"pointLight.{name}": value for name, value in point_light_uniforms(lights[0]).items()}
             self._over_layers("point.frag", {}, values, units or self.layers_per_pass(1))
             return
-        far = np.ones((self._asset.clusters, self._asset.scalars + 1, 4), np.float32)
+        far = np.ones((self._asset.clusters, self._asset.components + 1, 4), np.float32)
         far[..., :3] = weights.reshape(*far.shape[:2], 3)
         for group, places in point_light_groups(lights, self._point_lights):
             values |= {"pointLights": packed_point_lights(group, places), "pointLightCount": len(group), "weights": 4}
@@ -93,7 +94,7 @@ class ComponentPasses:
     def _run_far(self, first: int, count: int, units: int | None, values: dict[str, Any]) -> None:
         if units is None:
             self._textures.layers().use(2)
-            defines = {"SRBF_COMPONENTS": self._asset.scalars, "SRBF_LAYERS": count}
+            defines = {"SRBF_COMPONENTS": self._asset.components, "SRBF_LAYERS": count}
             self._programs.run(f"{self._method}_projected.frag", defines, values | {"planes": 2})
             return
         for unit in range(count):
@@ -110,7 +111,7 @@ class ComponentPasses:
         scale, bias = self._asset.scale, self._asset.bias
         for first, count in ranges(len(scale), size):
             own = {"firstLayer": first, "scale": scale[first : first + count], "bias": bias[first : first + count]}
-            counts = {"SRBF_COMPONENTS": self._asset.scalars, "SRBF_LAYERS": count}
+            counts = {"SRBF_COMPONENTS": self._asset.components, "SRBF_LAYERS": count}
             self._programs.run(f"{self._method}_{lights}", counts | defines | self._defines, values | own)
 
 
@@ -119,10 +120,10 @@ def projected_rows(asset: Asset, weights: Float64[ndarray, "F 3"]) -> Float32[nd
 
     n = 3 layers + 1; the three are the red, green and blue weights of the layer's four scalars.
     """
-    by_cluster = weights.reshape(asset.clusters, asset.scalars + 1, 3)
+    by_cluster = weights.reshape(asset.clusters, asset.components + 1, 3)
     layers = len(asset.scale)
     own = np.zeros((asset.clusters, layers * 4, 3))
-    own[:, : asset.scalars] = by_cluster[:, 1:]
+    own[:, : asset.components] = by_cluster[:, 1:]
     rows = np.ones((asset.clusters, 3 * layers + 1, 4), np.float32)
     rows[:, 0, :3] = by_cluster[:, 0] + np.einsum("mjc,j->mc", own, asset.bias.ravel().astype(np.float64))
     projected = own * asset.scale.ravel().astype(np.float64)[:, None]

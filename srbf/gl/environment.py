@@ -31,7 +31,7 @@ class Sky:
     def __init__(self, context: moderngl.Context, asset: Asset, programs: Programs, textures: AssetTextures, resources: ExitStack) -> None:
         self._context, self._asset, self._programs, self._textures = context, asset, programs, textures
         self._resources = resources
-        self._maps = asset.method == "relighting-map"
+        self._maps = "r_table" in asset.tables
         if self._maps:
             basis = asset.basis
             self._size = (asset.k, 1)
@@ -39,7 +39,7 @@ class Sky:
         else:
             functions = asset.light_functions
             spreads, which = np.unique(functions.spreads, return_inverse=True)
-            self._size = (asset.scalars + 1, asset.clusters)
+            self._size = (asset.components + 1, asset.clusters)
             centers = np.concatenate([np.pad(functions.centers, ((0, 0), (0, 1)), constant_values=0.5 / spread**2) for spread in spreads])
             coefficients = np.pad(functions.coefficients, ((0, 0), (0, 0), (0, 1)))
             coefficients[..., 3] = which[:, None]
@@ -62,8 +62,7 @@ class Sky:
         return np.frombuffer(data, np.float32).reshape(-1, 4)[:, :3].copy()
 
     def _add(self, light: EnvironmentLight) -> None:
-        linear = self._asset.asset_from_world[:3, :3]
-        rotation = linear / np.cbrt(np.linalg.det(linear))
+        rotation = light.rotation
         domain = SPHERE
         if self._asset.domain == "hemisphere":
             domain = HEMISPHERE if np.allclose(rotation[2], [0, 0, 1]) else TURNED_HEMISPHERE

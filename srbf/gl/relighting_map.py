@@ -12,6 +12,7 @@ from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.gl.context import Limits
+from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import (
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 VECTORS_PER_MAP = 4  # weight, center, scale, bias
 
 
-class MapPasses:
+class MapPasses(Passes):
     """Passes over an asset of relighting maps; each adds to the target in use."""
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
@@ -54,7 +55,7 @@ class MapPasses:
         vectors = VECTORS_PER_MAP if point_lights else 1
         return max(1, (self._free - VECTORS_PER_POINT_LIGHT * point_lights) // vectors)
 
-    def far(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
+    def distant(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
         """All directional and environment lights; `units` maps a pass as plain textures, or all that uniforms hold from an array."""
         if units is not None:
             self._accumulate(weights, units)

@@ -45,8 +45,7 @@ class AssetTextures:
         if self._layers is None:
             stored, most = self._asset.stored, self._limits.array_layers
             if len(stored) > most:
-                what = "maps" if self._asset.method == "relighting-map" else "images of planes"
-                raise ShaderError(f"expected at most {most} {what} on this GPU (array layers), found {len(stored)}; fit with fewer")
+                raise ShaderError(f"expected at most {most} layers on this GPU (array layers), found {len(stored)}; fit with fewer")
             layers, height, width, channels = stored.shape
             dtype = _DTYPES[stored.dtype.name]
             pixels = np.ascontiguousarray(stored)
@@ -67,13 +66,7 @@ class AssetTextures:
 
     def plain(self) -> bool:
         """Whether what is stored needs no decoding."""
-        scale, bias = self._asset.scale.ravel().copy(), self._asset.bias.ravel()
-        if self._asset.method != "relighting-map":
-            unused = slice(self._asset.scalars, None)
-            if self._asset.stored[-1].reshape(-1, 4)[:, self._asset.scalars % 4 or 4 :].any():
-                return False
-            scale[unused] = 1
-        return bool((scale == 1).all() and not bias.any())
+        return self._asset.is_plain()
 
     def w_table(self) -> moderngl.Texture:
         """The atlas of light functions over the octahedral square."""

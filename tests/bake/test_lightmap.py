@@ -13,7 +13,8 @@ from srbf.bake.settings import plan_lights
 from srbf.errors import BakeError
 from srbf.io.image import write_image
 from srbf.lights import DirectionalLight, EnvironmentLight
-from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.methods import relight
+from srbf.methods.relighting_map import RelightingMap
 
 pytestmark = pytest.mark.blender
 

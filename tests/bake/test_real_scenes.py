@@ -22,7 +22,8 @@ from srbf.errors import BakeError, InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.io.image import read_image
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.methods import relight
+from srbf.methods.relighting_map import RelightingMap
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
 

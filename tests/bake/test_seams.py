@@ -67,8 +67,8 @@ def test_only_smooth_edges_are_seams(handed_over: Seams) -> None:
 def test_a_torus_looks_whole(bake) -> None:
     capture = bake("torus", "lightmap:Torus", width=64, height=64, lights=40, domain="sphere", samples=2, holdout=6).capture
     assert len(capture.seam_edges()) == 4 * 24 + 48
-    for method in (RelightingMap(k=25), EigenMap(scalars=12)):
-        plain, stitched = encode(method, capture, stitched=False), encode(method, capture)
+    for method in (RelightingMap(k=25), EigenMap(components=12)):
+        plain, stitched = encode(method, capture, stitch=False), encode(method, capture)
         seams = stitched.manifest["seams"]
         assert seams["before"] > 0.1 and seams["after"] < 0.05 * seams["before"], seams
         errors = [evaluate(asset, capture, roles=("holdout",))["holdout"]["rmse"] for asset in (plain, stitched)]

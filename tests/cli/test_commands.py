@@ -171,7 +171,7 @@ def test_import_to_relight(tmp_path: Path) -> None:
 
 
 def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.report.METHODS", ())
+    monkeypatch.setattr("srbf.report.compared_methods", lambda: ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
     page = tmp_path / "page.html"

@@ -16,7 +16,7 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.lights import DirectionalLight
-from srbf.methods.relighting_map import relight
+from srbf.methods import relight
 
 BOUNCE = np.array([0.2, 0.1, 0.05])
 

@@ -57,7 +57,7 @@ def test_leaving_one_out_takes_the_same_method(make_capture) -> None:
     assert srbf("evaluate", "--leave-one-out", folder, "--scalars", 2).exit_code == 0
     done = srbf("evaluate", "--leave-one-out", folder, "--scalars", 2, "--method", "relighting-map")
     assert done.exit_code == 1 and "--scalars with --method eigen-map" in done.stderr
-    assert method_of(None, {"scalars": 2, "clusters": None}) == "eigen-map"
+    assert method_of(None, {"components": 2, "clusters": None}) == "eigen-map"
 
 
 def test_more_maps_than_lights_is_a_caution(make_capture, tmp_path: Path) -> None:

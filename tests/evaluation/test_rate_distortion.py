@@ -21,7 +21,7 @@ from srbf.evaluation.rate_distortion import (
     score_asset,
     spectrum,
 )
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -64,8 +64,8 @@ def test_every_family_is_told_apart(capture: Capture) -> None:
     sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
     methods = [
         RelightingMap(k=9, basis="spherical-harmonics"),
-        EigenMap(scalars=8),
-        ClusteredEigenMap(clusters=3, scalars=4, encoding="uint8"),
+        EigenMap(components=8),
+        ClusteredEigenMap(clusters=3, components=4, encoding="uint8"),
     ]
     harmonics, eigen, clustered, *_ = contest(sample, methods, "holdout", 1.0)
     assert (harmonics.family, harmonics.name, harmonics.bytes_per_texel) == ("spherical harmonics", "9 maps", 72)
@@ -99,9 +99,9 @@ def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Captu
     bound = planes_bound(values, responses.size, 1.0)
     assert (np.diff(bound) >= 0).all()
     assert bound[0] == pytest.approx(-10 * np.log10(((responses - responses.mean(axis=0)) ** 2).mean()), abs=0.01)
-    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(scalars=3, encoding="float")):
+    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(components=3, encoding="float")):
         asset = method.encode(sample)
-        fitted = np.concatenate(list(directional_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
+        fitted = np.concatenate(list(asset_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
         reached = -10 * np.log10(((fitted - responses) ** 2).mean())
         assert reached <= bound[components_of(asset)] + 0.01
     assert reached > bound[1]  # the eigen map comes near it

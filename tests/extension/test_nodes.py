@@ -9,7 +9,7 @@ import pytest
 
 from srbf.basis.gaussian import TABLE_TOLERANCE
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.relighting_map import relight
+from srbf.methods import relight
 
 pytestmark = pytest.mark.blender
 

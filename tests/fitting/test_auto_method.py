@@ -53,9 +53,9 @@ def size(method: EigenMap | ClusteredEigenMap, capture: Capture) -> int:
 
 def test_shadows_ask_for_clusters_and_smooth_light_does_not(shadows: Capture, cosines: Capture) -> None:
     clustered = within_budget(shadows, 9, spread=0.3, ridge=0.01)
-    assert isinstance(clustered, ClusteredEigenMap) and clustered.scalars == 8 and clustered.encoding == "uint8"
+    assert isinstance(clustered, ClusteredEigenMap) and clustered.components == 8 and clustered.encoding == "uint8"
     shared = within_budget(cosines, 9, spread=0.3, ridge=0.01)
-    assert isinstance(shared, EigenMap) and shared.scalars == 8
+    assert isinstance(shared, EigenMap) and shared.components == 8
     assert size(clustered, shadows) <= 9 and size(shared, cosines) <= 9
 
 

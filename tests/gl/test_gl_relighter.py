@@ -13,9 +13,9 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import projected_weights, receiver_weights
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
+from srbf.methods import projected_weights
+from srbf.methods.relighting_map import receiver_weights
 from srbf.relighting.relighter import Relighter, relight
 
 FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times color and attenuation)

@@ -14,8 +14,8 @@ from srbf.encode.quantization import quantize
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
-from srbf.methods.receivers import outside_domain
-from srbf.methods.relighting_map import RelightingMap, linear_response, projected_weights, relight
+from srbf.methods import linear_response, outside_domain, projected_weights, relight
+from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products

@@ -76,7 +76,7 @@ def test_point_lights_and_suns_together_are_numpys(
     chromium: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path, kind: str
 ) -> None:
     """Typed into the panel; each light's color and falloff its own."""
-    made = make_asset(k=6) if kind == "relighting-map" else make_planes(scalars=5, clusters=4 if kind.startswith("c") else None)
+    made = make_asset(k=6) if kind == "relighting-map" else make_planes(components=5, clusters=4 if kind.startswith("c") else None)
     asset = complete(on_a_plane(made))
     asset.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset") + PICTURE + ",'exposure':-1}", width=WIDTH, height=HEIGHT)

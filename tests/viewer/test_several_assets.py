@@ -38,7 +38,7 @@ def fitted(make_capture: Callable[..., Capture], plane_positions: np.ndarray, tm
     capture = make_capture(lambda direction: np.maximum(axes @ direction, 0) ** 2, lights=60, holdout=6, position=plane_positions)
     folders = [tmp_path / "maps", tmp_path / "planes"]
     RelightingMap(k=6, spread="mean", ridge=1e-3).encode(capture).save(folders[0])
-    EigenMap(scalars=5).encode(capture).save(folders[1])
+    EigenMap(components=5).encode(capture).save(folders[1])
     return capture, folders
 
 

@@ -27,8 +27,8 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
     for encoding in ENCODINGS:
         for asset in (
             make_asset(k=7, encoding=encoding, ambient=True),
-            make_planes(scalars=9, encoding=encoding, ambient=True),
-            make_planes(scalars=5, clusters=7, encoding=encoding),
+            make_planes(components=9, encoding=encoding, ambient=True),
+            make_planes(components=5, clusters=7, encoding=encoding),
         ):
             ready = complete(on_a_plane(asset))
             out[ready.method, encoding] = ready, browser.serve(ready)
@@ -222,7 +222,7 @@ def test_texture_arrays_are_relit_as_they_are_read_by_numpy(
     """The GPU's decoder of blocks against OpenImageIO's: BC7 is exact, BC1's mixed colors may round to another byte."""
     made = [make_asset(k=4, encoding="half", height=12, width=20)]
     if form == "bc7":
-        made += [make_planes(scalars=5, clusters=7, encoding="half", height=12, width=20)]
+        made += [make_planes(components=5, clusters=7, encoding="half", height=12, width=20)]
     for asset in map(complete, made):
         url = browser.place(lambda folder, asset=asset: export(asset, target, folder, Settings(encoding=form)))
         exported = Asset.open(browser.folder(url))
