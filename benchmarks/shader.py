@@ -27,6 +27,7 @@ from srbf.gl.includes import resolve, resolve_text
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_point_lights, padded
+from srbf.light_domain import Directions
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import projected_weights
 from srbf.relighting.relighter import PASSES
@@ -80,7 +81,7 @@ def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0) ->
         manifest |= {"method": "relighting-map", "maps": entries}
         manifest["basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spread": spread}
         return Asset(manifest, stored, scale, bias, {"r_table": r_table(spread)}, images)
-    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), "hemisphere")
+    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), Directions("hemisphere"))
     count = max(clusters, 1) * (components + 1)
     coefficients = rng.normal(size=(count, len(centers), 3)).astype(np.float32)
     functions = LightFunctions(centers, rng.choice(SPREADS, count), coefficients)

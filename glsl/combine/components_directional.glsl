@@ -5,7 +5,7 @@
    domain: layers firstLayer ... firstLayer + SRBF_LAYERS - 1 of planes, four scalars each, and w_0 with layer 0; weights: texel
            (j, cluster) holds w_j times the lights' colors, summed over all directional and environment lights, RGBA32F of
            width SRBF_COMPONENTS + 1; result signed, before the clamp
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #include "combine/decode_components.glsl"
 

@@ -5,7 +5,7 @@
    domain: layers firstLayer ... firstLayer + SRBF_LAYERS - 1 of planes, four scalars each, and w_0 with layer 0; wTable holds
            function j of a cluster in tile cluster * (SRBF_COMPONENTS + 1) + j; lightDirection of length 1, or 0 where the receiver
            lies in the lamp; result signed, for unit irradiance
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #include "basis/octahedral_encode.glsl"
 #include "basis/octahedral_lookup.glsl"

@@ -6,7 +6,7 @@
    domain: planes, weights and cluster as in srbfCombineComponentsDirectional, weights 0 where no directional or environment light shines;
            level: of mip maps, 0 without; wTable as in srbfCombineComponentsPoint; directions, colors, shining from srbfPointLightsAt; result
            signed
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #include "basis/octahedral_encode.glsl"
 #include "basis/octahedral_mix.glsl"

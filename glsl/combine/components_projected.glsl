@@ -4,7 +4,7 @@
                                         vec3 offset)
    domain: weights: three vec4 a layer, the red, green and blue weights of its four scalars, each w_j times the channel's scale; offset:
            w_0 plus the sum of w_j times bias, with one pass alone; level: of mip maps, 0 without; result signed, before the clamp
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #ifndef SRBF_COMPONENTS
 #error define SRBF_COMPONENTS: how many scalars a texel has

@@ -4,7 +4,7 @@
    domain: weights: RGBA32F, nearest, 3 (all layers) + 1 texels wide, a row a cluster: the offset, then three texels a layer, the red,
            green and blue weights of its four scalars, each w_j times the channel's scale; the offset counts with firstLayer 0; result
            signed, before the clamp
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #ifndef SRBF_COMPONENTS
 #error define SRBF_COMPONENTS: how many scalars a texel has

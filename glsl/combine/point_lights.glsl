@@ -5,7 +5,7 @@
                                  vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining)
    domain: weights, scale, bias as in srbfCombineDirectional, weights 0 where no directional or environment light shines; level: of mip
            maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfPointLightsAt; result signed
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 and 8 */
 #include "combine/center_weight.glsl"
 #include "combine/decode.glsl"

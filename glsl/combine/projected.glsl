@@ -3,7 +3,7 @@
    use:    vec3 srbfCombineProjected(sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], vec3 offset)
    domain: weights: those of srbfCombineDirectional times each map's scale; offset: the sum over maps of weight times bias, with one pass
            alone; level: of mip maps, 0 without; result signed, before the clamp
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 */
 #ifndef SRBF_K
 #error define SRBF_K: how many maps this pass combines

@@ -4,7 +4,7 @@
                                     vec4 scale[SRBF_K], vec4 bias[SRBF_K])
    domain: weights RGBA32F, nearest, all maps' in one row; scale, bias of the maps of this pass; level: of mip maps, 0 without; result
            signed, before the clamp
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 */
 #include "combine/decode.glsl"
 

@@ -10,7 +10,7 @@
    domain: planes sampled nearest, never filtered: a scalar means something else in another cluster; the filtered functions rebuild the
            four texels about uv and mix the answers bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, a row a cluster; firstLayer 0
            where one pass combines all layers; receiver and lamp as in the eigen map
-   twin:   srbf.methods.clustered_eigen_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003; Kristensen2005 */
 #include "combine/cluster_index.glsl"
 #include "combine/finish.glsl"

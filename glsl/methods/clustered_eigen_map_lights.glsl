@@ -9,7 +9,7 @@
            and mixes the answers bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, a row a cluster, or 0; lamps in fours as
            srbfUnpackPointLight takes them, the first pointLightCount in use (0 is allowed); receiver the world position of this place, meters, one
            frame with the lamps. Call srbfFinish once, after all passes
-   twin:   srbf.methods.clustered_eigen_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003; Kristensen2005 */
 #include "combine/cluster_index.glsl"
 #include "combine/finish.glsl"

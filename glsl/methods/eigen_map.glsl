@@ -8,7 +8,7 @@
    domain: firstLayer 0 where one pass combines all layers; planes may be filtered linearly; receiver the world position of this
            texel, meters, and the lamp in the asset's frame; weights summed on the host over all directional and environment
            lights, (SRBF_COMPONENTS + 1) x 1 texels
-   twin:   srbf.methods.eigen_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader"; the planes are ours */
 #include "combine/finish.glsl"
 #include "combine/components_directional.glsl"

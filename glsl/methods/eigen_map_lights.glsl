@@ -7,7 +7,7 @@
            as srbfUnpackPointLight takes them, the first pointLightCount in use (0 is allowed); receiver the world position of this place, meters,
            one frame with the lamps; firstLayer 0 where one pass combines all layers; level: of mip maps, 0 without. Call srbfFinish
            once, after all passes
-   twin:   srbf.methods.eigen_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader"; the planes are ours */
 #include "combine/finish.glsl"
 #include "combine/components_point_lights.glsl"

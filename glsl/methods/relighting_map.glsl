@@ -7,7 +7,7 @@
                                  vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfPointLight lamp)
    domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, meters, and the lamp in the
            asset's frame; weights summed on the host over all directional and environment lights
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
 #include "combine/directional.glsl"
 #include "combine/finish.glsl"

@@ -6,7 +6,7 @@
    domain: weights summed on the host over all directional and environment lights, or 0; lamps in fours as srbfUnpackPointLight takes them,
            the first pointLightCount in use (0 is allowed); receiver the world position of this place, meters, one frame with the lamps;
            firstMap 0 where one pass combines all maps; level: of mip maps, 0 without. Call srbfFinish once, after all passes
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
 #include "combine/finish.glsl"
 #include "combine/point_lights.glsl"

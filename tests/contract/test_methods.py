@@ -114,8 +114,7 @@ def test_an_environment_is_the_sum_of_its_texels(asymmetric: Asset) -> None:
 def test_rows_at_a_time_make_no_difference(asymmetric: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
     directions = random_directions(3, "hemisphere", np.random.default_rng(2))
     whole, many = linear_response(asymmetric, LIGHTS), asset_responses(asymmetric, directions)
-    for module in ("methods.receivers", "methods.coefficient_maps", "methods.relighting_map"):
-        monkeypatch.setattr(f"srbf.{module}.CHUNK", 3 * 14)  # does not divide the 10 rows
+    monkeypatch.setattr("srbf.methods.over_lights.CHUNK", 3 * 14)  # does not divide the 10 rows
     np.testing.assert_allclose(linear_response(asymmetric, LIGHTS), whole, atol=FLOAT32 * np.abs(whole).max() * 10)
     np.testing.assert_allclose(asset_responses(asymmetric, directions), many, atol=FLOAT32 * np.abs(many).max() * 10)
 

@@ -13,7 +13,6 @@ from srbf.evaluation.rate_distortion import (
     ALL,
     IMAGE_BYTES,
     NEAREST,
-    components_of,
     contest,
     error_of,
     nearest_image,
@@ -21,6 +20,7 @@ from srbf.evaluation.rate_distortion import (
     score_asset,
     spectrum,
 )
+from srbf.methods import method_of
 from srbf.methods import responses as asset_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
@@ -57,7 +57,7 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
         assert score.psnr == pytest.approx(whole["psnr"], abs=0.01)  # sums in another order, float32
         assert score.relative_rmse == pytest.approx(whole["relative_rmse"], rel=1e-3)
         assert (score.family, score.name, score.bytes_per_texel) == ("relighting map", "12 maps, float", 12 * 16)
-    assert components_of(asset) == 36
+    assert method_of(asset).numbers_per_texel(asset) == 36
 
 
 def test_every_family_is_told_apart(capture: Capture) -> None:
@@ -103,5 +103,5 @@ def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Captu
         asset = method.encode(sample)
         fitted = np.concatenate(list(asset_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
         reached = -10 * np.log10(((fitted - responses) ** 2).mean())
-        assert reached <= bound[components_of(asset)] + 0.01
+        assert reached <= bound[method_of(asset).numbers_per_texel(asset)] + 0.01
     assert reached > bound[1]  # the eigen map comes near it

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from srbf.errors import InputError
-from srbf.evaluation.temporal_stability import LOWEST, compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
+from srbf.evaluation.temporal_stability import compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
+from srbf.light_domain.directions import LOWEST
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap

@@ -226,7 +226,7 @@ def test_point_lights_need_positions(context: Any, make_planes: Callable[..., As
 
 @pytest.mark.parametrize(
     ("limit", "text"),
-    [({"array_layers": 2}, "at most 2 images of planes .* found 3"), ({"texture_size": 60}, "at most 60 texels a side")],
+    [({"array_layers": 2}, "at most 2 layers .* found 3"), ({"texture_size": 60}, "at most 60 texels a side")],
 )
 def test_planes_too_many_for_the_gpu_are_refused(
     context: Any, make_planes: Callable[..., Asset], monkeypatch: Any, limit: dict[str, int], text: str

@@ -164,7 +164,7 @@ def test_settings_that_no_eigen_map_has(settings: dict, words: str) -> None:
 
 def test_more_components_than_numbers(make_capture) -> None:
     capture = make_capture(planted(2), lights=4)
-    with pytest.raises(InputError, match="at most 12 scalars for 4 lights, found 13"):
+    with pytest.raises(InputError, match="at most 12 components for 4 lights, found 13"):
         EigenMap(components=13).encode(capture)
     assert EigenMap(components=12).encode(capture).components == 12
 
