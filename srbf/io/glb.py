@@ -5,57 +5,74 @@ from __future__ import annotations
 import json
 import struct
 import warnings
+from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
-from pygltflib import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, FLOAT, GLTF2, SCALAR, UNSIGNED_BYTE, UNSIGNED_INT, UNSIGNED_SHORT, VEC2, VEC3
 
-ALIGNMENT = 4  # bytes
+from srbf.errors import MissingLibraryError
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+UNSIGNED_BYTE, UNSIGNED_SHORT, UNSIGNED_INT, FLOAT = 5121, 5123, 5125, 5126
 DTYPES = {UNSIGNED_BYTE: np.uint8, UNSIGNED_SHORT: np.uint16, UNSIGNED_INT: np.uint32, FLOAT: np.float32}
-WIDTHS = {SCALAR: 1, VEC2: 2, VEC3: 3}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 TYPES = {width: name for name, width in WIDTHS.items()}
+ALIGNMENT = 4  # bytes
 DAMAGE = (struct.error, ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, RecursionError)  # what reading one may raise
 
 
-class Glb(GLTF2):
-    """A .glb to read, or to add to: `json` is its document as dictionaries, `body` its buffer.
+@cache
+def _file() -> Any:
+    """pygltflib's class of a file, with the JSON left as text.
 
-    pygltflib handles the file; its classes for the parts of a document are left out: they take 0.25 ms per object to read, 20 times what
-    the rest of a scene takes, and drop keys that they do not know.
+    Its classes for nodes, meshes and the rest take 0.25 ms per object to read, 20 times what this module takes, and drop keys that they
+    do not know.
     """
+    try:
+        from pygltflib import GLTF2
+    except ImportError as error:
+        raise MissingLibraryError("binary glTF needs pygltflib, which is not installed; run: pip install pygltflib") from error
 
-    def __init__(self, document: dict[str, Any], body: bytes = b"") -> None:
-        super().__init__()
-        self.json = document
-        self.body = bytearray(body)
+    class File(GLTF2):
+        text = ""
 
-    @classmethod
-    def parse(cls, data: bytes) -> Glb:
+        @classmethod
+        def from_json(cls, s: str, **options: Any) -> File:
+            made = cls()
+            made.text = s
+            return made
+
+        def gltf_to_json(self, separators: tuple[str, str] | None = None, indent: str | None = None) -> str:
+            return self.text
+
+        def buffers_to_binary_blob(self) -> bytearray:
+            return self.binary_blob()
+
+    return File
+
+
+@dataclass
+class Glb:
+    """A .glb to read, or to add to: its document as dictionaries, and its buffer."""
+
+    json: dict[str, Any]
+    body: bytearray = field(default_factory=bytearray)
+
+    @staticmethod
+    def parse(data: bytes) -> Glb:
         """The file's content. Raises one of DAMAGE where the data are no glTF 2.0 or cut short."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks of extensions
-            found = cls.load_from_bytes(data)
-        if found is None or not str(found.json["asset"]["version"]).startswith("2."):
+            file = _file().load_from_bytes(data)
+        document, body = json.loads(file.text), bytearray(file.binary_blob() or b"")
+        if not str(document["asset"]["version"]).startswith("2."):
             raise ValueError("no glTF 2.0")
-        found.body = bytearray(found.binary_blob() or b"")
-        buffers = found.json.get("buffers", [])
-        if buffers and "uri" not in buffers[0] and len(found.body) < buffers[0]["byteLength"]:
+        buffers = document.get("buffers", [])
+        if buffers and "uri" not in buffers[0] and len(body) < buffers[0]["byteLength"]:
             raise ValueError("a file cut short")
-        return found
-
-    @classmethod
-    def from_json(cls, s: str, **options: Any) -> Glb:
-        """pygltflib's hook: the JSON chunk."""
-        return cls(json.loads(s))
-
-    def gltf_to_json(self, separators: tuple[str, str] | None = None, indent: str | None = None) -> str:
-        """pygltflib's hook: the JSON chunk."""
-        return json.dumps(self.json, allow_nan=False, separators=separators, indent=indent)
-
-    def buffers_to_binary_blob(self) -> bytearray:
-        """pygltflib's hook: the binary chunk."""
-        return self.body
+        return Glb(document, body)
 
     def values(self, index: int) -> ndarray:
         """Accessor `index` as an array (n,) or (n, 2 or 3), a view of the buffer. ValueError where its vertices are interleaved."""
@@ -103,4 +120,7 @@ class Glb(GLTF2):
         """The bytes of the file."""
         self.body += bytes(-len(self.body) % ALIGNMENT)
         self.json["buffers"] = [{"byteLength": len(self.body)}]
-        return b"".join(self.save_to_bytes())
+        file = _file()()
+        file.text = json.dumps(self.json, allow_nan=False, separators=(",", ":"))
+        file.set_binary_blob(self.body)
+        return b"".join(file.save_to_bytes())

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.errors import ManifestError
-
-if TYPE_CHECKING:
-    from srbf.io.glb import Glb
+from srbf.io.glb import DAMAGE, Glb
 
 TRIANGLES = 4  # glTF's mode of a primitive
 KNOTS = 8
@@ -53,8 +51,6 @@ class Triangles:
 
 def read_triangles(data: bytes, name: str = "scene.glb") -> Triangles:
     """The triangles of a .glb; ManifestError, in one line, where it is none or of a kind that no bake writes (sparse, compressed)."""
-    from srbf.io.glb import DAMAGE, Glb  # here: pygltflib takes 0.1 s to import
-
     try:
         return _Reader(Glb.parse(data)).triangles()
     except DAMAGE as error:

@@ -278,7 +278,8 @@ def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
 def test_the_library_needs_numpy_and_scipy_alone() -> None:
     code = (
         "import sys, pkgutil, importlib\n"
-        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL'):\n"
+        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL',\n"
+        "             'pygltflib'):\n"
         "    sys.modules[name] = None\n"
         "import srbf\n"
         "names = [m.name for m in pkgutil.walk_packages(srbf.__path__, 'srbf.') if '.cli' not in m.name and '__main__' not in m.name]\n"
