@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 from typer.testing import CliRunner, Result
 
 from srbf import methods
@@ -39,15 +41,23 @@ def refused(*arguments: object) -> str:
     return lines[0]
 
 
-@pytest.fixture
-def capture(make_capture, plane_positions) -> Capture:
-    return make_capture(lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray) -> Path:
+    """A folder of a capture and of an asset fitted to it, to be copied."""
+    folder = tmp_path_factory.mktemp("made")
+    write_capture(folder / "capture", lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+    ok("fit", folder / "capture", "-o", folder / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
+    return folder
 
 
 @pytest.fixture
-def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
-    return tmp_path / "asset"
+def capture(made: Path, tmp_path: Path) -> Capture:
+    return Capture.open(shutil.copytree(made / "capture", tmp_path / "capture"))
+
+
+@pytest.fixture
+def asset(made: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
 def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
@@ -170,6 +180,7 @@ def test_import_to_relight(tmp_path: Path) -> None:
     assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
 
 
+@pytest.mark.slow
 def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.report.METHODS", ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
@@ -237,6 +248,7 @@ def test_a_full_or_read_only_target(asset: Path) -> None:
     assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr")
 
 
+@pytest.mark.slow
 def test_gl_missing(asset: Path, tmp_path: Path) -> None:
     code = "import sys; sys.modules['moderngl'] = None; from srbf.cli import app; app()"
     done = subprocess.run(
@@ -257,6 +269,7 @@ def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
     assert not (tmp_path / "y").exists()
 
 
+@pytest.mark.slow
 def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-m", "srbf", *map(str, arguments)], capture_output=True, text=True)
@@ -268,6 +281,7 @@ def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     assert json.loads(run("info", tmp_path / "asset", "--json").stdout)["k"] == 5
 
 
+@pytest.mark.slow
 def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "relighting_map.py"
     done = subprocess.run([sys.executable, str(example), str(capture.folder), str(tmp_path / "x.png")], capture_output=True, text=True)
@@ -275,6 +289,7 @@ def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     assert read_image(tmp_path / "x.png").max() > 0.3
 
 
+@pytest.mark.slow
 def test_the_library_needs_numpy_and_scipy_alone() -> None:
     code = (
         "import sys, pkgutil, importlib\n"
@@ -315,6 +330,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
     assert set(json.loads(ok("evaluate", tmp_path / "asset", capture.folder, "--json"))) == {"train", "holdout", "lights"}
 
 
+@pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
     assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four

@@ -51,6 +51,7 @@ def imported(folder: Path, facing: str, directions: np.ndarray) -> Result:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("facing", ["down", "around"])
 @pytest.mark.parametrize("flags", [["-k", 25], ["--method", "eigen-map"]])
 def test_all_below_relight_as_they_were_lit(tmp_path: Path, facing: str, flags: list) -> None:

@@ -100,12 +100,14 @@ def unseen(method: EigenMap | RelightingMap, capture: Capture) -> float:
     return evaluate(method.encode(capture), capture)["holdout"]["psnr"]
 
 
+@pytest.mark.slow
 def test_unseen_lights_gain_from_scalars_and_smooth_scenes_far_more_than_from_relighting_maps(smooth: Capture) -> None:
     eigen = unseen(EigenMap(scalars=28), smooth)
     assert eigen > 2 + unseen(EigenMap(scalars=10), smooth)
     assert eigen >= 8 + unseen(RelightingMap(k=25, spread="mean", ridge=0, centers="hammersley"), smooth)
 
 
+@pytest.mark.slow
 def test_bytes_cost_little(smooth: Capture) -> None:
     settings = {"scalars": 28, "spread": 0.25, "ridge": 1e-3}
     floats, coded = (unseen(EigenMap(**settings, encoding=encoding), smooth) for encoding in ("float", "uint8"))
@@ -133,6 +135,7 @@ def plane(make_capture, plane_positions) -> Asset:
     return EigenMap(scalars=8).encode(make_capture(lambda d: 1.5 + np.sin(waves @ d), lights=150, position=plane_positions))
 
 
+@pytest.mark.slow
 def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
     # Directional lights weigh by the functions, point lights by their table: they meet but for the table's error.
     directions = random_directions(12, "hemisphere", np.random.default_rng(5))
@@ -168,6 +171,7 @@ def test_more_scalars_than_numbers(make_capture) -> None:
     assert EigenMap(scalars=12).encode(capture).scalars == 12
 
 
+@pytest.mark.slow
 def test_validation_lights_steer_and_holdout_does_not(make_capture) -> None:
     capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).kept()
     assert EigenMap(8).encode(capture).manifest["source"]["fit"]["chosen_by"] == "validation"
