@@ -70,7 +70,9 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert result["holdout"] == opened.manifest["error"]["holdout"]
     assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
-    assert "holdout" in ok("evaluate", asset, capture.folder) and "k" in ok("info", asset)
+    assert "holdout" in ok("evaluate", asset, capture.folder)
+    shown = dict(line.split(maxsplit=1) for line in ok("info", asset).splitlines())
+    assert (shown["method"], shown["k"], shown["width"], shown["height"]) == ("relighting-map", "9", "14", "10")
 
 
 @pytest.mark.parametrize(
@@ -117,6 +119,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
     assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
@@ -368,6 +371,6 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
         (["-k", 0], "-k 0"),
     ],
 )
-def test_flags_that_do_not_go_together(capture: Capture, tmp_path: Path, flags: list, words: str) -> None:
-    assert words in refused("fit", capture.folder, "-o", tmp_path / "asset", *flags)
+def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
+    assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

@@ -72,6 +72,7 @@ def test_all_below_relight_as_they_were_lit(tmp_path: Path, facing: str, flags: 
     assert above.exit_code == 0 and above.stderr.count("light 0 is at 90 degrees of elevation, far from all captured lights") == 1
 
 
+@pytest.mark.slow
 def test_some_below_are_counted_and_kept(tmp_path: Path) -> None:
     directions = fibonacci(120)
     directions = directions[directions[:, 2] > -0.3]

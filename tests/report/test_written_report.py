@@ -86,6 +86,7 @@ def test_a_report_leaves_every_file(report: Path) -> None:
         assert_shows_something(report / name)
 
 
+@pytest.mark.slow
 def test_the_animation_moves_and_is_small(report: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     path = next(report.glob("animation.*"))
