@@ -37,10 +37,10 @@ gallery: setup
 	$(BIN)/python -m scripts.gallery
 
 test: setup-test
-	$(BIN)/pytest -n 2 --dist loadfile
+	SRBF_CHECK_ANNOTATIONS=1 $(BIN)/pytest -n 2 --dist loadfile
 
 test-fast: setup-test
-	$(BIN)/pytest -m "not blender and not engines" -n 2
+	$(BIN)/pytest -m "not blender and not engines and not slow" -n 2 --dist worksteal
 
 test-godot: setup-test
 	sh scripts/godot-chroot

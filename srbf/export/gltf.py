@@ -10,12 +10,12 @@ import numpy as np
 
 from srbf.arrays import Float32
 from srbf.asset import MANIFEST, Asset
-from srbf.errors import InputError
+from srbf.errors import InputError, ManifestError
 from srbf.export import texture_array
-from srbf.export.glb import Document
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.texel_mesh import texel_mesh
 from srbf.io.files import atomic_path
+from srbf.io.glb import DAMAGE, Glb
 from srbf.lights import EnvironmentLight
 from srbf.methods import relight
 from srbf.relighting.alpha import alpha_of, write_png
@@ -55,15 +55,31 @@ def white_sky(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
     return relight(asset, [EnvironmentLight(np.full((*SKY, 3), radiance, np.float32))])
 
 
-def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Document, int]:
+def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Glb, int]:
     """The mesh with the lightmap on its materials, and how many of its triangles have it."""
-    document = _document(asset, notes) if mesh is None else Document.read(mesh)
+    document = _document(asset, notes) if mesh is None else _given(mesh)
     return document, _light_up(document, asset, _fallback(document, asset), mesh)
 
 
-def _document(asset: Asset, notes: list[str]) -> Document:
+def _given(path: Path) -> Glb:
+    """The mesh of a .glb whose buffer is its own; ManifestError, in one line, on anything else."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ManifestError(f"cannot read {path}: {error.strerror}; expected the mesh as binary glTF (.glb)") from error
+    try:
+        document = Glb.parse(data)
+        buffers = document.json.get("buffers", [])
+        if not document.json.get("meshes") or len(buffers) != 1 or "uri" in buffers[0]:
+            raise ValueError("no mesh in a buffer of its own")
+    except DAMAGE as error:
+        raise ManifestError(f"expected a mesh as binary glTF 2.0 in {path}, found {error}; export it from Blender as .glb") from error
+    return document
+
+
+def _document(asset: Asset, notes: list[str]) -> Glb:
     """One node of one primitive: a view's picture, or the lightmap's texels. Adds to `notes` which."""
-    document = Document()
+    document = Glb({"asset": {"version": "2.0", "generator": "srbf export"}})
     kind = asset.receiver.get("kind")
     if kind == "vertices":
         raise InputError("expected a lightmap or a view, found an asset of vertices; give the mesh with a UV for each: --mesh FILE.glb")
@@ -80,14 +96,14 @@ def _document(asset: Asset, notes: list[str]) -> Document:
         positions, uv, triangles = _y_up(mesh.positions), mesh.uv, mesh.triangles
         normals = None if mesh.normals is None else _y_up(mesh.normals)
         notes.append("the mesh is rebuilt from the lightmap's texels; --mesh FILE.glb takes the scene's own")
-    attributes = {"POSITION": document.accessor(positions, bounds=True)}
+    attributes = {"POSITION": document.add_accessor(positions, bounds=True)}
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        attributes["NORMAL"] = document.accessor(
+        attributes["NORMAL"] = document.add_accessor(
             np.where(length > 0, normals / np.where(length > 0, length, 1), [0, 1, 0]).astype(np.float32)
         )
-    attributes["TEXCOORD_0"] = document.accessor(uv)
-    primitive = {"attributes": attributes, "indices": document.accessor(triangles.astype(np.uint32).ravel())}
+    attributes["TEXCOORD_0"] = document.add_accessor(uv)
+    primitive = {"attributes": attributes, "indices": document.add_accessor(triangles.astype(np.uint32).ravel())}
     mesh_index = document.add("meshes", {"primitives": [primitive]})
     name = asset.receiver.get("object", "receiver")
     document.json["scenes"] = [{"nodes": [document.add("nodes", {"name": str(name), "mesh": mesh_index})]}]
@@ -100,18 +116,18 @@ def _y_up(vectors: Float32[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
     return np.ascontiguousarray(np.stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]], axis=1))
 
 
-def _fallback(document: Document, asset: Asset) -> int:
+def _fallback(document: Glb, asset: Asset) -> int:
     """The asset under a white sky as a texture of the document; its index."""
     with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
         path = Path(folder) / "lightmap.png"
         write_png(path, white_sky(asset), alpha_of(asset))
-        view = document.view(path.read_bytes())
+        view = document.add_view(path.read_bytes())
     image = document.add("images", {"name": "lightmap", "mimeType": "image/png", "bufferView": view})
     sampler = document.add("samplers", {"magFilter": LINEAR_FILTER, "minFilter": LINEAR_FILTER, "wrapS": CLAMP, "wrapT": CLAMP})
     return document.add("textures", {"source": image, "sampler": sampler})
 
 
-def _light_up(document: Document, asset: Asset, picture: int, path: Path | None) -> int:
+def _light_up(document: Glb, asset: Asset, picture: int, path: Path | None) -> int:
     """Give the receivers' primitives TEXCOORD_1 and a material with the extension; how many triangles they have."""
     receivers = _receivers(document, asset)
     made: dict[int | None, int] = {}
@@ -134,19 +150,19 @@ def _light_up(document: Document, asset: Asset, picture: int, path: Path | None)
             lit += count // 3
     if not lit:
         raise InputError(f"expected a mesh with a UV set in {path}, found none; unwrap it, or leave --mesh out")
-    document.uses(EXTENSION)
-    document.uses(UNLIT)
+    document.use_extension(EXTENSION)
+    document.use_extension(UNLIT)
     return lit
 
 
-def _receivers(document: Document, asset: Asset) -> set[int]:
+def _receivers(document: Glb, asset: Asset) -> set[int]:
     """The meshes of the nodes that are named as the asset's receivers; all of them where none is."""
     names = {receiver["object"] for receiver in asset.receivers if "object" in receiver}
     named = {node["mesh"] for node in document.json.get("nodes", []) if "mesh" in node and node.get("name") in names}
     return named or set(range(len(document.json["meshes"])))
 
 
-def _material(document: Document, before: int | None, picture: int, cut_out: bool) -> dict[str, Any]:
+def _material(document: Glb, before: int | None, picture: int, cut_out: bool) -> dict[str, Any]:
     """The lightmap unlit, in the color of the material before where the map holds none, and the extension; a view by its alpha."""
     old = document.json["materials"][before] if before is not None else {}
     base = old.get("pbrMetallicRoughness", {})

@@ -15,9 +15,9 @@ from srbf.arrays import Float32
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST, Capture
 from srbf.errors import BakeError, InputError, ManifestError, OutputExistsError
-from srbf.export.glb import Document
 from srbf.export.gltf_surface import mean_thickness, surface
 from srbf.io import files
+from srbf.io.glb import Glb
 from srbf.io.image import write_picture
 
 SUFFIX = ".glb"
@@ -132,7 +132,7 @@ class _Writer:
     """Puts the document together: a node and a mesh for each object, a primitive for each look and set of attributes."""
 
     def __init__(self, told: dict[str, Any], scratch: Path, albedo: Float32[ndarray, "H W 3"] | None) -> None:
-        self.document = Document({"asset": {"version": "2.0", "generator": "srbf mesh"}})
+        self.document = Glb({"asset": {"version": "2.0", "generator": "srbf mesh"}})
         self._looks, self._albedo = told["looks"], albedo
         self._materials: dict[tuple[Any, ...], int] = {}
         self._picture: int | None = None
@@ -183,12 +183,12 @@ class _Writer:
         attributes, at = {}, 0
         for name, values in parts.items():
             width = values.shape[1]
-            attributes[ATTRIBUTES[name]] = self.document.accessor(np.ascontiguousarray(welded[:, at : at + width]), name == "position")
+            attributes[ATTRIBUTES[name]] = self.document.add_accessor(np.ascontiguousarray(welded[:, at : at + width]), name == "position")
             at += width
         self._triangles += len(index) // 3
         return {
             "attributes": attributes,
-            "indices": self.document.accessor(index),
+            "indices": self.document.add_accessor(index),
             "material": self._material(look, thickness, is_lit, "color" in parts),
         }
 
@@ -199,7 +199,7 @@ class _Writer:
             picture = {"index": self._texture(), "texCoord": LIGHTMAP_SET} if is_lit else None
             material = surface(told, thickness, picture, colored)
             for extension in material.get("extensions", {}):
-                self.document.uses(extension)
+                self.document.use_extension(extension)
             self._materials[key] = self.document.add("materials", material)
         return self._materials[key]
 
@@ -213,7 +213,7 @@ class _Writer:
             with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
                 path = Path(folder) / "albedo.png"
                 write_picture(path, self._albedo)
-                view = self.document.view(path.read_bytes())
+                view = self.document.add_view(path.read_bytes())
             image = self.document.add("images", {"name": "albedo", "mimeType": "image/png", "bufferView": view})
             sampler = {"magFilter": LINEAR_FILTER, "minFilter": LINEAR_FILTER, "wrapS": CLAMP, "wrapT": CLAMP}
             self._picture = self.document.add("textures", {"source": image, "sampler": self.document.add("samplers", sampler)})

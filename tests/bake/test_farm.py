@@ -225,6 +225,7 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
     assert Sums(tmp_path, [light]).refresh(light, 2) and not sums.refresh(light, 3)
 
 
+@pytest.mark.slow
 def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.compute.dask_client.CONNECTING", 1.0)
     for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, seconds=60.0)):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 from typer.testing import CliRunner, Result
 
 from srbf.asset import Asset
@@ -19,9 +20,9 @@ def srbf(*arguments: object) -> Result:
     return CliRunner().invoke(app, list(map(str, arguments)))
 
 
-@pytest.fixture
-def capture(make_capture) -> Capture:
-    return make_capture(lambda d: np.full((6, 8, 3), max(0, d[2])) * [1, 0.5, 0.25])
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory: pytest.TempPathFactory) -> Capture:
+    return write_capture(tmp_path_factory.mktemp("made") / "capture", lambda d: np.full((6, 8, 3), max(0, d[2])) * [1, 0.5, 0.25])
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,7 @@ def test_flags_name_their_method(capture: Capture, tmp_path: Path, flags: list, 
     assert Asset.open(tmp_path / "asset").method == method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [["--budget", 6], ["--psnr", 20]])
 def test_bytes_or_decibels_alone_choose(capture: Capture, tmp_path: Path, flags: list) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", *flags)

@@ -40,6 +40,7 @@ def planted(noise: float, validated: bool = False) -> tuple[TexelSample, np.ndar
     return TexelSample(np.arange(5), images.transpose(1, 0, 2).astype(np.float32), directions, 60, ABOVE), centers, truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("validated", [True, False])
 def test_noise_asks_for_a_ridge(validated: bool) -> None:
     clean, noisy = (choose_functions(*planted(noise, validated)[:2]) for noise in (0.0, 6.0))

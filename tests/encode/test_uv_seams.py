@@ -117,6 +117,7 @@ def test_it_is_linear_keeps_what_agrees_and_touches_seams_alone() -> None:
     np.testing.assert_allclose(even, 0.7, rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 @pytest.mark.parametrize("method", [RelightingMap(k=30), EigenMap(components=16)], ids=["relighting-map", "eigen-map"])
 def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap | EigenMap, encoding: str) -> None:
@@ -133,6 +134,7 @@ def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap 
     assert after**2 <= before**2 + (0.05 * seams["before"] * mean) ** 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_clusters_agree_as_well_as_they_hold_the_images(cut: Capture, encoding: str) -> None:
     method = ClusteredEigenMap(clusters=3, components=12, encoding=encoding)

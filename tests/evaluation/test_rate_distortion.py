@@ -60,6 +60,7 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
     assert method_of(asset).numbers_per_texel(asset) == 36
 
 
+@pytest.mark.slow
 def test_every_family_is_told_apart(capture: Capture) -> None:
     sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
     methods = [

@@ -124,6 +124,7 @@ def test_a_black_reference_is_refused() -> None:
         compare(PATH, curve(1 + PATH[..., 2]), curve(np.zeros(100)))
 
 
+@pytest.mark.slow
 def test_twenty_five_gaussians_of_the_hemisphere_pulse_and_those_of_the_sphere_hold_the_cosine() -> None:
     lights = point_set("hammersley", 400, "hemisphere")
     paper = lambert_sweep(RelightingMap(k=25, spread="mean", ridge=0).encode, lights)

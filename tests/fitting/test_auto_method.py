@@ -51,6 +51,7 @@ def size(method: EigenMap | ClusteredEigenMap, capture: Capture) -> int:
     return method.encode(capture).bytes_per_texel()["directional"]
 
 
+@pytest.mark.slow
 def test_shadows_ask_for_clusters_and_smooth_light_does_not(shadows: Capture, cosines: Capture) -> None:
     clustered = within_budget(shadows, 9, spread=0.3, ridge=0.01)
     assert isinstance(clustered, ClusteredEigenMap) and clustered.components == 8 and clustered.encoding == "uint8"
@@ -59,11 +60,13 @@ def test_shadows_ask_for_clusters_and_smooth_light_does_not(shadows: Capture, co
     assert size(clustered, shadows) <= 9 and size(shared, cosines) <= 9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("budget", [5, None])
 def test_bytes_are_kept_to(shadows: Capture, budget: int | None) -> None:
     assert size(within_budget(shadows, budget, spread=0.3, ridge=0.01), shadows) <= (budget or DEFAULT_BUDGET)
 
 
+@pytest.mark.slow
 def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     settings = {"spread": 0.3, "ridge": 0.01}  # one pair for all: what is asked here is the size

@@ -40,6 +40,7 @@ def test_keeping_fewer_loses_more(make_capture) -> None:
     assert lost == sorted(lost)
 
 
+@pytest.mark.slow
 def test_an_eigen_map_drops_its_last_planes(make_capture, tmp_path) -> None:
     capture = make_capture(smooth, lights=80)
     asset, fewer = EigenMap(components=6, encoding="float").encode(capture), EigenMap(components=3, encoding="float").encode(capture)

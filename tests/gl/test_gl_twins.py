@@ -386,15 +386,24 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
 
 
 @pytest.mark.parametrize("file", FUNCTIONS)
-def test_the_shader_function_equals_its_twin(file: str, request: pytest.FixtureRequest) -> None:
+def test_the_shader_functions_equal_their_twins(file: str, request: pytest.FixtureRequest) -> None:
+    """And the test calls each function that the file's header names."""
     assert file in TWINS, f"{file} has no twin test: register one here"
-    test = TWINS[file]
-    test(*(request.getfixturevalue(name) for name in inspect.signature(test).parameters))
+    test, run = TWINS[file], request.getfixturevalue("evaluate")
+    ran: list[str] = []
+
+    def evaluate(file: str, expression: str, *inputs: np.ndarray, **options: Any) -> np.ndarray:
+        ran.append(expression + options.get("declarations", ""))
+        return run(file, expression, *inputs, **options)
+
+    test(*(evaluate if name == "evaluate" else request.getfixturevalue(name) for name in inspect.signature(test).parameters))
+    header = HEADER.match((ROOT / file).read_text())
+    assert header is not None
+    assert [name for name in header["names"].split(", ") if not any(f"{name}(" in text for text in ran)] == []
 
 
-def test_every_twin_test_has_its_file() -> None:
-    assert set(TWINS) <= set(FUNCTIONS)
-    assert len(FUNCTIONS) >= 12
+def test_every_file_of_functions_has_a_twin_test_and_the_reverse() -> None:
+    assert set(TWINS) == set(FUNCTIONS) and "basis/weight.glsl" in TWINS
 
 
 @pytest.mark.parametrize("file", FUNCTIONS)

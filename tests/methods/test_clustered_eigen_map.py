@@ -81,6 +81,7 @@ def test_bytes_cost_little(make_capture) -> None:
     assert np.sqrt(((coded - floats) ** 2).mean()) < 0.01 * images.std()
 
 
+@pytest.mark.slow
 def test_more_clusters_serve_shadows(make_capture) -> None:
     rng = np.random.default_rng(6)
     walls = rng.normal(size=(12, 2))
@@ -109,6 +110,7 @@ def test_more_clusters_than_texels(make_capture) -> None:
     assert np.isfinite(responses(asset, capture.directions())).all()
 
 
+@pytest.mark.slow
 def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
     """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
     height, width, band = 512, 256, 16

@@ -101,12 +101,14 @@ def unseen(method: EigenMap | RelightingMap, capture: Capture) -> float:
     return evaluate(method.encode(capture), capture)["holdout"]["psnr"]
 
 
+@pytest.mark.slow
 def test_unseen_lights_gain_from_components_and_smooth_scenes_far_more_than_from_relighting_maps(smooth: Capture) -> None:
     eigen = unseen(EigenMap(components=28), smooth)
     assert eigen > 2 + unseen(EigenMap(components=10), smooth)
     assert eigen >= 8 + unseen(RelightingMap(k=25, spread="mean", ridge=0, centers="hammersley"), smooth)
 
 
+@pytest.mark.slow
 def test_bytes_cost_little(smooth: Capture) -> None:
     settings = {"components": 28, "spread": 0.25, "ridge": 1e-3}
     floats, coded = (unseen(EigenMap(**settings, encoding=encoding), smooth) for encoding in ("float", "uint8"))
@@ -134,6 +136,7 @@ def plane(make_capture, plane_positions) -> Asset:
     return EigenMap(components=8).encode(make_capture(lambda d: 1.5 + np.sin(waves @ d), lights=150, position=plane_positions))
 
 
+@pytest.mark.slow
 def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
     # Directional lights weigh by the functions, point lights by their table: they meet but for the table's error.
     directions = random_directions(12, "hemisphere", np.random.default_rng(5))
@@ -169,6 +172,7 @@ def test_more_components_than_numbers(make_capture) -> None:
     assert EigenMap(components=12).encode(capture).components == 12
 
 
+@pytest.mark.slow
 def test_validation_lights_steer_and_holdout_does_not(make_capture) -> None:
     capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).kept()
     assert EigenMap(8).encode(capture).manifest["source"]["fit"]["chosen_by"] == "validation"

@@ -138,6 +138,7 @@ def test_blocks_average_their_covered_receivers(grid: tuple[int, int]) -> None:
             assert np.allclose(means[i, j], expected, atol=SINGLE)
 
 
+@pytest.mark.slow
 def test_a_tile_without_receivers_is_nan_before_and_after(lambert: Capture) -> None:
     coverage = np.ones((HEIGHT, WIDTH), np.float32)
     coverage[:3, :3] = 0
@@ -155,6 +156,7 @@ def test_rebinning_does_not_depend_on_the_blocks_it_is_read_in(lambert: Capture,
     assert np.array_equal(rebin(lambert, range(LIGHTS), tiles), whole)
 
 
+@pytest.mark.slow
 def test_fitted_tiles_are_what_relighting_gives(lambert: Capture) -> None:
     asset = RelightingMap(k=16).encode(lambert)
     directions = tile_directions(7, "equal-area")
