@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
 FILE = "denoised.exr"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
 
 def read_passes(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:

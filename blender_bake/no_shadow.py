@@ -6,17 +6,17 @@ from __future__ import annotations
 import bpy
 
 from blender_bake import elsewhere
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
 
 def let_light_through(scene: bpy.types.Scene, names: list[str]) -> None:
     """Hide the objects `names` from shadow rays, and from nothing else; WorkerError names what there is.
 
-    Shadow rays go to the light from where it falls first and from every bounce after: direct light and bounced light enter alike. The
-    object still reflects: camera, diffuse and glossy rays meet it, so a white ceiling sends back what the floor sends up. It is lit
-    itself as ever. An empty that shows a collection stands for all of its objects; instances share what is set on their source.
-    The sun must then be sampled by shadow rays alone, see `Illuminant`: a bounced ray that could have met the sun's disc meets the ceiling,
-    and Cycles would weigh the shadow ray as if it had not.
+    Shadow rays start at every bounce, so direct and indirect light both enter. The object still reflects: camera, diffuse and glossy
+    rays meet it, so a white ceiling reflects the light of the floor, and it is lit as before. The name of an empty that shows a
+    collection means all of its objects; instances share what is set on their source.
+    The sun must then be sampled by shadow rays alone, see `light.SoleLight`: a bounced ray that could have met the sun's disc meets the
+    ceiling, and Cycles would weight the shadow ray as if it had not.
     """
     for name in names:
         obj = scene.objects.get(name)

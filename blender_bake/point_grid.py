@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 from blender_bake.scene_file import SOLID, show_as_rendered
 from blender_bake.seam_edges import mesh_corners, paired
 
@@ -40,7 +40,7 @@ class Solid:
     closed: bool
 
 
-def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
+def free_points(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     """{box, grid, random, skipped}: free points `asked["spacing"]` meters apart in `asked["box"]`, and `asked["random"]` free random ones.
 
     The box is by default that of all that is rendered. The grid stands in its middle, half a spacing or more from its sides. WorkerError

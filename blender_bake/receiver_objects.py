@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from blender_bake import as_rendered, beside, elsewhere, soundness
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 
 NO_MESHES = {"CURVE", "SURFACE", "FONT", "META"}
 SHEARED = 1e-5  # of an object's scale, that its matrix is off by where location, rotation and scale cannot hold it
@@ -34,7 +34,7 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
     return ready
 
 
-def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list[str]:
+def meshes_of(scene: bpy.types.Scene, collection: str, events: Events) -> list[str]:
     """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none.
 
     What has faces and is no mesh is named: it casts shadows alone.
@@ -52,7 +52,7 @@ def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list
     names = [o.name for o in shown if o.type == "MESH" or _shows_collection(o)]
     if others := sorted(repr(o.name) for o in shown if o.type in NO_MESHES):
         listed = ", ".join(others[:12]) + (", …" if len(others) > 12 else "")
-        channel.warn(f"no receivers, since they are no meshes (Object > Convert > Mesh makes them some): {listed}")
+        events.warn(f"no receivers, since they are no meshes (Object > Convert > Mesh makes them some): {listed}")
     if not names:
         raise WorkerError(f"expected renderable meshes in collection {collection!r}, found none")
     return sorted(set(names))

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import bpy
 
-from blender_bake import as_rendered, hardening
-from blender_bake.channel import Channel, WorkerError, leave
+from blender_bake import as_rendered
+from blender_bake.ipc import Events, WorkerError, leave
+from blender_bake.sanitize import sanitize
 
 WORKING_SPACE = "Linear Rec.709"
 
@@ -18,8 +19,8 @@ def version() -> str:
     return ".".join(str(n) for n in bpy.app.version)
 
 
-def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.types.Scene:
-    """The .blend's scene `name`, else its active one, disarmed (see `hardening`): nothing in it runs or writes; what is left out or
+def open_scene(path: str, events: Events, name: str | None = None) -> bpy.types.Scene:
+    """The .blend's scene `name`, else its active one, sanitized (see `sanitize`): nothing in it runs or writes; what is left out or
     missing is named, and no object is in another mode than Object Mode."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.filepaths.use_scripts_auto_execute = False
@@ -27,29 +28,29 @@ def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.type
     read = False
 
     @bpy.app.handlers.persistent
-    def disarm(*_: object) -> None:
+    def clean(*_: object) -> None:
         nonlocal read
         read = True
         try:
-            said.extend(hardening.disarm())
-        except Exception as error:  # noqa: BLE001 - Blender would print it and go on to evaluate what is still armed
-            channel.emit("error", message=str(error) if isinstance(error, WorkerError) else f"Blender's worker failed: {error!r}")
+            said.extend(sanitize())
+        except Exception as error:  # noqa: BLE001 - Blender would print it and go on to evaluate the rest
+            events.emit("error", message=str(error) if isinstance(error, WorkerError) else f"Blender's worker failed: {error!r}")
             leave(1)
 
-    bpy.app.handlers.load_post.insert(0, disarm)
+    bpy.app.handlers.load_post.insert(0, clean)
     try:
         bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
     except RuntimeError as error:
         reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
         raise WorkerError(f"expected a .blend that Blender {version()} can open, found {path}: {reason}") from error
     finally:
-        bpy.app.handlers.load_post.remove(disarm)
+        bpy.app.handlers.load_post.remove(clean)
     if not read:
         raise WorkerError(f"expected Blender {version()} to say that it has read {path}, found it silent; use another Blender")
     for line in said:
-        channel.warn(line)
+        events.warn(line)
     for missing in missing_files():
-        channel.warn(missing)
+        events.warn(missing)
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
     if space != WORKING_SPACE:
         raise WorkerError(f"expected the working color space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")

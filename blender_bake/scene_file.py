@@ -142,8 +142,8 @@ def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh, layer: bpy.typ
         yield Part(shown.name, slot.name if slot else None, casts, places, normals, None if lightmap is None else lightmap[chosen])
 
 
-def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
-    """The parts as one .glb; `tints` names the materials that light passes straight, and what one wall of them lets through.
+def write_glb(parts: list[Part], transmittances: Mapping[str, Curve]) -> bytes:
+    """The parts as one .glb; `transmittances` names the materials that light passes straight, and what one wall of them lets through.
 
     That is told twice: to any reader as a transmission of the mean tint, to ours by the extras `tint_by_cosine`.
     An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`. A receiver's lightmap coordinates
@@ -182,7 +182,7 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         meshes.append({"name": part.object, "primitives": [primitive]})
         nodes.append({"name": part.object, "mesh": len(meshes) - 1, **({} if part.casts else {"extras": {"casts_shadow": False}})})
     root = {"name": "z-up to y-up", "rotation": Z_UP_TO_Y_UP, "children": list(range(len(nodes)))}
-    passing = any(name in tints for name in names)
+    passing = any(name in transmittances for name in names)
     document = {
         "asset": {"version": "2.0", "generator": "srbf"},
         **({"extensionsUsed": ["KHR_materials_transmission"]} if passing else {}),
@@ -190,7 +190,7 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         "scenes": [{"nodes": [len(nodes)]}],
         "nodes": [*nodes, root],
         "meshes": meshes,
-        **({"materials": [_material(name, tints.get(name)) for name in names]} if names else {}),
+        **({"materials": [_material(name, transmittances.get(name)) for name in names]} if names else {}),
         "accessors": accessors,
         "bufferViews": views,
         "buffers": [{"byteLength": len(body)}],

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from blender_bake import scene_file
-from blender_bake.channel import WorkerError, hand_over
+from blender_bake.ipc import WorkerError, hand_over
 from blender_bake.looks import Look, look_of
 from blender_bake.receiver_objects import prepare
 from blender_bake.unwrap import layer_coordinates

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 
 SHOWN = 6  # names in a warning
 LARGEST = 1e18  # of a coordinate, m
@@ -29,13 +29,13 @@ def require_finite(obj: bpy.types.Object, mesh: bpy.types.Mesh, after: str = "")
         )
 
 
-def require_visible(obj: bpy.types.Object, channel: Channel) -> None:
+def require_visible(obj: bpy.types.Object, events: Events) -> None:
     """WorkerError that names the setting by which Cycles leaves a receiver black or empty; a line for parts of it that stay empty."""
     setting = hidden_by(obj)
     if setting is not None:
         raise WorkerError(f"expected a receiver that light can be read from, found that {obj.name!r} {setting}, and save the .blend")
     if held := _held_out(obj):
-        channel.warn(f"what has material {held[0]!r} of {obj.name!r}, a Holdout, stays empty")
+        events.warn(f"what has material {held[0]!r} of {obj.name!r}, a Holdout, stays empty")
 
 
 def hidden_by(obj: bpy.types.Object) -> str | None:
@@ -65,7 +65,7 @@ def _is_holdout(material: bpy.types.Material) -> bool:
     return bool(links) and links[0].from_node.bl_idname == "ShaderNodeHoldout"
 
 
-def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], channel: Channel) -> None:
+def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], events: Events) -> None:
     """Name the meshes other than `receivers` whose vertices or places are no numbers: Cycles makes of them what it can."""
     found = []
     for obj in scene.objects:
@@ -78,19 +78,17 @@ def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], channel: Chan
             found.append(f"{obj.name!r} in its transform")
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        channel.warn(
-            f"NaN, infinite or immense coordinates, whose shadows and bounces are left to chance: {', '.join(found[:SHOWN])}{more}"
-        )
+        events.warn(f"NaN, infinite or immense coordinates, whose shadows and bounces are left to chance: {', '.join(found[:SHOWN])}{more}")
 
 
-def warn_of_hidden(scene: bpy.types.Scene, channel: Channel) -> None:
+def warn_of_hidden(scene: bpy.types.Scene, events: Events) -> None:
     """Name what a view leaves out of its picture: shadow catchers and holdouts."""
     layer = bpy.context.view_layer
     shown = [obj for obj in scene.objects if obj.type == "MESH" and not obj.hide_render and obj.name in layer.objects]
     found = [f"{obj.name!r} {setting.partition(',')[0]}" for obj in shown if (setting := _leaves_no_picture(obj)) is not None]
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        channel.warn(f"pixels without a picture: {', '.join(found[:SHOWN])}{more}")
+        events.warn(f"pixels without a picture: {', '.join(found[:SHOWN])}{more}")
 
 
 def spoiled_vertices(mesh: bpy.types.Mesh) -> np.ndarray:

@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -63,22 +64,32 @@ class Translucent:
 class Switch:
     """All translucent materials of a scene together; false where there is none."""
 
-    def __init__(self, translucent: list[Translucent], tints: Mapping[str, Curve]) -> None:
+    def __init__(self, translucent: list[Translucent], transmittances: Mapping[str, Curve]) -> None:
         self._translucent = translucent
-        self._tints = tints
+        self._transmittances = transmittances
 
     def __bool__(self) -> bool:
         return bool(self._translucent)
 
     def on(self) -> None:
-        """Shadow rays meet tints by angle."""
+        """Shadow rays meet transmittances by angle."""
         for one in self._translucent:
-            one.on(self._tints[one.name])
+            one.on(self._transmittances[one.name])
 
     def off(self) -> None:
         """The scene as its author made it."""
         for one in self._translucent:
             one.off()
+
+
+@contextmanager
+def switched(switch: Switch | None) -> Iterator[None]:
+    """The translucent materials, if any, switched on inside."""
+    if switch is not None:
+        switch.on()
+    yield
+    if switch is not None:
+        switch.off()
 
 
 def find(scene: bpy.types.Scene) -> list[Translucent]:
@@ -95,7 +106,9 @@ def cut_out(scene: bpy.types.Scene) -> list[str]:
     return sorted(m.name for m in used if m.use_nodes and m.node_tree and _passes(m) and _varies(m.node_tree))
 
 
-def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]) -> dict[str, Curve]:
+def fit_transmittances(
+    translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]
+) -> dict[str, Curve]:
     """The tint of each material that comes nearest, in least squares, to the direct light behind it.
 
     Seen with every other such material clear, under each light that `aims` turn on: a texel whose light d met walls at the cosines c
@@ -103,7 +116,7 @@ def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]]
     read off a bake whose walls pass 2^-hat_k.
     """
     lights = list(aims)
-    tints: dict[str, Curve] = {}
+    transmittances: dict[str, Curve] = {}
     for one in translucent:
         for other in translucent:
             other.on(CLEAR)
@@ -126,11 +139,11 @@ def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]]
             walls.append(stacked[met])
             whole.append(clear[lit][met])
             passed.append(true[lit][met])
-        tints[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
+        transmittances[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
         one.off()
     for one in translucent:
         one.off()
-    return tints
+    return transmittances
 
 
 def _probe(first: int) -> Curve:

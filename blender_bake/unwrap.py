@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import select, world_area
 
 MAX_UV_LAYERS = 8  # Blender's own limit
@@ -25,7 +25,7 @@ GUTTER_TEXELS = 4
 LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be all gutter
 
 
-def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int, method: str, channel: Channel) -> tuple[list[str], bool]:
+def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int, method: str, events: Events) -> tuple[list[str], bool]:
     """(a layer for each object, whether they were made). Several objects share one atlas, so theirs must lie side by side.
 
     name: the layer asked for, else the active one if it fits, else another that fits; where none does, or where those of several objects
@@ -33,7 +33,7 @@ def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int
     that fits, then all charts together by Blender's packer at one density; `keep` makes none. WorkerError where nothing can serve.
     """
     if len(objects) == 1:
-        layer, made = choose_layer(objects[0], name, texels, method, channel)
+        layer, made = choose_layer(objects[0], name, texels, method, events)
         return [layer], made
     if name not in (None, MADE_LAYER):
         for obj in objects:
@@ -60,13 +60,13 @@ def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int
             "or let --unwrap smart pack them"
         )
     pack(objects, own, texels, method)
-    channel.warn(
+    events.warn(
         f"packed a lightmap UV layer for {len(objects)} objects ({reason}); its coordinates are written to uv.json beside the capture"
     )
     return [MADE_LAYER] * len(objects), True
 
 
-def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: str, channel: Channel) -> tuple[str, bool]:
+def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: str, events: Events) -> tuple[str, bool]:
     """(layer, whether it was made) of a single object, see `choose_layers`."""
     mesh = obj.data
     layers = mesh.uv_layers
@@ -77,13 +77,13 @@ def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: s
         _require_layer(obj, name)
         problem = misfit(mesh, name)
         if problem:
-            channel.warn(f"UV layer {name!r} {problem}; it is used because it was asked for")
+            events.warn(f"UV layer {name!r} {problem}; it is used because it was asked for")
         return name, False
     active = layers.active.name if layers.active else None
     layer = fitting_layer(mesh)
     if layer is not None:
         if layer != active:
-            channel.warn(f"the active UV layer {active!r} {misfit(mesh, active)}; using {layer!r}")
+            events.warn(f"the active UV layer {active!r} {misfit(mesh, active)}; using {layer!r}")
         return layer, False
     problem = misfit(mesh, active) if active else None
     reason = f"the active one {problem}" if active else "it has none"
@@ -92,7 +92,7 @@ def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: s
             f"expected a UV layer of {obj.name!r} that fits a lightmap, found that {reason}; mend it, or let --unwrap smart make one"
         )
     make_layer(obj, texels, method)
-    channel.warn(f"made a lightmap UV layer for {obj.name!r} ({reason}); its coordinates are written to uv.json beside the capture")
+    events.warn(f"made a lightmap UV layer for {obj.name!r} ({reason}); its coordinates are written to uv.json beside the capture")
     return MADE_LAYER, True
 
 

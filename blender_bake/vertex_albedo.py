@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 from blender_bake.receiver_objects import select
 
 ATTRIBUTE = "srbf albedo"

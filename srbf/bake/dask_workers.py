@@ -21,12 +21,12 @@ from uuid import uuid4
 
 import srbf
 from srbf.bake import folder
+from srbf.bake.accumulation import LATE, Accumulation
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
 from srbf.bake.settings import BakeSettings
-from srbf.bake.sums import LATE, Sums
 from srbf.bake.worker import Worker
 from srbf.bake.worker_pool import TRIES, RemoteResult, Response, Take, Task, WorkerPool, WorkerPoolSettings
 from srbf.compute.dask_client import Cluster, ClusterError, scratch_root
@@ -51,7 +51,7 @@ class RemoteBake:
     folder: Path
     settings: BakeSettings
     blender: Path | None
-    crew: WorkerPoolSettings
+    pool: WorkerPoolSettings
     version: str
 
     @property
@@ -84,7 +84,7 @@ class DaskWorkerPool:
             bake.folder.resolve(),
             bake.settings,
             bake.blender,
-            WorkerPoolSettings(1, bake.crew.lights_per_worker, bake.crew.worker_timeout),
+            WorkerPoolSettings(1, bake.pool.lights_per_worker, bake.pool.worker_timeout),
             srbf.__version__,
         )
         self._refused: Counter[int] = Counter()
@@ -103,8 +103,8 @@ class DaskWorkerPool:
 
     def open(self) -> None:
         """Open the scene on this machine, and close it again."""
-        with self._here as crew:
-            crew.open()
+        with self._here as pool:
+            pool.open()
 
     def stop(self) -> None:
         """Begin no other light; `render` returns once those at hand are done."""
@@ -180,7 +180,7 @@ class _RemoteWorker:
         self.bake = bake
         self.timer: threading.Timer | None = None
         self._scratch = Path(tempfile.mkdtemp(prefix="srbf-", dir=scratch_root()))
-        self._worker_pool = WorkerPool(bake.crew, self._scratch, self._start, self._ready, self._said.append)
+        self._worker_pool = WorkerPool(bake.pool, self._scratch, self._start, self._ready, self._said.append)
 
     def close(self) -> None:
         self._worker_pool.__exit__(None, None, None)
@@ -189,12 +189,12 @@ class _RemoteWorker:
     def render(self, tasks: list[Task]) -> Report:
         """Render and commit what is not in yet."""
         self._said.clear()
-        sums = Sums(self.bake.folder, [task.light for task in tasks])
+        accumulation = Accumulation(self.bake.folder, [task.light for task in tasks])
         lights: dict[int, RemoteResult] = {}
         due = []
         for task in tasks:
-            if sums.refresh(task.light, task.before, LATE):
-                if sums.passes(task.light) == task.before:
+            if accumulation.refresh(task.light, task.before, LATE):
+                if accumulation.passes(task.light) == task.before:
                     due.append(task)
                 else:
                     lights[task.light.index] = RemoteResult(0.0)
@@ -203,10 +203,10 @@ class _RemoteWorker:
             assert isinstance(response, Response)
             try:
                 with self._alone(task) as allowed:
-                    sums.refresh(task.light)
-                    if allowed and sums.passes(task.light) == task.before:
-                        add_pass(self._images, sums, task, response)
-                    if sums.passes(task.light) > task.before:
+                    accumulation.refresh(task.light)
+                    if allowed and accumulation.passes(task.light) == task.before:
+                        add_pass(self._images, accumulation, task, response)
+                    if accumulation.passes(task.light) > task.before:
                         lights[task.light.index] = RemoteResult(response.seconds)
             except BakeError as error:
                 lights[task.light.index] = RemoteResult(response.seconds, str(error))

@@ -14,6 +14,7 @@ import numpy as np
 
 from srbf.bake.checks import bytes_needed
 from srbf.bake.job import base_job
+from srbf.bake.request import Rendered, RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
@@ -35,18 +36,21 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     lights = plan_lights(settings)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        probes = [{**lights[len(lights) // 3].job(), "index": i, "samples": n} for i, n in enumerate((1, 1, 1 + PROBE_SAMPLES))]
-        job = {**base_job(bake.scene, settings, scratch), "geometry": False, "ambient": None, "lights": probes, "probes": []}
+        probe = lights[len(lights) // 3]
+        channels: tuple[Rendered, ...] = ("response", "direct") if settings.transport == "indirect" else ("response",)
+        counts = (1, 1, 1 + PROBE_SAMPLES)
+        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=channels) for i, n in enumerate(counts)]
+        job = base_job(bake.scene, settings, scratch, requests)
         facts: dict[str, Any] = {}
-        seconds, image_bytes = [0.0] * len(probes), 0
+        seconds, image_bytes = [0.0] * len(requests), 0
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
             for event in worker.events(say):
                 if event["event"] == "scene":
                     facts = event
-                elif event["event"] == "image":
+                elif event["event"] == "rendered":
                     seconds[event["light"]] = event["seconds"]
                     image_bytes = 0
-                    for file in (event[key] for key in ("file", "direct") if key in event):
+                    for file in event["files"].values():
                         write_image(scratch / "probe.exr", np.clip(np.load(scratch / file), -6e4, 6e4), "half")
                         image_bytes += (scratch / "probe.exr").stat().st_size
     # The first light also hands the scene to Cycles: the second and third tell what every other one costs.
@@ -55,7 +59,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     ambient = 2 * settings.holdout_samples  # as the scene emits, and with all of it off
     passes = [_passes(light) for light in lights]
     time = (sum(passes) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
-    summed = len(lights) if bake.keeps_sums else sum(count > 1 for count in passes)
+    summed = len(lights) if bake.keeps_accumulation else sum(count > 1 for count in passes)
     disk = len(lights) * image_bytes + bytes_needed(settings, 0, summed)
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
@@ -81,7 +85,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
 def _samples(bake: Bake) -> str:
     if bake.settings.samples == "auto":
         return "as many samples as help"
-    return f"{bake.settings.samples} samples" if bake.seconds is None else f"the samples that {_duration(bake.seconds)} allow"
+    return f"{bake.settings.samples} samples" if bake.time_limit is None else f"the samples that {_duration(bake.time_limit)} allow"
 
 
 def _passes(light: PlannedLight) -> int:

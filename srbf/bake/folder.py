@@ -11,11 +11,13 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from srbf.bake import sums
-from srbf.bake.images import GEOMETRY, PREPARED, SCENE_FILE
-from srbf.bake.part import Part
-from srbf.bake.sums import SUMS
+from srbf.bake import accumulation
+from srbf.bake.accumulation import ACCUMULATION
+from srbf.bake.former_folder import FORMER, adopt
+from srbf.bake.images import PREPARED, SCENE_FILE, SEAMS
+from srbf.bake.shard import Shard
 from srbf.capture import MANIFEST
+from srbf.channels import CHANNELS, file_name
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
 from srbf.io import files
 
@@ -25,17 +27,25 @@ LONGEST_LOG = 16 << 20  # bytes of Blender's own words
 SCRATCH = ".scratch"
 LOCK = ".lock"
 HOLDER = ".holder.json"
-FINDING_A_PLACE = 5.0  # seconds that parts may need to do so, one after the other
-BEFORE_IMAGES = (LOCK, HOLDER, SCRATCH, LOG, SUMS, "lights", "direct")  # what may be there of a bake that never wrote an image
+FINDING_A_PLACE = 5.0  # seconds that shards may need to do so, one after the other
+BEFORE_IMAGES = (
+    LOCK,
+    HOLDER,
+    SCRATCH,
+    LOG,
+    ACCUMULATION,
+    FORMER,
+    "lights",
+    "direct",
+)  # what may be there of a bake that never wrote an image
 WRITTEN = (
     "lights",
     "direct",
-    "ambient.exr",
-    "seams.exr",
-    *(f"{name}.exr" for name in GEOMETRY),
+    *(file_name(name) for name in (*CHANNELS, SEAMS)),
     "uv.json",
     SCENE_FILE,
-    SUMS,
+    ACCUMULATION,
+    FORMER,
     SCRATCH,
     LOG,
 )  # all that a bake leaves
@@ -43,7 +53,7 @@ WRITTEN = (
 
 @contextmanager
 def hold(folder: Path) -> Iterator[None]:
-    """Hold the folder, parts of a bake included; the system lets go of it however this process ends."""
+    """Hold the folder, shards of a bake included; the system lets go of it however this process ends."""
     if folder.exists() and not folder.is_dir():
         raise OutputExistsError(f"expected a folder or nothing at {folder}, found a file; choose another -o")
     files.make_folder(folder)
@@ -51,8 +61,9 @@ def hold(folder: Path) -> Iterator[None]:
     if lock is None:
         raise BakeError(f"another process{_holder(folder)} is baking into {folder}; wait for it, or choose another -o")
     try:
-        if held := _parts_held(folder):
-            raise BakeError(f"other processes are baking parts {', '.join(held)} into {folder}; wait for them, or choose another -o")
+        if held := _shards_held(folder):
+            raise BakeError(f"other processes are baking shards {', '.join(held)} into {folder}; wait for them, or choose another -o")
+        adopt(folder)
         files.write_json(folder / HOLDER, {"host": socket.gethostname(), "pid": os.getpid(), "since": time.strftime("%F %T")})
         yield
     finally:
@@ -63,23 +74,25 @@ def hold(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def hold_part(folder: Path, part: Part) -> Iterator[None]:
-    """Hold one part of a bake beside others of as many; BakeError where another process holds it, or all of the folder."""
+def hold_shard(folder: Path, shard: Shard) -> Iterator[None]:
+    """Hold one shard of a bake beside others of as many; BakeError where another process holds it, or all of the folder."""
     if not folder.is_dir():
-        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
-    # A part holds the folder for a moment, to find its place: so no bake of all of it can begin unseen, and none be under way.
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run --shard prepare first")
+    # A shard holds the folder for a moment, to find its place: so no bake of all of it can begin unseen, and none be under way.
     whole = locked(folder, LOCK, FINDING_A_PLACE)
     if whole is None:
         raise BakeError(f"another process{_holder(folder)} is baking all of {folder}; wait for it")
     try:
-        held = _parts_held(folder)
-        if others := [name for name in held if not name.endswith(f"/{part.count}")]:
+        held = _shards_held(folder)
+        if others := [name for name in held if not name.endswith(f"/{shard.count}")]:
             raise BakeError(
-                f"expected parts of {part.count} in {folder}, found part {others[0]} being baked; wait for it, or keep to its number"
+                f"expected shards of {shard.count} in {folder}, found shard {others[0]} being baked; wait for it, or keep to its number"
             )
-        own = None if part.name in held else locked(folder, part.lock)
+        if not held:
+            adopt(folder)
+        own = None if shard.name in held else locked(folder, shard.lock)
         if own is None:
-            raise BakeError(f"another process is baking part {part.name} into {folder}; wait for it")
+            raise BakeError(f"another process is baking shard {shard.name} into {folder}; wait for it")
     finally:
         whole.release()
     try:
@@ -87,7 +100,7 @@ def hold_part(folder: Path, part: Part) -> Iterator[None]:
     finally:
         whole = locked(folder, LOCK, FINDING_A_PLACE)
         if whole is not None:
-            (folder / part.lock).unlink(missing_ok=True)  # nobody opens it meanwhile
+            (folder / shard.lock).unlink(missing_ok=True)  # nobody opens it meanwhile
             whole.release()
         own.release()
 
@@ -108,13 +121,13 @@ def locked(folder: Path, name: str, patience: float = 0.0) -> Any:
     return lock
 
 
-def _parts_held(folder: Path) -> list[str]:
-    """Names of the parts that are being baked; what others left behind is removed. To be asked by whoever holds the folder."""
+def _shards_held(folder: Path) -> list[str]:
+    """Names of the shards that are being baked; what others left behind is removed. To be asked by whoever holds the folder."""
     held = []
-    for path in sorted(folder.glob(".part-*.lock")):
+    for path in sorted(folder.glob(".shard-*.lock")):
         lock = locked(folder, path.name)
         if lock is None:
-            held.append(path.name.removeprefix(".part-").removesuffix(".lock").replace("-of-", "/"))
+            held.append(path.name.removeprefix(".shard-").removesuffix(".lock").replace("-of-", "/"))
         else:
             path.unlink(missing_ok=True)
             lock.release()
@@ -166,8 +179,8 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
     return False
 
 
-def is_past_parts(folder: Path, identity: dict[str, Any]) -> bool:
-    """Whether all parts of the bake are done and it is finished; BakeError where none is prepared, OutputExistsError where another is."""
+def is_past_shards(folder: Path, identity: dict[str, Any]) -> bool:
+    """Whether all shards of the bake are done and it is finished; BakeError where none is prepared, OutputExistsError where another is."""
     state = next((name for name in (STATE, MANIFEST) if (folder / name).is_file()), None)
     recorded = files.read_json(folder / state) if state else {}
     if recorded.get("tidying"):
@@ -180,8 +193,8 @@ def is_past_parts(folder: Path, identity: dict[str, Any]) -> bool:
         )
     if state == MANIFEST and not _may_grow(folder, recorded, identity):
         return True
-    if state != STATE or not (folder / SUMS / PREPARED).is_file():
-        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
+    if state != STATE or not (folder / ACCUMULATION / PREPARED).is_file():
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run --shard prepare first")
     return False
 
 
@@ -191,7 +204,7 @@ def sweep(folder: Path) -> None:
     if log.is_file() and log.stat().st_size > LONGEST_LOG:
         log.write_bytes(log.read_bytes()[-LONGEST_LOG // 16 :])
     shutil.rmtree(folder / SCRATCH, ignore_errors=True)
-    for place in ("", "lights/", "direct/", f"{SUMS}/"):
+    for place in ("", "lights/", "direct/", f"{ACCUMULATION}/"):
         for partial in folder.glob(f"{place}.*.partial*"):
             partial.unlink()
 
@@ -199,7 +212,7 @@ def sweep(folder: Path) -> None:
 def tidy(folder: Path) -> None:
     """Drop the sums of a finished bake, and the mark that it was unfinished. Killed on the way, the next run does it."""
     files.write_json(folder / STATE, {"tidying": True})
-    sums.remove(folder)
+    accumulation.remove(folder)
     (folder / STATE).unlink()
 
 
@@ -207,10 +220,10 @@ def _may_grow(folder: Path, recorded: dict[str, Any], asked: dict[str, Any]) -> 
     """Whether a finished capture is to have more samples; OutputExistsError where it is, and its sums are gone."""
     has, wants = recorded["settings"]["samples"], asked["settings"]["samples"]
     more = not recorded.get("validation_curve") if wants == "auto" else wants > has
-    if more and not any((folder / SUMS).glob("[0-9]*")):
+    if more and not any((folder / ACCUMULATION).glob("[0-9]*")):
         raise OutputExistsError(
-            f"expected the sums of {folder}, to add to its {has} samples a texel, found none: they are kept by --keep-sums, "
-            "--samples auto and --time; choose another -o, or --force to bake anew"
+            f"expected the sums of {folder}, to add to its {has} samples a texel, found none: they are kept by --keep-accumulation, "
+            "--samples auto and --time-limit; choose another -o, or --force to bake anew"
         )
     return more
 

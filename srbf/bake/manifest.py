@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import srbf
-from srbf.bake.images import GEOMETRY, SCENE_FILE
+from srbf.bake.images import SCENE_FILE, SEAMS
 from srbf.bake.settings import BakeSettings, PlannedLight
+from srbf.channels import file_name, manifest_keys
 
 
 def capture_manifest(
@@ -48,8 +49,7 @@ def capture_manifest(
             for light, samples in lights
         ],
         **({"scene": SCENE_FILE, "direct": {"sun_angle": settings.sun_angle, **prepared["sampling"]}} if apart else {}),
-        **{name: f"{name}.exr" for name in GEOMETRY},
-        **({"seams": "seams.exr"} if prepared["seams"] else {}),
-        **({"ambient": "ambient.exr"} if prepared["ambient"] else {}),
+        **manifest_keys(prepared["channels"]),
+        **({SEAMS: file_name(SEAMS)} if prepared["seams"] else {}),
         "source": source,
     }

@@ -1,6 +1,6 @@
 """`--farm openjd`: a bake and its fit as a job of a render farm, an Open Job Description bundle (specification jobtemplate-2023-09).
 
-Steps: Prepare, then Bake with a task a part of the lights, then Finish, which takes stock and writes the manifest, then Fit.
+Steps: Prepare, then Bake with a task a shard of the lights, then Finish, which takes stock and writes the manifest, then Fit.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> No
 def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
     """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_PER_TASK lights."""
     if bake.is_open_ended:
-        raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time")
+        raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time-limit")
     lights = len(plan_lights(bake.settings))
     count = min(lights, tasks or -(-lights // LIGHTS_PER_TASK))
     command = ["-m", "srbf", "bake", "{{Param.Scene}}", "-o", "{{Param.Capture}}", *_flags(bake)]
@@ -61,10 +61,10 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
             {"name": "Python", "type": "STRING", "default": "python3", "description": "A Python that has srbf."},
         ],
         "steps": [
-            _step("Prepare", [*command, "--part", "prepare"]),
+            _step("Prepare", [*command, "--shard", "prepare"]),
             {
-                **_step("Bake", [*command, "--part", f"{{{{Task.Param.Part}}}}/{count}"], "Prepare"),
-                "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{count}"}]},
+                **_step("Bake", [*command, "--shard", f"{{{{Task.Param.Shard}}}}/{count}"], "Prepare"),
+                "parameterSpace": {"taskParameterDefinitions": [{"name": "Shard", "type": "INT", "range": f"1-{count}"}]},
             },
             _step("Finish", command, "Bake"),
             _step("Fit", ["{{Task.File.Fit}}", "{{Param.Capture}}", "{{Param.Asset}}", "{{Param.FitFlags}}"], "Finish", FIT),
@@ -102,14 +102,14 @@ def arguments(settings: BakeSettings) -> list[str]:
 
 
 def _flags(bake: Bake) -> list[str]:
-    crew = {
-        "workers": bake.crew.workers,
-        "lights-a-worker": bake.crew.lights_per_worker,
-        "hang-after": bake.crew.worker_timeout,
+    pool = {
+        "workers": bake.pool.workers,
+        "lights-per-worker": bake.pool.lights_per_worker,
+        "worker-timeout": bake.pool.worker_timeout,
         "blender": bake.blender,
     }
-    flags = [f"--{name}={value}" for name, value in crew.items() if value is not None]
-    flags += ["--keep-sums"] if bake.keep_sums else []
+    flags = [f"--{name}={value}" for name, value in pool.items() if value is not None]
+    flags += ["--keep-accumulation"] if bake.keep_accumulation else []
     for flag in (*flags, *arguments(bake.settings), bake.scene.stem):
         if "{{" in flag and flag != "--light-list={{Param.LightList}}":
             raise InputError(f"expected names without {{{{, which a job template reads as its own, found {flag!r}; rename it")

@@ -21,7 +21,7 @@ Places = tuple[tuple[float, float, float], ...]
 class PointGrid:
     """Lamps `spacing` meters apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
 
-    `grid` and `random` are positions in meters, not known before `srbf.bake.survey.with_free_point_lights` has asked the scene.
+    `grid` and `random` are positions in meters, not known before `srbf.bake.scene_query.with_free_point_lights` has asked the scene.
     """
 
     spacing: float

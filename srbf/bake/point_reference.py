@@ -11,8 +11,9 @@ import numpy as np
 
 from srbf import methods
 from srbf.asset import Asset
-from srbf.bake.job import base_job
-from srbf.bake.settings import BakeSettings, Receiver, noise_seed
+from srbf.bake.job import AMBIENT_SEED, base_job
+from srbf.bake.request import RenderRequest
+from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, noise_seed
 from srbf.bake.worker import Worker
 from srbf.errors import InputError
 from srbf.io import files
@@ -104,28 +105,22 @@ def _render(
     chosen = asset.manifest["source"].get("settings", {}).get("scene")
     settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
     lights = [
-        {"index": i, "kind": "point", "position": point_light.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
-        for i, point_light in enumerate(point_lights)
+        PlannedLight(i, tuple(place.tolist()), "holdout", samples, noise_seed(seed, i), "point") for i, place in enumerate(point_lights)
     ]
+    requests = [RenderRequest(light, light.samples, light.seed) for light in lights]
     images: list[np.ndarray] = []
-    left: np.ndarray | float = 0.0
+    residual: np.ndarray | float = 0.0
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        job = {
-            **base_job(scene, settings, scratch),
-            "geometry": False,
-            "ambient": {"samples": samples, "seed": noise_seed(seed, -1)},
-            "lights": lights,
-        }
+        ambient = RenderRequest(None, samples, noise_seed(seed, AMBIENT_SEED))
+        job = {**base_job(scene, settings, scratch, requests), "ambient": ambient.message()}
         with Worker(job, scratch, scratch / "bake.log", blender) as worker:
             for event in worker.events(say):
-                if event["event"] == "image":
-                    array = np.load(scratch / event["file"])
-                    if "light" in event:
-                        images.append(np.maximum(array - left, 0))
-                        progress(len(images), len(lights))
-                    elif event["name"] == "left":
-                        left = array
+                if event["event"] == "rendered":
+                    images.append(np.maximum(np.load(scratch / event["files"]["response"]) - residual, 0))
+                    progress(len(images), len(lights))
+                elif event["event"] == "image" and event["name"] == "residual":
+                    residual = np.load(scratch / event["file"])
     return images
 
 

@@ -207,10 +207,6 @@ class PlannedLight:
         """Its kind and where it is, as manifest and worker read them."""
         return {"kind": self.kind, ("direction" if self.kind == "directional" else "position"): list(self.place)}
 
-    def job(self) -> dict[str, Any]:
-        """As the worker reads it."""
-        return {"index": self.index, **self.placed(), "samples": self.samples, "seed": self.seed}
-
 
 def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
     """Train lights (Hammersley, the light list's, or a grid of lamps), then validation, then holdout: uniform random, of more samples."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from srbf.bake.sums import Sum
+from srbf.bake.accumulation import Sum
 from srbf.capture import Capture
 from srbf.encode.light_function_fit import choose_functions, dense_centers
 from srbf.encode.model_selection import TexelSample

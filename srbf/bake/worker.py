@@ -16,6 +16,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any
 
+from srbf.bake.request import RenderRequest
 from srbf.errors import BakeError, MissingLibraryError
 
 
@@ -24,7 +25,7 @@ def command(blender: Path | None, job: Path) -> list[str]:
     package = importlib.util.find_spec("blender_bake")
     if package is None or package.origin is None:
         raise MissingLibraryError("expected the package blender_bake beside srbf, found none; install srbf again")
-    confined = [sys.executable, str(Path(package.origin).parent / "confine.py"), str(job.parent)] if sys.platform != "win32" else []
+    confined = [sys.executable, str(Path(package.origin).parent / "sandbox.py"), str(job.parent)] if sys.platform != "win32" else []
     if blender is not None:
         if shutil.which(blender) is None:
             raise BakeError(f"cannot start Blender at {blender}: expected a program, found none; correct --blender")
@@ -90,9 +91,9 @@ class Worker:
                     stream.close()
         self._log.close()
 
-    def ask(self, light: dict[str, Any]) -> None:
-        """Ask for one more light of a job that serves; what is asked for is answered in order."""
-        self._tell(light)
+    def ask(self, request: RenderRequest) -> None:
+        """Send one more request to a job that serves; replies come in order, as events `rendered`."""
+        self._tell(request.message())
 
     def end(self) -> None:
         """Let it finish the light at hand, forget the others, and end."""

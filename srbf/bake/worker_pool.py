@@ -15,6 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy import ndarray
 
+from srbf.bake.request import Rendered, RenderRequest
 from srbf.bake.settings import PlannedLight
 from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.errors import BakeError
@@ -32,7 +33,8 @@ LEAST_PATIENCE = 30.0  # seconds
 class Task:
     """One pass of a light: `samples` more of it, by their own `seed`, to what `before` passes gave.
 
-    `squares`: its sum of squares is wanted too. `keep`: the sum is, since more may come.
+    `squares`: its sum of squares is wanted too. `keep`: keep the sum, since more passes may follow. `denoise`: the response is to be
+    denoised. `direct`: its direct light is wanted too.
     """
 
     light: PlannedLight
@@ -42,10 +44,13 @@ class Task:
     squares: bool = False
     keep: bool = False
     denoise: bool = False
+    direct: bool = False
 
-    def job(self) -> dict[str, Any]:
-        """As the worker reads it."""
-        return {**self.light.job(), "samples": self.samples, "seed": self.seed, "denoise": self.denoise}
+    @property
+    def request(self) -> RenderRequest:
+        """What the worker is asked for."""
+        channels: tuple[Rendered, ...] = ("response", "direct") if self.direct else ("denoised",) if self.denoise else ("response",)
+        return RenderRequest(self.light, self.samples, self.seed, channels=channels)
 
 
 @dataclass(frozen=True)
@@ -204,7 +209,7 @@ class WorkerPool:
                         self._open(slot)
                         asked.pop()
                     assert slot.worker is not None
-                    slot.worker.ask(task.job())
+                    slot.worker.ask(task.request)
                     asked.append(task)
                 if self._stop and len(asked) > 1 and slot.worker is not None:
                     slot.worker.end()  # drops what it has not begun
@@ -250,12 +255,16 @@ class WorkerPool:
         while (event := slot.worker.event(self._patience.of(task.samples))) is not None:
             if event["event"] == "warning":
                 self._say(event["message"])
-            elif event["event"] == "image":
-                if event["light"] != task.light.index:
-                    raise BakeError(f"expected light {task.light.index} from Blender, found {event['light']}")
+            elif event["event"] == "rendered":
+                wanted = task.request.channels
+                if event["light"] != task.light.index or set(event["files"]) != set(wanted):
+                    raise BakeError(
+                        f"expected {', '.join(wanted)} of light {task.light.index} from Blender, "
+                        f"found {', '.join(event['files'])} of light {event['light']}"
+                    )
                 slot.answered += 1
-                direct = _taken(slot.scratch / event["direct"]) if "direct" in event else None
-                return Response(_taken(slot.scratch / event["file"]), direct, event["seconds"])
+                images = {name: _taken(slot.scratch / file) for name, file in event["files"].items()}
+                return Response(images[wanted[0]], images.get("direct"), event["seconds"])
         return None
 
     def _next(self) -> Task | None:

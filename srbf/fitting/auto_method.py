@@ -58,7 +58,7 @@ def within_budget(
         raise InputError(f"expected --psnr in dB, found {psnr:g}")
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
-    trial = _without_holdout(capture.kept(texels))
+    trial = _without_holdout(capture.load(texels))
     missed = None if trial.indices("validation") else _between_lights(trial)
     share = len(covered) / max(1, len(texels))
     sizes = [budget or DEFAULT_BUDGET] if psnr is None else range(LEAST_BUDGET, MOST_COMPONENTS + 5, 4)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from srbf.asset import Asset
-from srbf.capture import Capture, Look
+from srbf.capture import Capture, OnImage
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
 from srbf.fitting.auto_method import DEFAULT_BUDGET, Planes, within_budget
@@ -86,17 +86,17 @@ def encode(
     chosen: RelightingMap | Planes,
     capture: Capture,
     progress: Callable[[int, int], None] = lambda done, total: None,
-    look: Look = lambda row, image: None,
+    on_image: OnImage = lambda row, image: None,
     stitched: bool = True,
     tiles: Tiles | None = None,
 ) -> Asset:
     """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so; by `tiles` a relighting map."""
     stitch = Stitch.of(capture) if stitched else None
     if isinstance(chosen, RelightingMap):
-        return chosen.encode(capture, progress, look, stitch, tiles)
+        return chosen.encode(capture, progress, on_image, stitch, tiles)
     if tiles is not None:
         raise InputError("expected a relighting map to be fitted by tiles, found another method")
-    return chosen.encode(capture, progress, look, stitch)
+    return chosen.encode(capture, progress, on_image, stitch)
 
 
 def _require_above(capture: Capture, flags: str) -> None:

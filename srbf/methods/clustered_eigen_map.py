@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import Capture, Look
+from srbf.capture import Capture, OnImage
 from srbf.encode.light_function_fit import functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.uv_seams import Stitch
@@ -70,13 +70,13 @@ class ClusteredEigenMap:
         self,
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
-        look: Look = lambda row, image: None,
+        on_image: OnImage = lambda row, image: None,
         stitch: Stitch | None = None,
     ) -> Asset:
         """Clusters from a texel sample; a pass over the images to assign every texel, another to project it.
 
         Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `scalars`) + 40 bytes a texel, two blocks of
-        `capture.STREAM_BYTES`, twice the sample (12 bytes a light and sampled texel), what `look` keeps, and some 0.2 GB of libraries.
+        `capture.STREAM_BYTES`, twice the sample (12 bytes a light and sampled texel), what `on_image` keeps, and some 0.2 GB of libraries.
         Scalars of two clusters cannot be compared, so `stitch` closes the seams of the images, and what its texels show is read once
         more: both sides then agree as well as their clusters hold them.
         InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
@@ -94,7 +94,7 @@ class ClusteredEigenMap:
         features, _ = principal_axes(space.centered, FEATURES)
         found = cluster(space.centered, np.ascontiguousarray(features.T), self.clusters, self.scalars, self.seed)
         seen = StreamedProduct(space.weights(features))
-        for first, block in capture.stream(train, look):
+        for first, block in capture.stream(train, on_image):
             seen.add(first, block)
             progress(first + len(block), 2 * len(train))
         columns = seen.result if stitch is None else _with_stitched(seen.result, stitch)

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Literal, get_args
 
 from srbf.asset import Asset
-from srbf.capture import Capture, Look
+from srbf.capture import Capture, OnImage
 from srbf.encode.light_function_fit import functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.uv_seams import Stitch
@@ -61,13 +61,13 @@ class EigenMap:
         self,
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
-        look: Look = lambda row, image: None,
+        on_image: OnImage = lambda row, image: None,
         stitch: Stitch | None = None,
     ) -> Asset:
         """Axes from a texel sample, then one projection of every texel: each image read once, and some of its rows before.
 
         Peak memory, whatever the number of lights: about 12 `scalars` + 40 bytes a texel, two blocks of `capture.STREAM_BYTES`, the sample
-        (12 bytes a light and texel of SAMPLE_TEXELS), what `look` keeps, and some 0.2 GB of libraries. `stitch` closes the planes' seams.
+        (12 bytes a light and texel of SAMPLE_TEXELS), what `on_image` keeps, some 0.2 GB of libraries. `stitch` closes the planes' seams.
         InputError where there are no train lights, or fewer than 3 times as many numbers a texel as scalars.
         """
         train = capture.indices("train")
@@ -81,7 +81,7 @@ class EigenMap:
         space = LightSpace.of(sample, self.weighting)
         axes, values = principal_axes(space.centered * space.row_weights[:, None], self.scalars)
         product = StreamedProduct(space.weights(axes))
-        for first, block in capture.stream(train, look):
+        for first, block in capture.stream(train, on_image):
             product.add(first, block)
             progress(first + len(block), len(train))
         planes = product.result - space.offsets(axes)[:, None]

@@ -13,7 +13,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset, layer_entries
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of
 from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
-from srbf.capture import Capture, Look
+from srbf.capture import Capture, OnImage
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.encode.model_selection import RIDGES, USUAL_RIDGE, USUAL_SPREAD, Choice, TexelSample, choose, spread_candidates
@@ -83,16 +83,16 @@ class RelightingMap:
         self,
         capture: Capture,
         progress: Callable[[int, int], None] = lambda done, total: None,
-        look: Look = lambda row, image: None,
+        on_image: OnImage = lambda row, image: None,
         stitch: Stitch | None = None,
         tiles: Tiles | None = None,
     ) -> Asset:
         """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve a texel.
 
-        `auto` reads a sample of the texels before. `look` sees every train image as it streams by (`Capture.stream`); `stitch` closes
+        `auto` reads a sample of the texels before. `on_image` sees every train image as it streams by (`Capture.stream`); `stitch` closes
         the seams of the dilated maps before they are rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes a texel, two
-        blocks of `capture.STREAM_BYTES`, what `look` keeps, and some 0.2 GB of libraries. With `tiles` others stream the images and
-        solve, and `look` sees none.
+        blocks of `capture.STREAM_BYTES`, what `on_image` keeps, and some 0.2 GB of libraries. With `tiles` others stream the images and
+        solve, and `on_image` sees none.
 
         InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
         the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
@@ -111,7 +111,7 @@ class RelightingMap:
             solved, report = tiles(capture, train, basis.evaluate(directions), ridge, progress)
         else:
             solve = StreamedLeastSquares(basis.evaluate(directions), ridge)
-            for first, block in capture.stream(train, look):
+            for first, block in capture.stream(train, on_image):
                 solve.add(first, block)
                 progress(first + len(block), len(train))
             report, solved = solve.report(), solve.solve()

@@ -14,8 +14,8 @@ from conftest import Baked
 from typer.testing import CliRunner, Result
 
 from srbf.bake.run import Bake, Reporter
+from srbf.bake.scene_query import objects_of, with_size
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
-from srbf.bake.survey import objects_of, with_size
 from srbf.capture import COVERED, Capture
 from srbf.cli import app
 from srbf.errors import BakeError, InputError
@@ -98,11 +98,11 @@ def test_layers_that_lie_side_by_side_are_used(bake) -> None:
 
 
 def test_a_collection_with_children_modifiers_and_instances(bake, scene, tmp_path: Path) -> None:
-    planned = Bake(scene("kit"), tmp_path / "none", BakeSettings(Receiver("view")))
-    assert objects_of(planned, ["Kit"]) == ["Deep", "Doubled", "Plate"]  # not what is hidden
-    assert objects_of(planned, ["Inner"]) == ["Deep"]
+    kit = scene("kit")
+    assert objects_of(kit, ["Kit"]) == ["Deep", "Doubled", "Plate"]  # not what is hidden
+    assert objects_of(kit, ["Inner"]) == ["Deep"]
     with pytest.raises(BakeError, match="expected a collection 'Nothing'.*'Kit'"):
-        objects_of(planned, ["Nothing"])
+        objects_of(kit, ["Nothing"])
     capture = bake("kit", "lightmap:Plate", "lightmap:Doubled", "lightmap:Deep", "lightmap:Set", width=96, height=96).capture
     names = [one["object"] for one in capture.manifest["receivers"]]
     assert names == ["Plate", "Doubled", "Deep", "Set/Deep", "Set/Doubled", "Set/Plate"]

@@ -13,8 +13,8 @@ from srbf.bake.folder import STATE
 from srbf.bake.job import base_job
 from srbf.bake.openjd import arguments
 from srbf.bake.run import Bake
+from srbf.bake.scene_query import size_of_begun, with_frame
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import size_of_begun, with_frame
 from srbf.capture import MANIFEST
 from srbf.cli.parameters import parse_sun_angle
 from srbf.errors import InputError

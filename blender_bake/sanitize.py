@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A .blend is hostile until shown otherwise: what in it would run Python or OSL, or write files, is disarmed before it is first evaluated.
+"""A .blend is hostile until shown otherwise: what in it would run Python or OSL, or write files, is disabled before it is first evaluated.
 
 Blender calls `load_post` handlers after a file is read and before its dependency graph is evaluated, which is when drivers run and physics
 write their disk caches. What stands as saved, such as values of drivers, is what its author last saw.
@@ -14,14 +14,14 @@ from typing import Any
 
 import bpy
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
-CONFINED = "SRBF_CONFINED"  # see `confine`: nothing outside the scratch folder can be written whatever Blender tries
+SANDBOXED = "SRBF_CONFINED"  # see `sandbox`: nothing outside the scratch folder can be written whatever Blender tries
 SHOWN = 6  # names in a warning
-ARMING = ("use_disk_cache", "use_external", "cache_type")  # properties that no animation may turn back
+REVERTING = ("use_disk_cache", "use_external", "cache_type")  # properties that no animation may turn back
 
 
-def disarm() -> list[str]:
+def sanitize() -> list[str]:
     """Take from the file just read all that runs code or writes files; returns a line for each kind of thing that the user may miss.
 
     Raises WorkerError where opening the scene further would touch files on disk.
@@ -33,11 +33,11 @@ def disarm() -> list[str]:
     ]
     for block in _blocks():
         for curves, curve in list(_curves(block)):
-            if curve.data_path.endswith(ARMING) or (isinstance(block, bpy.types.Camera) and curve.data_path == "type"):
+            if curve.data_path.endswith(REVERTING) or (isinstance(block, bpy.types.Camera) and curve.data_path == "type"):
                 curves.remove(curve)
     _disk_caches()
     for scene in bpy.data.scenes:
-        _disarm_scene(scene)
+        _sanitize_scene(scene)
     for text in bpy.data.texts:
         text.use_module = False
     for tree in [scene.node_tree for scene in bpy.data.scenes if getattr(scene, "node_tree", None)] + list(bpy.data.node_groups):
@@ -46,7 +46,7 @@ def disarm() -> list[str]:
     return [line for line in said if line]
 
 
-def _disarm_scene(scene: bpy.types.Scene) -> None:
+def _sanitize_scene(scene: bpy.types.Scene) -> None:
     """No OSL, no compositor, sequencer or Freestyle, no cache of renders; nothing animated that `scene.configure` sets."""
     scene.animation_data_clear()
     for marker in scene.timeline_markers:
@@ -101,8 +101,8 @@ def _disk_caches() -> None:
     Turning a disk cache off deletes its files: that is done where there are none, or where they cannot be deleted.
     """
     found = [(owner, cache) for owner, cache in _point_caches() if cache.use_disk_cache and not (cache.is_baked or cache.use_external)]
-    confined = os.environ.get(CONFINED) == "1"
-    kept = [repr(owner.name) for owner, _ in found if not confined and _cache_folder(owner).exists()]
+    sandboxed = os.environ.get(SANDBOXED) == "1"
+    kept = [repr(owner.name) for owner, _ in found if not sandboxed and _cache_folder(owner).exists()]
     if kept:
         raise WorkerError(
             f"expected physics baked or cached in memory, found an unfinished disk cache of {', '.join(kept[:SHOWN])}, which Blender would "

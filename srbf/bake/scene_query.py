@@ -1,4 +1,4 @@
-"""What only the scene knows, asked before a bake is planned: a collection's objects, a receiver's texels, where lamps may stand."""
+"""Facts that only the scene knows, queried before a bake is planned: a collection's objects, a receiver's size, free places for lights."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from srbf.bake.folder import STATE
-from srbf.bake.job import base_job
-from srbf.bake.run import Bake
+from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
 from srbf.capture import MANIFEST
@@ -22,25 +21,45 @@ from srbf.io import files
 MULTIPLE = 4  # of texels, that a side found by density is rounded up to: what block compression needs
 
 
-def survey(bake: Bake, asked: dict[str, Any], say: Callable[[str], None] = lambda line: None) -> dict[str, Any]:
-    """The facts `asked` for of the scene of `bake`, see `blender_bake.survey`; it is opened by a worker of its own, nothing is written."""
-    bake.check_scene()
+def ask_scene(
+    scene: Path,
+    question: dict[str, Any],
+    say: Callable[[str], None] = lambda line: None,
+    scene_name: str | None = None,
+    blender: Path | None = None,
+) -> dict[str, Any]:
+    """The facts that a `question` asks of a .blend, see `blender_bake.scene_query`; needs no bake, and writes nothing.
+
+    scene_name: which scene of the .blend; None: the active one. blender: an installed Blender's executable; None: this Python's bpy.
+    `say` gets a line for each warning. Raises InputError where there is no .blend, BakeError where Blender fails.
+    """
+    require_scene(scene)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        job = {**base_job(bake.scene, bake.settings, scratch), "survey": asked}
+        job = {"scene": str(scene.resolve()), "scene_name": scene_name, "scratch": str(scratch.resolve()), "query": question}
         facts: dict[str, Any] | None = None
-        with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
+        with Worker(job, scratch, scratch / "bake.log", blender) as worker:
             for event in worker.events(say):
-                if event["event"] == "survey":
+                if event["event"] == "facts":
                     facts = event
     if facts is None:
-        raise BakeError("expected a survey of the scene from Blender, found none; run again, and look at the scene if it happens twice")
+        raise BakeError("expected facts of the scene from Blender, found none; run again, and look at the scene if it happens twice")
     return facts
 
 
-def objects_of(bake: Bake, collections: list[str], say: Callable[[str], None] = lambda line: None) -> list[str]:
-    """Names of the receivers that the scene's collections hold, children included, in order of name."""
-    return list(survey(bake, {"collections": collections}, say)["objects"])
+def objects_of(
+    scene: Path,
+    collections: list[str],
+    say: Callable[[str], None] = lambda line: None,
+    scene_name: str | None = None,
+    blender: Path | None = None,
+) -> list[str]:
+    """Names of the receivers in a scene's collections, children included, in order of name. Arguments and errors as of `ask_scene`."""
+    return list(ask_scene(scene, {"collections": collections}, say, scene_name, blender)["objects"])
+
+
+def _ask(bake: Bake, question: dict[str, Any], say: Callable[[str], None]) -> dict[str, Any]:
+    return ask_scene(bake.scene, question, say, bake.settings.scene, bake.blender)
 
 
 def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[str], None] = lambda line: None) -> Bake:
@@ -52,7 +71,7 @@ def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[
     if bake.settings.receiver.kind == "vertices":
         if texels_per_meter is not None:
             raise InputError("--texels-per-meter belongs to a lightmap, found it with vertices")
-        facts = survey(bake, {"vertices": True}, say)
+        facts = _ask(bake, {"vertices": bake.settings.receiver.job()}, say)
         return _sized(bake, facts["width"], facts["height"])
     if texels_per_meter is None:
         return bake
@@ -60,7 +79,7 @@ def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[
         raise InputError("--texels-per-meter belongs to a lightmap, found it with a view; give its --size")
     if not (texels_per_meter > 0 and math.isfinite(texels_per_meter)):
         raise InputError(f"expected --texels-per-meter above 0, found {texels_per_meter:g}")
-    facts = survey(bake, {"texels_per_meter": texels_per_meter}, say)
+    facts = _ask(bake, {"texels_per_meter": texels_per_meter, "receiver": bake.settings.receiver.job()}, say)
     side = MULTIPLE * math.ceil(facts["side"] / MULTIPLE)
     if side > LARGEST_SIDE:
         most = math.floor(LARGEST_SIDE * math.sqrt(facts["uv_area"] / facts["world_area"]) * 100) / 100
@@ -80,7 +99,7 @@ def with_frame(bake: Bake, longer: int, anew: bool, say: Callable[[str], None] =
     before = None if anew else size_of_begun(bake.folder)
     if before is not None:
         return _sized(bake, *before)
-    found = survey(bake, {"frame": True}, say)["frame"]
+    found = _ask(bake, {"frame": True}, say)["frame"]
     aspect = float(found["aspect"])
     width, height = (longer, max(1, round(longer / aspect))) if aspect >= 1 else (max(1, round(longer * aspect)), longer)
     say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; --size WxH gives another")
@@ -104,7 +123,8 @@ def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line:
     if points is None or points.grid is not None:
         return bake
     random = settings.validation + settings.holdout
-    found = survey(bake, {"points": {"spacing": points.spacing, "box": points.box, "random": random, "seed": settings.seed}}, say)["points"]
+    question = {"points": {"spacing": points.spacing, "box": points.box, "random": random, "seed": settings.seed}}
+    found = _ask(bake, question, say)["points"]
     x0, y0, z0, x1, y1, z1 = found["box"]
     grid, free = (tuple((x, y, z) for x, y, z in found[key]) for key in ("grid", "random"))
     say(

@@ -19,7 +19,7 @@ class WorkerError(Exception):
     """A failure told to the host in one line: expected, found, what to do."""
 
 
-class Channel:
+class Events:
     """Events out. Blender's own chatter, from C as from Python, goes to stderr once this is made."""
 
     def __init__(self) -> None:

@@ -18,7 +18,7 @@ from srbf.bake.settings import PlannedLight
 from srbf.errors import ImageError
 from srbf.io import files
 
-SUMS = "sums"
+ACCUMULATION = "accumulation"
 LATE = 30.0  # seconds after which a shared folder shows what another machine wrote
 POLL = 0.25
 
@@ -67,7 +67,7 @@ class Sum:
 NOTHING = Sum(0, 0, None)
 
 
-class Sums:
+class Accumulation:
     """The folder of sums, one file a light: read once, then written as passes come. A light's file appears whole or not at all.
 
     It is written after the light's images, so that after a kill they are at least as far as it says; the pass in question is then
@@ -75,7 +75,7 @@ class Sums:
     """
 
     def __init__(self, folder: Path, lights: Sequence[PlannedLight]) -> None:
-        self._folder = folder / SUMS
+        self._folder = folder / ACCUMULATION
         files.make_folder(self._folder)
         self._known = {light.index: self._read_counts(light.index) for light in lights}
 
@@ -156,7 +156,7 @@ def load_array(path: Path) -> ndarray:
 
 def remove(folder: Path) -> None:
     """Remove a capture's sums: it can then no longer be gone on with."""
-    shutil.rmtree(folder / SUMS, ignore_errors=True)
+    shutil.rmtree(folder / ACCUMULATION, ignore_errors=True)
 
 
 def _added(total: ndarray | None, part: ndarray) -> Float32[ndarray, "H W 3"]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python confine.py SCRATCH COMMAND…`: become COMMAND, able to write below SCRATCH alone.
+"""`python sandbox.py SCRATCH COMMAND…`: become COMMAND, able to write below SCRATCH alone.
 
-The second wall around a .blend that nobody vouches for; the first is `hardening`, inside Blender. Linux's Landlock refuses every write,
+The second wall around a .blend that nobody vouches for; the first is `sanitize`, inside Blender. Linux's Landlock refuses every write,
 creation, renaming and removal elsewhere, and every TCP connection, whoever asks and by whatever path; reading stays free. Other systems
 and older kernels have the first wall alone. Everywhere Blender's temporary folder and its user's folder are put below SCRATCH, so that
 the user's own start-up scripts and add-ons do not run either. Stands alone: it needs neither Blender nor this package.
@@ -16,9 +16,9 @@ import struct
 import sys
 from pathlib import Path
 
-CONFINED = "SRBF_CONFINED"  # in the environment of what runs behind the second wall
-UNCONFINED = "SRBF_UNCONFINED"  # set by users whose Blender cannot start behind it
-LAUNCHERS = {"snap", "flatpak"}  # what these start needs rights that a confined process has given up
+SANDBOXED = "SRBF_CONFINED"  # in the environment of what runs behind the second wall
+UNSANDBOXED = "SRBF_UNCONFINED"  # set by users whose Blender cannot start behind it
+LAUNCHERS = {"snap", "flatpak"}  # what these start needs rights that a sandboxed process has given up
 
 # linux/landlock.h
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
@@ -37,8 +37,8 @@ def main() -> None:
     os.environ.update(environment(scratch))
     program = shutil.which(command[0])
     launched = program is not None and Path(program).resolve().name in LAUNCHERS
-    if not (launched or os.environ.get(UNCONFINED)) and confine(scratch):
-        os.environ[CONFINED] = "1"
+    if not (launched or os.environ.get(UNSANDBOXED)) and restrict_writes(scratch):
+        os.environ[SANDBOXED] = "1"
     try:
         os.execvp(command[0], command)
     except OSError as error:
@@ -51,7 +51,7 @@ def environment(scratch: Path) -> dict[str, str]:
     return {**places, "BLENDER_USER_RESOURCES": str(scratch / "user"), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def confine(folder: Path) -> bool:
+def restrict_writes(folder: Path) -> bool:
     """Give up, for this process and its children, writing anywhere but below `folder`; False where the system has no such thing."""
     if sys.platform != "linux":
         return False
