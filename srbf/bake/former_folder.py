@@ -30,7 +30,7 @@ def adopt(folder: Path) -> None:
     with suppress(ManifestError):  # damaged, or none: the receiver is prepared again
         stored = files.read_json(present / PREPARED)
         prepared = stored.get("prepared")
-        if isinstance(prepared, dict) and "tints" in prepared and stored.get("sha256") == checksum_of(prepared):
+        if isinstance(prepared, dict) and "tints" in prepared and stored.get("sha256") == checksum_of(prepared):  # words: ok
             write_preparation(folder, _present(prepared))
 
 
@@ -41,7 +41,7 @@ def _present(former: dict[str, Any]) -> dict[str, Any]:
     return {
         "facts": former["facts"],
         "sampling": former["sampling"],
-        "transmittances": former["tints"],
+        "transmittances": former["tints"],  # words: ok
         "channels": [*GEOMETRY, *ambient],
         "seams": former["seams"],
         "uv": former["uv"],

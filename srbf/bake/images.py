@@ -105,32 +105,34 @@ class CaptureImages:
         """BakeError where a worker has another receiver than the one prepared."""
         assert self.prepared is not None
         if without_uv(facts) != self.prepared["facts"] or uv_checksum(facts) != self.prepared["uv"]:
-            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+            raise BakeError(
+                f"expected the receiver of {self._folder} as it was when its bake began, found another; bake with `restart=True`"
+            )
 
     def require_size(self, light: PlannedLight, image: ndarray) -> None:
-        """BakeError where an answer has not the size of the receiver."""
+        """BakeError where an image of `light` has not the size of the receiver."""
         if image.shape != (*self._size, 3):
             raise BakeError(
                 f"expected {(*self._size, 3)} values of light {light.index} from Blender, found {image.shape}; see the bake's log"
             )
 
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
-        """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
+        """`mean` as the capture holds it, before rounding: dilated, the residual emission subtracted. BakeError for NaN."""
         if not np.isfinite(mean).all():
             raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
         mean = dilate(mean, self._nearest)
         return mean if self._residual is None else mean - self._residual
 
     def publish(self, light: PlannedLight, own: Float32[ndarray, "H W 3"], direct: Float32[ndarray, "H W 3"] | None = None) -> None:
-        """Write one light's answer as half floats, fireflies beyond them clipped, and said.
+        """Write one light's response as half floats, values beyond their range clipped with a warning.
 
-        With `direct` given that is taken from it and written beside it, first: a light whose image is there has both.
+        `direct`, where given, is subtracted from it and written first, to a file of its own: a light whose image exists has both.
         """
         if direct is not None:
             if not np.isfinite(direct).all():
                 raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
             direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
-            own = own - direct  # as the file has it, so that the two add up again
+            own = own - direct  # as stored, so that the two add up again
             write_image(self._folder / light.direct_file, direct, "half")
         beyond = int((np.abs(own) > HALF_MAX).sum())
         if beyond:
@@ -139,14 +141,14 @@ class CaptureImages:
         write_image(self._folder / light.file, own, "half")
 
     def checksum(self, light: PlannedLight, apart: bool) -> str:
-        """Of the light's images as they are on disk, empty where one is missing; `apart` where there are two."""
+        """Checksum of the light's images on disk, empty where one is missing; `apart`: there are two."""
         paths = [self._folder / name for name in (light.file, *([light.direct_file] if apart else []))]
         if not all(path.is_file() for path in paths):
             return ""
         return hashlib.sha256("".join(files.sha256_of(path) for path in paths).encode()).hexdigest()
 
     def published(self, light: PlannedLight, apart: bool) -> Float32[ndarray, "H W 3"]:
-        """All light of one that is published; of an indirect capture (`apart`), both its images together."""
+        """The published response to a light; of an indirect capture (`apart`), the sum of its two images."""
         image = read_image(self._folder / light.file, 3)
         return image + read_image(self._folder / light.direct_file, 3) if apart else image
 
@@ -165,12 +167,12 @@ class CaptureImages:
 
 
 def without_uv(facts: dict[str, Any]) -> dict[str, Any]:
-    """Facts of a scene without the long list of a made layer's coordinates."""
+    """Facts of a scene without the long list of UV coordinates of a layer that was made."""
     return {key: value for key, value in facts.items() if key not in ("uv", "event")}
 
 
 def uv_checksum(facts: dict[str, Any]) -> str | None:
-    """Of the layer that was made, where one was: every worker must make the same."""
+    """Checksum of the UV layer that was made, None without one: every worker must make the same."""
     return hashlib.sha256(json.dumps(facts["uv"]).encode()).hexdigest() if "uv" in facts else None
 
 

@@ -1,4 +1,4 @@
-"""One more pass of a light, taken into a capture: the sum grows, its mean is published, and last the sum says so."""
+"""One more pass of a light, added to a capture: its mean is published, then the running sum is written."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from srbf.bake.worker_pool import Response, Task
 
 
 def add_pass(images: CaptureImages, accumulation: Accumulation, task: Task, response: Response) -> Float32[ndarray, "H W 3"] | None:
-    """Add `answer` to the light of `task`; what the capture then holds of it but for the rounding.
+    """Add `response` to the light of `task`; returns the image that the capture then holds, before rounding.
 
-    None where the light is not at the pass that `task` adds to: it is rendered again from where it is. BakeError on NaN or another size.
+    None where the light is not at the pass that `task` adds to: it is then rendered from where it is. BakeError for NaN or another size.
     """
     light = task.light
     if accumulation.passes(light) != task.before:

@@ -1,4 +1,4 @@
-"""capture.json as a bake writes it: at the end of every pass, and the same whatever interrupted the bake."""
+"""capture.json as a bake writes it at the end of every pass; interruptions do not change it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ def capture_manifest(
     reached: int,
     curve: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    """The manifest of the lights that are there, each with its samples; `reached` by the train lights, `curve` of `--samples auto`."""
+    """The manifest (the keys of capture.schema.json) of the lights rendered so far.
+
+    identity: scene, scene_sha256 and settings of the bake. prepared: see `CaptureImages`. lights: (light, its samples so far).
+    reached: samples per texel of every train light, at least. curve: what `samples=auto` measured, see `stopping.record`.
+    """
     facts = prepared["facts"]
     receivers = facts["receivers"]
     source = {**identity, "settings": {**identity["settings"], "samples": reached}, "srbf": srbf.__version__, "blender": facts["blender"]}

@@ -1,4 +1,4 @@
-"""Baking a capture: pass by pass, every light's sum kept, the folder a valid capture from the first pass on."""
+"""Baking a capture pass by pass, with a running sum per light; the folder is a valid capture from the first pass on."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from srbf.io import files
 if TYPE_CHECKING:
     from srbf.bake.dask_workers import DaskWorkerPool
 
-CURVE = "curve.json"  # in the folder of sums: what --samples auto measured
+CURVE = "curve.json"  # in the accumulation folder: what `samples=auto` measured
 
 
 def require_scene(scene: Path) -> None:
@@ -46,7 +46,7 @@ def require_scene(scene: Path) -> None:
 
 @dataclass
 class Reporter:
-    """Where a bake tells of itself: progress in samples (done, total, what), and lines for the user."""
+    """Receives a bake's progress, in samples or seconds (done, total, text), and lines for the user."""
 
     progress: Callable[[float, float, str], None] = lambda done, total, what: None
     say: Callable[[str], None] = lambda line: None
@@ -72,7 +72,7 @@ class Bake:
 
     def __post_init__(self) -> None:
         if self.time_limit is not None and self.settings.denoise:
-            raise InputError("--denoise needs a given number of samples, found --time-limit; give --samples, or take --denoise off")
+            raise InputError("expected a fixed number of `samples` with `denoise`, found `time_limit`; leave one of them out")
 
     @property
     def is_open_ended(self) -> bool:
@@ -97,7 +97,7 @@ class Bake:
         identity = self._identity()
         existed = self.folder.exists()
         if shard is not None and self.is_open_ended:
-            raise InputError("--shard needs to know how much there is to do: expected --samples N, found --samples auto or --time-limit")
+            raise InputError("expected a fixed number of `samples` with `shard`, found `samples=auto` or `time_limit`")
         if shard is not None and not shard.is_preparation:
             return self._run_beside(shard, identity, reporter)
         with folder.hold(self.folder):
@@ -112,12 +112,12 @@ class Bake:
                 return True
             except KeyboardInterrupt:
                 if (self.folder / STATE).is_file():
-                    reporter.say(f"stopped; finished lights are kept, the same command goes on with {self.folder}")
+                    reporter.say(f"stopped; finished lights are kept, the same command resumes {self.folder}")
                 raise
             finally:
                 shutil.rmtree(self.folder / SCRATCH, ignore_errors=True)
                 if not (existed or (self.folder / STATE).exists() or (self.folder / MANIFEST).exists()):
-                    shutil.rmtree(self.folder, ignore_errors=True)  # Blender never came as far as the first image
+                    shutil.rmtree(self.folder, ignore_errors=True)  # Blender rendered nothing yet
 
     def _run_beside(self, shard: Shard, identity: dict[str, Any], reporter: Reporter) -> bool:
         with folder.hold_shard(self.folder, shard):
@@ -129,7 +129,7 @@ class Bake:
                 return True
             finally:
                 shutil.rmtree(self.folder / SCRATCH / shard.scratch, ignore_errors=True)
-                with suppress(OSError):  # other shards are in it
+                with suppress(OSError):  # other shards use it
                     (self.folder / SCRATCH).rmdir()
 
     def check_scene(self) -> None:
@@ -163,14 +163,14 @@ class _Passes:
         self._keep = bake.keeps_accumulation
         self._goal = 1 if self._auto else int(bake.settings.samples)
         self._first = FirstLights(judged, bake.settings.receiver.place, reporter.say)
-        self._settled = not self._auto  # how many samples the fitted lights get
+        self._settled = not self._auto  # whether the number of samples of the train lights is final
         self._curve: list[stopping.Measure] = []
         self._measured: dict[int, stopping.Measure] = {}  # by samples, in this run or before
         self._sampling: dict[str, Any] = {}
         self._transmittances: dict[str, Any] | None = None
         self._facts: dict[str, Any] | None = None
         self._failed: dict[int, str] = {}
-        self._told: set[str] = set()
+        self._said: set[str] = set()
         self._started = time.monotonic()
         self._mutex = threading.Lock()
 
@@ -180,14 +180,14 @@ class _Passes:
         with self._renderer() as pool, self._alarm(pool):
             if self._images.prepared is None:
                 if self._shard is not None and not self._shard.is_preparation:
-                    raise BakeError(f"expected {self._folder} prepared, found it damaged; run --shard prepare again")
+                    raise BakeError(f"expected {self._folder} prepared, found it damaged; run `shard=prepare` again")
                 self._reporter.progress(0, 1, "opening the scene")
                 pool.open()
                 assert self._facts is not None
                 self._images.prepare(self._facts, self._sampling, self._transmittances)
             else:
                 self._record(self._images.prepared["facts"]["blender"])
-            self._take_stock()
+            self._check_lights()
             try:
                 self._passes(pool)
             except KeyboardInterrupt:
@@ -214,40 +214,40 @@ class _Passes:
             elif self._settled:
                 return
             elif self._is_enough():
-                self._settled = True  # what is left is what the tested lights are still due
+                self._settled = True  # the validation and holdout lights may need more samples
             else:
                 self._goal *= 2
 
     def _finish(self) -> None:
         self._write_manifest()
         if self._bake.dask is not None:
-            folder.sweep(self._folder)  # after machines that died while they wrote
+            folder.sweep(self._folder)  # of machines that died while they wrote
         self._log(f"stopped after {time.monotonic() - self._started:.1f} s")
         if self._failed:
             index, reason = next(iter(self._failed.items()))
             raise BakeError(
                 f"{len(self._failed)} of {len(self._lights)} lights could not be rendered, among them light {index}: {reason}; "
-                f"the others are in {self._folder}, and the same command tries these again"
+                f"the others are in {self._folder}, and the same command tries the failed ones again"
             )
         if self._is_time_up() and (self._tasks() or not self._settled):
             reached = [self._accumulation.samples(light) for light in self._lights if light.role == "train"]
             self._reporter.say(
-                f"the time is up at {min(reached)} to {max(reached)} samples a texel; the same command adds more"
+                f"the time is up at {min(reached)} to {max(reached)} samples per texel; the same command adds more"
                 if any(reached)
-                else "the time was up before the first light was done; the same command goes on"
+                else "the time was up before the first light was done; the same command resumes the bake"
             )
             return
         if self._shard is not None:
             return
         if not self._first.lit and all(float(self._images.published(light, self._apart).max()) <= 0 for light in self._lights):
-            raise self._first.black(len(self._lights))  # other commands rendered it, too few lights each to tell
+            raise self._first.black(len(self._lights))  # rendered by shards of too few lights each to check
         if self._keep:
             (self._folder / STATE).unlink()
             return
         folder.tidy(self._folder)
 
-    def _take_stock(self) -> None:
-        """A light whose images are gone or damaged is written or begun anew; likewise one that has to grow and cannot."""
+    def _check_lights(self) -> None:
+        """Write lights with missing or damaged images again, or drop them; drop those that need more samples and cannot get them."""
         for light in self._lights:
             if self._accumulation.passes(light) == 0:
                 continue
@@ -263,13 +263,13 @@ class _Passes:
                 self._accumulation.forget(light)
         done = sum(self._accumulation.passes(light) > 0 for light in self._lights)
         if done:
-            self._reporter.say(f"going on: {done} of {len(self._lights)} lights are done")
+            self._reporter.say(f"resuming: {done} of {len(self._lights)} lights are done")
         path = self._folder / ACCUMULATION / CURVE
         if self._auto and path.is_file():
             self._measured = {entry["samples"]: stopping.Measure(**entry) for entry in files.read_json(path)["curve"]}
 
     def _tasks(self) -> list[Task]:
-        """The next pass: of the lights that have the fewest, what each is due."""
+        """The next pass: a task for each unfinished light of those with the fewest passes."""
         due = [
             light for light in self._order if self._accumulation.samples(light) < self._goal_of(light) and light.index not in self._failed
         ]
@@ -279,7 +279,7 @@ class _Passes:
 
     def _task(self, light: PlannedLight, level: int, first: int) -> Task:
         done, goal = self._accumulation.samples(light), self._goal_of(light)
-        denoise = self._settings.denoise and light.role == "train"  # of a whole image: its samples are one pass
+        denoise = self._settings.denoise and light.role == "train"  # a denoised image cannot be summed: one pass has all samples
         samples = goal - done if denoise else next_samples(light, done, goal, first)
         seed = noise_seed(self._settings.seed, light.index, level)
         keep = self._keep or done + samples < goal
@@ -296,28 +296,28 @@ class _Passes:
         except BakeError as error:
             if self._first.looking:
                 raise
-            self._reporter.say(f"{error}; the rest goes on")
+            self._reporter.say(f"{error}; the other lights are rendered")
             self._failed[light.index] = str(error)
             return
         if own is None:
             return
         with self._mutex:
             self._first.look(own)
-            self._tell_progress(task.before + 1)
+            self._report_progress(task.before + 1)
             self._log(f"light {light.index} pass {task.before + 1} of {task.samples} in {response.seconds:.3f} s")
 
     def _committed(self, task: Task, response: RemoteResult) -> ndarray:
-        """What another machine wrote, while the first lights are looked at."""
+        """The image that another machine wrote, while the first lights are checked; else an empty array."""
         if response.error is not None:
             raise BakeError(response.error)
         if not self._accumulation.refresh(task.light, task.before + 1, LATE):
             raise BakeError(
-                f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see one folder?"
+                f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see the same folder?"
             )
         return self._images.published(task.light, self._apart) if self._first.looking else np.empty(0)
 
     def _is_enough(self) -> bool:
-        """`--samples auto`: measure what this many samples gave, and whether the last doubling was still worth it."""
+        """For `samples=auto`: measure the error at this number of samples, and whether the last doubling lowered it enough."""
         measure = self._measured.get(self._goal)
         if measure is None:
             lights = [light for light in self._lights if light.role == "validation" and light.index not in self._failed]
@@ -325,8 +325,8 @@ class _Passes:
             self._measured[self._goal] = measure
             files.write_json(self._folder / ACCUMULATION / CURVE, {"curve": stopping.record(list(self._measured.values()))})
             self._reporter.say(
-                f"{self._goal} samples a texel: error {measure.relative_rmse:.4f} on the validation lights "
-                f"(their own noise of {measure.noise:.4f} taken off)"
+                f"{self._goal} samples per texel: error {measure.relative_rmse:.4f} on the validation lights "
+                f"(without their own noise of {measure.noise:.4f})"
             )
         self._curve.append(measure)
         return stopping.is_enough(self._curve)
@@ -344,7 +344,7 @@ class _Passes:
         return self._keep or self._goal_of(light) > FIRST_SAMPLES
 
     def _write_manifest(self) -> None:
-        """The folder as it stands becomes a valid capture, once a fitted light is there. Not by a shard, which knows only its own."""
+        """Make the folder a valid capture, once a train light is there. Shards do not: each knows only its own lights."""
         if self._shard is not None:
             return
         lights = [(light, self._accumulation.samples(light)) for light in self._lights if self._accumulation.passes(light)]
@@ -355,11 +355,11 @@ class _Passes:
             files.write_json(self._folder / MANIFEST, manifest)
 
     def _record(self, blender: str) -> None:
-        """From here on the folder is a bake begun. Another Blender would not give the same bits."""
+        """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""
         path = self._folder / STATE
         began = files.read_json(path).get("blender", blender) if path.is_file() else blender
         if began != blender:
-            raise BakeError(f"expected Blender {began}, which began {self._folder}, found {blender}; use it, or add --restart")
+            raise BakeError(f"expected Blender {began}, which began {self._folder}, found {blender}; use it, or bake with `restart=True`")
         files.write_json(path, {**self._identity, "blender": blender})
 
     def _start(self, scratch: Path) -> Worker:
@@ -368,13 +368,13 @@ class _Passes:
 
     def _say_once(self, line: str) -> None:
         with self._mutex:
-            if line in self._told:
+            if line in self._said:
                 return
-            self._told.add(line)
+            self._said.add(line)
         self._reporter.say(line)
 
     def _ready(self, event: dict[str, Any], scratch: Path) -> None:
-        """What a worker tells before it serves: the first one the receiver and its geometry, every other one the same scene."""
+        """Events of a worker before it serves: the first worker sends the receiver's images, every other must have the same receiver."""
         kind, prepared = event["event"], self._images.prepared
         if kind == "warning":
             self._say_once(event["message"])
@@ -394,7 +394,7 @@ class _Passes:
 
     @contextmanager
     def _alarm(self, pool: Renderer) -> Iterator[None]:
-        """Stop the pool when the time is up."""
+        """Stop the workers when the time is up."""
         timer = None
         if self._bake.time_limit is not None:
             timer = threading.Timer(max(0.0, self._bake.time_limit - (time.monotonic() - self._started)), pool.stop)
@@ -409,7 +409,7 @@ class _Passes:
     def _is_time_up(self) -> bool:
         return self._bake.time_limit is not None and time.monotonic() - self._started >= self._bake.time_limit
 
-    def _tell_progress(self, sampling_pass: int) -> None:
+    def _report_progress(self, sampling_pass: int) -> None:
         if self._bake.time_limit is not None:
             done, total = min(time.monotonic() - self._started, self._bake.time_limit), self._bake.time_limit
         else:

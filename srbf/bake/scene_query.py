@@ -18,7 +18,7 @@ from srbf.capture import MANIFEST
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 
-MULTIPLE = 4  # of texels, that a side found by density is rounded up to: what block compression needs
+MULTIPLE = 4  # texels that a side computed from a density is rounded up to: block compression needs it
 
 
 def ask_scene(
@@ -63,46 +63,46 @@ def _ask(bake: Bake, question: dict[str, Any], say: Callable[[str], None]) -> di
 
 
 def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[str], None] = lambda line: None) -> Bake:
-    """The same bake with the size that its receiver takes: of a list of vertices, or of a lightmap of a mean density.
+    """The bake with the size of its receiver: of a list of vertices, or of a lightmap of `texels_per_meter`; others are unchanged.
 
-    The square's side is D sqrt(area in the world / area of the UV layer), rounded up to a multiple of 4; InputError where that is past
-    16384, with the density to take. A bake that needs neither is returned as it is.
+    A lightmap is square, its side D sqrt(area in the world / area of the UV layer) rounded up to a multiple of 4; InputError where that
+    is above 16384, with a density to use instead.
     """
     if bake.settings.receiver.kind == "vertices":
         if texels_per_meter is not None:
-            raise InputError("--texels-per-meter belongs to a lightmap, found it with vertices")
+            raise InputError("expected `texels_per_meter` with a lightmap, found it with vertices")
         facts = _ask(bake, {"vertices": bake.settings.receiver.job()}, say)
         return _sized(bake, facts["width"], facts["height"])
     if texels_per_meter is None:
         return bake
     if bake.settings.receiver.kind != "lightmap":
-        raise InputError("--texels-per-meter belongs to a lightmap, found it with a view; give its --size")
+        raise InputError("expected `texels_per_meter` with a lightmap, found it with a view; give its `size`")
     if not (texels_per_meter > 0 and math.isfinite(texels_per_meter)):
-        raise InputError(f"expected --texels-per-meter above 0, found {texels_per_meter:g}")
+        raise InputError(f"expected `texels_per_meter` above 0, found {texels_per_meter:g}")
     facts = _ask(bake, {"texels_per_meter": texels_per_meter, "receiver": bake.settings.receiver.job()}, say)
     side = MULTIPLE * math.ceil(facts["side"] / MULTIPLE)
     if side > LARGEST_SIDE:
         most = math.floor(LARGEST_SIDE * math.sqrt(facts["uv_area"] / facts["world_area"]) * 100) / 100
         raise InputError(
-            f"expected a lightmap of at most {LARGEST_SIDE} texels a side, found {side} at {texels_per_meter:g} texels a meter on "
-            f"{facts['world_area']:.4g} square meters; take --texels-per-meter {most:g} or less, or --separate lightmaps"
+            f"expected a lightmap of at most {LARGEST_SIDE} texels per side, found {side} at {texels_per_meter:g} texels per meter on "
+            f"{facts['world_area']:.4g} square meters; use `texels_per_meter={most:g}` or less, or `separate` lightmaps"
         )
-    say(f"{side}x{side} texels: {texels_per_meter:g} a meter on {facts['world_area']:.4g} square meters, UVs fill {facts['uv_area']:.0%}")
+    say(f"{side}x{side} texels: {texels_per_meter:g} per meter on {facts['world_area']:.4g} square meters, UVs fill {facts['uv_area']:.0%}")
     return _sized(bake, side, side)
 
 
-def with_frame(bake: Bake, longer: int, anew: bool, say: Callable[[str], None] = lambda line: None) -> Bake:
-    """The same bake of a view in the shape of its camera's frame, in square pixels, `longer` on the longer side.
+def with_frame(bake: Bake, longer: int, replacing: bool, say: Callable[[str], None] = lambda line: None) -> Bake:
+    """The bake of a view in the shape of its camera's frame, in square pixels, `longer` on the longer side.
 
-    A capture that its folder holds already keeps its size, unless it is to be made `anew`.
+    A capture that its folder holds keeps its size, unless it is to be replaced (`replacing`).
     """
-    before = None if anew else size_of_begun(bake.folder)
+    before = None if replacing else size_of_begun(bake.folder)
     if before is not None:
         return _sized(bake, *before)
     found = _ask(bake, {"frame": True}, say)["frame"]
     aspect = float(found["aspect"])
     width, height = (longer, max(1, round(longer / aspect))) if aspect >= 1 else (max(1, round(longer * aspect)), longer)
-    say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; --size WxH gives another")
+    say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; `size` gives another")
     return _sized(bake, width, height)
 
 
@@ -118,7 +118,7 @@ def size_of_begun(folder: Path) -> tuple[int, int] | None:
 
 
 def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line: None) -> Bake:
-    """The same bake with the lamps that are free in its scene, where it is one under point lights whose places are not known yet."""
+    """The bake with the positions of its point lights, free places of its scene; unchanged where they are known, or it has none."""
     settings, points = bake.settings, bake.settings.points
     if points is None or points.grid is not None:
         return bake
@@ -129,7 +129,7 @@ def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line:
     grid, free = (tuple((x, y, z) for x, y, z in found[key]) for key in ("grid", "random"))
     say(
         f"{len(grid)} point lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
-        f"{found['skipped']} places in or at geometry are left out"
+        f"{found['skipped']} places inside or near geometry are left out"
     )
     known = replace(points, box=(x0, y0, z0, x1, y1, z1), grid=grid, random=free)
     return replace(bake, settings=replace(settings, points=known))

@@ -47,8 +47,8 @@ def test_words_of_a_light_set() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"sun_angle": 0.1}, "--sun-angle"),
-        ({"light_list": Path("l.lp")}, "--light-list"),
+        ({"sun_angle": 0.1}, "`sun_angle`"),
+        ({"light_list": Path("l.lp")}, "`light_list`"),
         ({"transport": "indirect"}, "combined"),
         ({"samples": "auto"}, "auto"),
     ],
@@ -69,7 +69,7 @@ def test_planned_point_lights_have_their_roles_and_places() -> None:
     assert "lights" not in record and record["points"]["spacing"] == 1 and record["points"]["box"] == list(BOX)
     moved = settings_with(PointGrid(1.0, BOX, ((0, 0, 1.5), (1, 0, 1)), points.random))
     assert moved.record()["points"]["positions"] != record["points"]["positions"]
-    with pytest.raises(InputError, match="survey"):
+    with pytest.raises(InputError, match="with_free_point_lights"):
         plan_lights(settings_with(PointGrid(1.0)))
     with pytest.raises(InputError, match="point lights"):
         settings.with_matched_sun()
