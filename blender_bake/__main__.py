@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`python -m blender_bake JOB.json`, or `blender --background --python blender_bake/__main__.py -- JOB.json`.
 
-The job has the scene, the receiver and what is wanted of them; see `run`. Events go out as JSON lines:
+The job has the scene, the receiver and what to render or report; see `run`. Events go out as JSON lines:
 scene, warning, image (name, file, seconds), file, ready, rendered (light, files, seconds), facts, mesh, error, done.
 """
 
@@ -33,7 +33,7 @@ def main() -> None:
     except WorkerError as error:
         events.emit("error", message=str(error))
         leave(1)
-    except Exception as error:  # the one place where anything unforeseen becomes an event instead of a silent death
+    except Exception as error:  # reported as an event, so that the process does not end silently
         traceback.print_exc()
         events.emit("error", message=f"Blender's worker failed: {type(error).__name__}: {error}".replace("\n", " "))
         leave(1)
@@ -51,7 +51,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     channels: names of the receiver's images to send first (see `channels`);
     ambient: a request without a light, or null; rendered only where the scene may emit;
     requests, serve: requests (see `RenderRequest`) in the job, and whether more come on stdin;
-    transmittances, probes: where `transport` is indirect, what walls of translucent materials let through, by name; if null, fitted under
+    transmittances, probes: where `transport` is indirect, the transmittances of translucent materials, by name; if null, fitted under
     the lights `probes`, and sent with the scene's triangles.
     """
     from blender_bake import emission, no_shadow, scene_file, scene_mesh, scene_query, translucency, without_triangles
@@ -81,7 +81,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     if apart:
         scene_file.show_as_rendered(scene)
     receiver = kind(scene, job, events)
-    for line in left_out:  # of a receiver that is there
+    for line in left_out:  # only where the receiver exists
         events.warn(line)
     events.emit("scene", blender=scenes.version(), receivers=receiver.descriptions(), **receiver.facts())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The channels and masks of a receiver, by name: what of them a job asks for."""
+"""The channels and masks of a receiver, by name."""
 
 from __future__ import annotations
 

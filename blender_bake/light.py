@@ -18,7 +18,7 @@ class SoleLight:
     def __init__(self, scene: bpy.types.Scene, sun_angle: float, by_shadow_rays_alone: bool = False) -> None:
         self._sun = _point_light(scene, "SUN")
         self._sun.data.angle = sun_angle
-        if by_shadow_rays_alone:  # bounced rays may not reach it, and must then not be counted on
+        if by_shadow_rays_alone:  # bounced rays may not reach it
             self._sun.data.cycles.use_multiple_importance_sampling = False
         self._point = _point_light(scene, "POINT")
         self._point.data.shadow_soft_size = 0.0

@@ -17,7 +17,7 @@ from blender_bake.request import RenderRequest
 from blender_bake.seam_edges import seam_edges
 from blender_bake.translucency import Switch, switched
 
-NOT_DIFFUSE = 1e-3  # an albedo below this everywhere on a slot leaves Cycles nothing to divide irradiance by
+NOT_DIFFUSE = 1e-3  # albedo below which a slot is not diffuse: Cycles divides irradiance by it
 NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
 
 
@@ -47,7 +47,9 @@ class LightmapReceiver:
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
-        self._owner = np.zeros((self._height, self._width), np.int32)  # which object a covered texel belongs to: the last to take it
+        self._owner = np.zeros(
+            (self._height, self._width), np.int32
+        )  # which object a covered texel belongs to: the last one that covers it
         self._albedo = np.zeros((self._height, self._width, 4), np.float32)
         for i, obj in enumerate(self._objects):
             self._take_texels(i, obj)
@@ -59,11 +61,11 @@ class LightmapReceiver:
             self._whiten_what_is_not_diffuse()
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of each object."""
+        """The manifest's entry of each object."""
         return [{"kind": "lightmap", "object": name, "uv_layer": layer} for name, layer in self._layers.items()]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log; where layers were made, their names and coordinates per loop, to carry into one's own scene."""
+        """For dry run and log; where layers were made, their names and coordinates per loop, so that users can copy them into the scene."""
         facts: dict[str, Any] = {
             "polygons": sum(len(obj.data.polygons) for obj in self._objects),
             "covered_texels": int((self._coverage > 0).sum()),
@@ -78,7 +80,7 @@ class LightmapReceiver:
         return facts
 
     def sampling(self) -> dict[str, Any]:
-        """The side of the square within a texel that its samples spread over."""
+        """`footprint`: side of the square within a texel that its samples are spread over, texels."""
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
     def channels(self, names: list[str]) -> dict[str, np.ndarray]:
@@ -147,7 +149,7 @@ class LightmapReceiver:
             result = bpy.ops.object.bake(
                 type=kind,
                 margin=0,
-                use_clear=True,  # of several objects Blender clears none: what no object covers stays as its last bake alone left it
+                use_clear=True,  # of several objects Blender clears none: uncovered texels keep the values of its last bake alone
                 target="IMAGE_TEXTURES",
                 save_mode="INTERNAL",
                 use_selected_to_active=False,

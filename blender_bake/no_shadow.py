@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that light passes as if they were not there, while all else of the scene still sees them: a closed room's ceiling."""
+"""Objects that cast no shadow but are otherwise visible to the scene, such as a closed room's ceiling."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from blender_bake.ipc import WorkerError
 
 
 def let_light_through(scene: bpy.types.Scene, names: list[str]) -> None:
-    """Hide the objects `names` from shadow rays, and from nothing else; WorkerError names what there is.
+    """Hide the objects `names` from shadow rays alone; WorkerError, naming those there are, for an unknown one.
 
     Shadow rays start at every bounce, so direct and indirect light both enter. The object still reflects: camera, diffuse and glossy
     rays meet it, so a white ceiling reflects the light of the floor, and it is lit as before. The name of an empty that shows a
@@ -24,7 +24,7 @@ def let_light_through(scene: bpy.types.Scene, names: list[str]) -> None:
             shown = sorted(o.name for o in scene.objects if o.type in {"MESH", "EMPTY", "CURVE", "SURFACE", "FONT", "META"})
             listed = ", ".join(repr(n) for n in shown[:12]) + (", …" if len(shown) > 12 else "")
             raise WorkerError(
-                f"expected an object {name!r} for --no-shadow, found none in scene {scene.name!r}; there are {listed}"
+                f"expected an object {name!r} for `no_shadow`, found none in scene {scene.name!r}; there are {listed}"
                 f"{elsewhere.hint(scene, name)}"
             )
         shows = obj.type == "EMPTY" and obj.instance_collection is not None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A material as a physically based surface, read from its nodes: what of them the camera sees, in glTF's terms."""
+"""A physically based material in glTF's terms, read from the nodes of a Blender material as the camera sees it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
 
 @dataclass(frozen=True)
 class PbrMaterial:
-    """One surface: colors linear Rec.709, roughness as Blender and glTF have it (the square root of the microfacets' width).
+    """A material with constant parameters: colors linear Rec.709, roughness as in Blender and glTF (square root of the microfacets' width).
 
-    `specular` scales the reflection of what is no metal, 0 to 1. `inside` is what light takes on on its way through a solid body, beside
-    the base color: a Glass BSDF tints it at both walls. `emission` is radiance. `varies`: the base color is but a guess at a network of
-    textures, which only a bake of the diffuse albedo tells at each point.
+    specular: scale of a dielectric's reflection, 0 to 1. inside: attenuation color of light through a solid body, besides the base color,
+    which a Glass BSDF applies at both walls. emission: radiance. varies: the base color is a guess at a network of textures; a bake of
+    the diffuse albedo has its value at each point.
     """
 
     name: str
@@ -40,7 +40,7 @@ class PbrMaterial:
 
     @property
     def is_diffuse(self) -> bool:
-        """Whether it has an albedo that a bake can tell."""
+        """Whether it has an albedo that can be baked."""
         return self.metallic < 0.5 and self.transmission < 0.5
 
     def record(self) -> dict[str, Any]:
@@ -49,10 +49,10 @@ class PbrMaterial:
 
 
 def pbr_material_of(material: bpy.types.Material | None) -> PbrMaterial:
-    """The surface of a slot's material; of several mixed BSDFs that of the one with the largest share, the first where they share alike.
+    """The material of a slot; of several mixed BSDFs the one with the largest share, the first of equal ones.
 
-    A share that varies over the surface counts as one half. What is transparent beside it becomes alpha, what is so all through a pane of
-    IOR 1. Mixed with light by the path of the ray, what a camera's ray meets.
+    A share that varies over the surface counts as one half. A transparent BSDF beside it becomes alpha; alone, it becomes a pane of
+    IOR 1. Mixes by light path are those of a camera ray.
     """
     if material is None:
         return PbrMaterial("(none)", specular=0.0)
@@ -85,7 +85,7 @@ def pbr_material_of(material: bpy.types.Material | None) -> PbrMaterial:
 
 @dataclass(frozen=True)
 class _Share:
-    """A BSDF or emission (its output), how much of the surface it is, and whether that is the same all over."""
+    """A BSDF or emission (its output), its share of the surface, and whether that is constant."""
 
     weight: float
     known: bool
@@ -146,7 +146,7 @@ def _of_shader(name: str, shader: Place) -> PbrMaterial:
 
 
 def _alpha(place: Place | None) -> float:
-    """1 where it varies: a glTF factor cannot cut out."""
+    """The alpha; 1 where it varies, since a glTF factor is constant."""
     found = value(place)
     return 1.0 if found is None else float(found.mean())
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far from the origin single precision, in which Cycles traces rays, still tells texels apart."""
+"""Distance from the origin at which single precision, in which Cycles traces rays, no longer resolves texels."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ FINE_ENOUGH = 1 / 8  # step of single precision over texel: past it, shadows of 
 
 
 def warn_of_objects(objects: list[bpy.types.Object], receivers: int, what: str, events: Events) -> None:
-    """Say so where single precision is too coarse for so many `receivers` (texels, vertices: `what`) on the meshes `objects`."""
+    """Warn where single precision is too coarse for so many `receivers` (texels, vertices: `what`) on the meshes `objects`."""
     pitch = math.sqrt(sum(world_area(obj) for obj in objects) / max(1, receivers))
     warn(max(_reach(obj) for obj in objects), pitch, what, events)
 
 
 def warn_of_pixels(position: np.ndarray, hit: np.ndarray, events: Events) -> None:
-    """The same of a view's world positions (H, W, 3), where `hit` (H, W, 1) is not 0."""
+    """The same for a view's world positions (H, W, 3), where `hit` (H, W, 1) is not 0."""
     seen = hit[:, :, 0] > 0
     both = seen[:, 1:] & seen[:, :-1]
     if both.any():

@@ -27,7 +27,7 @@ def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
 
     mesh.receivers: those of a capture, {object, uv_layer, per_loop: a file of (loops, 2) coordinates where the bake made the layer}
     parts: {object, material (index), file, columns: [[name, width], ...]}: float32 rows of every corner, three per triangle; columns are
-        position, normal, uv (of the layer that renders), lightmap (a receiver's), color (baked albedo), of which the last three may lack
+        position, normal, uv (of the layer that renders), lightmap (a receiver's), color (baked albedo), the last three optional
     materials: see `PbrMaterial.record`
     camera: {name, pose (4 x 4, rows), ...} or null, see `_camera`
     Objects that the camera cannot see are left out, unless they are receivers.
@@ -115,7 +115,7 @@ def _of_mesh(shown: scene_file.Shown, mesh: bpy.types.Mesh, lightmap: np.ndarray
     if lightmap is not None:
         columns["lightmap"] = lightmap[corners.loops]
     order = np.arange(len(corners.loops)).reshape(-1, 3)
-    if np.linalg.det(shown.matrix[:3, :3]) < 0:  # a mirror turns the triangles over
+    if np.linalg.det(shown.matrix[:3, :3]) < 0:  # a mirror flips the triangles
         order = order[:, ::-1]
     sound = np.isfinite(corners.places).all(axis=1).reshape(-1, 3).all(axis=1)
     materials = _materials(shown.object, mesh)

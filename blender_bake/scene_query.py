@@ -13,11 +13,11 @@ from blender_bake.frame import Frame
 from blender_bake.ipc import Events
 from blender_bake.receiver_objects import meshes_of, prepare, world_area
 
-ROUNDS = 4  # a layer's gutter shrinks as its size grows: so often is one laid out for the size that the one before it asked for
+ROUNDS = 4  # of laying out a layer for the size that the one before needs: its gutter shrinks as the size grows
 
 
 def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, frame: Frame) -> dict[str, Any]:
-    """The facts that `question` asks for, each of its keys for itself.
+    """The facts for `question`, which may have several of these keys.
 
     collections: names            -> `objects`: the receivers in them, in order of name
     vertices: receiver            -> `width`, `height`: of the image that lists the receiver's vertices

@@ -15,7 +15,7 @@ ATTRIBUTE = "srbf albedo"
 class AlbedoBakes:
     """Copies of evaluated objects, gathered while the scene is read and then baked together.
 
-    Textures that go by the object's coordinates see its pose, generated ones the bounds of its mesh as its modifiers leave it.
+    Textures in object coordinates use its transform, generated ones the bounds of its mesh after modifiers.
     """
 
     def __init__(self) -> None:

@@ -18,7 +18,7 @@ from blender_bake.translucency import Switch
 
 NOT_DIFFUSE = 1e-3
 ATTRIBUTE = "srbf bake"
-ROW = 1024  # points a row of the images, at most
+ROW = 1024  # points per row of the images, at most
 
 
 def image_size(count: int) -> tuple[int, int]:
@@ -30,9 +30,9 @@ def image_size(count: int) -> tuple[int, int]:
 class VertexReceiver:
     """The vertices of one mesh object, its modifiers applied, in vertex order along the rows; arrays are (H, W, C) float32.
 
-    Cycles answers at every corner of every face, just inside it; a vertex takes the mean of its corners, each by its angle, as its normal
-    does: it does not depend on how its faces are divided. Corners with nothing diffuse do not count towards irradiance. A vertex
-    without a face, and what fills up the last row, has coverage 0.
+    Cycles bakes every corner of every face, just inside it; a vertex has the mean of its corners weighted by their angles, as its normal
+    does, which does not depend on how its faces are divided. Corners with nothing diffuse do not count towards irradiance. Vertices
+    without a face, and the padding of the last row, have coverage 0.
     """
 
     kind = "vertices"
@@ -74,11 +74,11 @@ class VertexReceiver:
             self._whiten_what_is_not_diffuse(albedo)
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of this receiver."""
+        """The manifest's entry of this receiver."""
         return [{"kind": "vertices", "object": self._object.name, "count": self._count}]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log."""
+        """For dry run and log."""
         return {"polygons": len(self._object.data.polygons), "vertices": self._count}
 
     def sampling(self) -> dict[str, Any]:

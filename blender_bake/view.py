@@ -49,11 +49,11 @@ class ViewReceiver:
             self._whiten_if_nothing_is_diffuse(events)
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of this receiver."""
+        """The manifest's entry of this receiver."""
         return [{"kind": "view", "camera": self._camera.name}]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run, the log and depth-based shaders: the camera's kind and pose."""
+        """For dry run, log and depth-based shaders: the camera's kind and pose."""
         data = self._camera.data
         return {
             "camera": {
@@ -67,7 +67,7 @@ class ViewReceiver:
         }
 
     def sampling(self) -> dict[str, Any]:
-        """How a pixel looks at the scene, where rays of others can do the same: not through a lens, nor a panorama."""
+        """`camera`: what rays need to sample the pixels as Cycles does; empty for depth of field and panoramas."""
         data = self._camera.data
         if data.type not in {"PERSP", "ORTHO"} or data.dof.use_dof:
             return {}
@@ -136,7 +136,7 @@ class ViewReceiver:
     def response(self, samples: int, seed: int) -> np.ndarray:
         """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without color).
 
-        Coverage and color are of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
+        Divided by coverage and color of many samples: by its own few, a pixel that they all miss would be dark, and so would the mean.
         """
         passes = self._last = self._render(samples, seed, LIGHT_PASSES)
         if self._irradiance:
@@ -146,7 +146,7 @@ class ViewReceiver:
     def denoised(self, image: np.ndarray) -> np.ndarray:
         """An image in the units of `response` without its noise, by OpenImageDenoise: biased, so never to be summed.
 
-        Guided by the albedo and normal channels; what no sample of these met stays 0.
+        Guided by the albedo and normal channels; pixels without coverage stay 0.
         """
         if self._denoiser is None:
             self._denoiser = Denoiser(self._scratch, self._albedo(), self._at_centers()["normal"])
@@ -227,7 +227,7 @@ class ViewReceiver:
 
 
 def find_camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
-    """The camera named, or the scene's own; WorkerError says what there is."""
+    """The camera `name`, or the scene's own; WorkerError, naming those there are, where there is none."""
     cameras = sorted(o.name for o in scene.objects if o.type == "CAMERA")
     shown = ", ".join(repr(n) for n in cameras) or "none"
     if name is None:

@@ -129,7 +129,7 @@ def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line:
     grid, free = (tuple((x, y, z) for x, y, z in found[key]) for key in ("grid", "random"))
     say(
         f"{len(grid)} point lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
-        f"{found['skipped']} places inside or near geometry are left out"
+        f"{found['skipped']} places in or near geometry are left out"
     )
     known = replace(points, box=(x0, y0, z0, x1, y1, z1), grid=grid, random=free)
     return replace(bake, settings=replace(settings, points=known))

@@ -142,7 +142,7 @@ def test_what_hides_a_receiver_is_named(made, tmp_path: Path, name: str, words: 
 
 
 def test_equal_bakes_are_equal_to_the_bit(made, tmp_path: Path) -> None:
-    """With hair, particles and instances too: every worker sets them apart anew."""
+    """With hair, particles and instances too: every worker sets them apart again."""
     for name in ("hair", "node_curves_and_instances"):
         first, second = (bake(made(name), tmp_path / f"{name} {i}", samples=2).capture.folder for i in range(2))
         for path in [*sorted(first.rglob("*.exr")), first / "capture.json"]:

@@ -49,7 +49,7 @@ def test_images_that_light_does_not_change_end_the_bake() -> None:
         first.look(GRAY)
 
 
-def test_a_plane_is_constant_under_each_light_and_answers_all_the_same() -> None:
+def test_a_plane_is_constant_under_each_light_and_yet_responds() -> None:
     first, said = looking(400)
     for i in range(FIRST_LIGHTS):
         first.look(GRAY * np.float32(i + 1))
@@ -62,9 +62,9 @@ def test_a_few_black_lights_are_all_there_is() -> None:
     first.look(BLACK)
     with pytest.raises(BakeError, match="all 3 light images"):
         first.look(BLACK)
-    alike, _ = looking(3)
+    uniform, _ = looking(3)
     for _ in range(3):
-        alike.look(GRAY)  # too few to tell
+        uniform.look(GRAY)  # too few to tell
 
 
 @pytest.mark.parametrize(

@@ -38,7 +38,7 @@ def as_before(folder: Path) -> None:
     prepared = {
         "facts": stored["facts"],
         "sampling": stored["sampling"],
-        "tints": stored["transmittances"],
+        "tints": stored["transmittances"],  # words: ok
         "ambient": "ambient" in stored["channels"],
         "seams": stored["seams"],
         "uv": stored["uv"],

@@ -25,7 +25,7 @@ from srbf.io.image import write_image
 pytestmark = pytest.mark.blender
 
 SETTINGS = ["--size", "24", "--lights", "60", "--samples", "40", "--validation", "1", "--holdout", "1", "--holdout-samples", "8"]
-SETTINGS += ["--sun-angle", "auto"]  # a number that is worked out anew by every run
+SETTINGS += ["--sun-angle", "auto"]  # a number that is computed again by every run
 
 
 def command(scene: Path, folder: Path) -> list[str]:

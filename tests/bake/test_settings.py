@@ -1,4 +1,4 @@
-"""What is planned before Blender starts: a sun as large as the lights stand apart."""
+"""What is planned before Blender starts: a sun as wide as the light spacing."""
 
 from __future__ import annotations
 
