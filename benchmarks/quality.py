@@ -144,9 +144,9 @@ def in_memory(capture: Capture, most: int | None = None) -> tuple[Capture, str]:
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     most = min(most or len(covered), max(1, KEPT_BYTES // (12 * len(capture.lights))))
     if len(covered) <= most:
-        return capture.kept(covered), f"{len(covered)} texels"
+        return capture.load(covered), f"{len(covered)} texels"
     chosen = np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
-    return capture.kept(chosen), f"{most} of {len(covered)} texels"
+    return capture.load(chosen), f"{most} of {len(covered)} texels"
 
 
 def peak_of(capture: Capture) -> float:

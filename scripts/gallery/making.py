@@ -123,7 +123,7 @@ def _evaluate(places: Places, fit: Fit) -> None:
 def _compare(places: Places) -> None:
     """Methods by bytes on a sample of the texels under all light; the peak is that of the first fit's evaluation, which all share."""
     capture = Capture.open(places.capture).combined()
-    sample = capture.kept(sampled_texels(capture.coverage() >= COVERED, places.scene.contest_texels))
+    sample = capture.load(sampled_texels(capture.coverage() >= COVERED, places.scene.contest_texels))
     peak = files.read_json(places.errors(places.scene.fits[0]))["holdout"]["peak"]
     methods = [*compared_methods(), PTM] if places.scene.dome else list(compared_methods())
     files.write_json(places.scores, {"scores": [asdict(score) for score in contest(sample, methods, "holdout", peak)]})

@@ -10,11 +10,11 @@ import typer
 
 from srbf.bake.estimate import estimate
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
-from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
+from srbf.bake.scene_query import objects_of, with_frame, with_free_point_lights, with_size
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import objects_of, with_frame, with_free_point_lights, with_size
+from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import WorkerPoolSettings
 from srbf.cli.parameters import Blender, Dask, Force, Output, parse_duration, parse_samples, parse_size, parse_sun_angle
 from srbf.cli.terminal import json_progress_lines, note, progress_bar
@@ -63,9 +63,13 @@ def bake(
     ] = "hemisphere",
     samples: Annotated[
         str | None,
-        typer.Option(help="Samples a texel of each fitted light; auto: until more no longer help. Default 2, with --time all it allows."),
+        typer.Option(
+            help="Samples a texel of each fitted light; auto: until more no longer help. Default 2, with --time-limit all it allows."
+        ),
     ] = None,
-    time: Annotated[str | None, typer.Option(help="Stop when so much time is up: 90s, 30m, 8h. The same command adds more.")] = None,
+    time: Annotated[
+        str | None, typer.Option("--time-limit", help="Stop when so much time is up: 90s, 30m, 8h. The same command adds more.")
+    ] = None,
     validation: Annotated[int, typer.Option(help="Random lights that decisions may look at.")] = 16,
     holdout: Annotated[int, typer.Option(help="Random lights for the reported error alone.")] = 32,
     holdout_samples: Annotated[int, typer.Option(help="Samples a texel of validation, holdout and ambient.")] = 64,
@@ -99,12 +103,15 @@ def bake(
         float | None,
         typer.Option(help="Seconds after which a silent Blender is replaced; default: learned from the lights before.", show_default=False),
     ] = None,
-    keep_sums: Annotated[bool, typer.Option("--keep-sums", help="Keep what --samples N can later add to; --time and auto do.")] = False,
+    keep_accumulation: Annotated[
+        bool, typer.Option("--keep-accumulation", help="Keep what --samples N can later add to; --time-limit and auto do.")
+    ] = False,
     dask: Dask = None,
     part: Annotated[
         str | None,
         typer.Option(
-            help="Bake all passes of the I-th of N parts alone, I/N, once `prepare` has been; a bake without it then finishes.",
+            "--shard",
+            help="Bake all passes of the I-th of N shards alone, I/N, once `prepare` has been; a bake without it then finishes.",
             show_default=False,
         ),
     ] = None,
@@ -156,11 +163,11 @@ def bake(
             scene=scene_name,
         )
         settings = settings.with_matched_sun() if angle == "auto" else settings
-        return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_sums, dask)
+        return Bake(scene, folder, settings, blender, crew, None if time is None else parse_duration(time), keep_accumulation, dask)
 
     if collection:
         known = {one.name for one in named if one.kind == "lightmap"}
-        inside = objects_of(plan(Receiver("view"), output), collection, note)
+        inside = objects_of(scene, collection, note, scene_name, blender)
         named += [Receiver("lightmap", name, uv_layer, unwrap=unwrap) for name in inside if name not in known]
     captures = captures_of(named, separate)
     several = len(captures) > 1 or separate
@@ -183,20 +190,20 @@ def bake(
                 typer.echo(line)
             continue
         with json_progress_lines() if json_progress else progress_bar("bake") as update:
-            baked = job.run(Reporter(update, note), force, restart, None if part is None else Part.parse(part))
-        what = {None: "baked", "prepare": "prepared"}.get(part, f"baked part {part} of")
+            baked = job.run(Reporter(update, note), force, restart, None if part is None else Shard.parse(part))
+        what = {None: "baked", "prepare": "prepared"}.get(part, f"baked shard {part} of")
         note(f"{what} {job.folder}" if baked else f"{job.folder} is complete already")
 
 
 def _check_spread(job: Bake, part: str | None, farm: str | None, anew: bool) -> None:
     """InputError where ways to spread the work exclude each other."""
-    given = [name for name, value in (("--dask", job.dask), ("--part", part), ("--farm", farm)) if value is not None]
+    given = [name for name, value in (("--dask", job.dask), ("--shard", part), ("--farm", farm)) if value is not None]
     if len(given) > 1:
         raise InputError(f"expected one way to spread the work, found {' and '.join(given)}; leave one")
-    if job.dask is not None and job.crew.workers > 1:
+    if job.dask is not None and job.pool.workers > 1:
         raise InputError("--workers counts Blenders of this machine, found it with --dask; start as many dask workers instead")
     if part not in (None, "prepare") and anew:
-        raise InputError("--force and --restart would drop what other parts baked; give them with --part prepare")
+        raise InputError("--force and --restart would drop what other shards baked; give them with --shard prepare")
 
 
 def _samples(text: str | None, time: str | None) -> int | Literal["auto"]:

@@ -58,7 +58,7 @@ def parse_duration(text: str) -> float:
     found = re.fullmatch(r"(?:(\d+(?:\.\d+)?)h)?(?:(\d+(?:\.\d+)?)m)?(?:(\d+(?:\.\d+)?)s?)?", text.strip())
     seconds = sum(float(n or 0) * unit for n, unit in zip(found.groups(), (3600, 60, 1), strict=True)) if found else 0.0
     if seconds <= 0:
-        raise InputError(f"expected --time as 90s, 30m or 8h, found {text!r}")
+        raise InputError(f"expected --time-limit as 90s, 30m or 8h, found {text!r}")
     return seconds
 
 

@@ -23,8 +23,11 @@ STDERR = Console(stderr=True, highlight=False, soft_wrap=True)
 FORMER_FLAGS = {  # hidden aliases, for one version
     "--hang-after": "--worker-timeout",
     "--keep-lamps": "--keep-scene-lights",
+    "--keep-sums": "--keep-accumulation",
     "--lights-a-worker": "--lights-per-worker",
+    "--part": "--shard",
     "--texels-per-metre": "--texels-per-meter",
+    "--time": "--time-limit",
 }
 
 

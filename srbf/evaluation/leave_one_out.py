@@ -35,7 +35,7 @@ def leave_one_out(
     most = max(1, KEPT_BYTES // (12 * len(capture.lights)))
     texels = covered if len(covered) <= most else np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
     roles: list[Role | None] = [role if (role := light.role) == "train" else None for light in capture.lights]
-    kept = capture.kept(texels).with_roles(roles)
+    kept = capture.load(texels).with_roles(roles)
     domain = domain_of_capture(kept)
     peaks = PeakHistogram()
     squares, powers = np.empty(len(lights)), np.empty(len(lights))

@@ -15,7 +15,7 @@ DIGITS = 6
 
 
 def surface(look: dict[str, Any], thickness: float = 0.0, picture: dict[str, int] | None = None, colored: bool = False) -> dict[str, Any]:
-    """The material; `look` as in `blender_bake.looks.Look`.
+    """The material; `look` as in `blender_bake.pbr_material.PbrMaterial`.
 
     thickness: of a solid body, m (see `mean_thickness`), seen from outside alone; 0 is a thin wall, behind which nothing is displaced
     picture: glTF's texture info of its base color; colored: the vertices hold it. Either makes the base color itself white.

@@ -133,7 +133,7 @@ class _Writer:
 
     def __init__(self, told: dict[str, Any], scratch: Path, albedo: Float32[ndarray, "H W 3"] | None) -> None:
         self.document = Glb({"asset": {"version": "2.0", "generator": "srbf mesh"}})
-        self._looks, self._albedo = told["looks"], albedo
+        self._looks, self._albedo = told["materials"], albedo
         self._materials: dict[tuple[Any, ...], int] = {}
         self._picture: int | None = None
         self._triangles = 0
@@ -156,7 +156,7 @@ class _Writer:
     def _object(self, name: str, parts: list[dict[str, Any]], scratch: Path) -> int:
         alike: dict[tuple[Any, ...], list[Float32[ndarray, "n C"]]] = {}
         for part in parts:
-            key = (part["look"], tuple((column, int(width)) for column, width in part["columns"]))
+            key = (part["material"], tuple((column, int(width)) for column, width in part["columns"]))
             alike.setdefault(key, []).append(np.load(scratch / part["file"]))
         corners = np.concatenate([rows[:, :3] for group in alike.values() for rows in group]).reshape(-1, 3, 3)
         glass = any(self._looks[look]["transmission"] > 0 for look, _ in alike)

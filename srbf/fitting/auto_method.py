@@ -53,7 +53,7 @@ def within_budget(
         raise InputError(f"expected `psnr` in dB, found {psnr:g}")
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
-    trial = capture.kept(texels)
+    trial = capture.load(texels)
     trial = trial.with_roles([None if light.role == "holdout" else light.role for light in trial.lights])
     size, numbers = budget or DEFAULT_BUDGET, 3 * len(trial.indices("train"))
     if not trial.indices("validation") and len(trial.indices("train")) < LEAST_LIGHTS:

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset, AssetReader
-from srbf.capture import Capture, Look
+from srbf.capture import Capture, OnImage
 from srbf.encode.row_blocks import SolveRows
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
@@ -44,7 +44,7 @@ class FitRun:
     """
 
     progress: Callable[[int, int], None] = lambda done, total: None
-    on_image: Look = lambda row, image: None
+    on_image: OnImage = lambda row, image: None
     stitch: Stitch | None = None
     solve_rows: SolveRows | None = None
 

@@ -75,7 +75,7 @@ def measure(subject: Subject, methods: Sequence[Method], progress: Callable[[int
     unseen = look_at_unseen(subject)
     progress(1, STEPS)
     picked = sampled_texels(subject.covered, TEXELS)
-    sample, asset = subject.capture.kept(picked), subject.asset.at(picked)
+    sample, asset = subject.capture.load(picked), subject.asset.at(picked)
     peak = subject.evaluation[subject.role]["peak"]
     texels = np.arange(len(picked))
     own = score_asset(asset, sample, subject.role, peak)

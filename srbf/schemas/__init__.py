@@ -53,8 +53,19 @@ def _check(value: Schema, name: SchemaName, method: str | None, where: str) -> N
     validator = _validator(name, method)
     from jsonschema.exceptions import best_match
 
-    error = best_match(validator.iter_errors(value))
+    errors = list(validator.iter_errors(value))
+    error = best_match([cause for found in errors for cause in _of_kind(found)] or errors)
     if error is not None:
         place = "/".join(str(p) for p in error.absolute_path) or "its top level"
         message = error.message if len(error.message) <= 200 else error.message[:197] + "..."
         raise ManifestError(f"{where} breaks the {name} format at {place}: {message}")
+
+
+def _of_kind(error: Any) -> list[Any]:
+    """The error; where it is that of a `oneOf` whose alternatives differ by `kind`, the errors of the alternative of the value's kind."""
+    if error.validator != "oneOf" or not isinstance(error.instance, dict) or "kind" not in error.instance:
+        return [error]
+    alternatives: dict[Any, list[Any]] = {}
+    for cause in error.context:
+        alternatives.setdefault(cause.schema_path[0], []).append(cause)
+    return next((causes for causes in alternatives.values() if not any(list(cause.path) == ["kind"] for cause in causes)), [])

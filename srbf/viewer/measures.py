@@ -57,7 +57,7 @@ class Measures:
     @cached_property
     def _sample(self) -> Capture:
         assert self._capture is not None
-        return self._capture.kept(self._texels)
+        return self._capture.load(self._texels)
 
     def _errors(self, index: int) -> dict[str, object]:
         sample, asset = self._sample, self._assets[index].at(self._texels)

@@ -30,7 +30,7 @@ def handed_over(blend: Callable[[str], Path], tmp_path: Path) -> Seams:
         scratch = tmp_path / f"{scene} {quantity}"
         scratch.mkdir()
         settings = BakeSettings(Receiver("lightmap", name), 32, 32, quantity=quantity)
-        job = {**base_job(blend(scene), settings, scratch), "geometry": True, "ambient": None, "lights": [], "probes": []}
+        job = {**base_job(blend(scene), settings, scratch), "channels": ["seams"]}
         with Worker(job, scratch, scratch / "log") as worker:
             found = [np.load(scratch / event["file"]) for event in worker.events(print) if event.get("name") == "seams"]
         return found[0].reshape(-1, 8) if found else None

@@ -60,7 +60,7 @@ def test_tiles_cover_every_row_once_and_keep_to_strips() -> None:
 
 def test_indirect_and_kept_captures_stream_rows_too(make_capture) -> None:
     capture = make_capture(noisy(40, 6), lights=7, holdout=0, encoding="half")
-    for opened in (capture, capture.kept()):
+    for opened in (capture, capture.load()):
         whole = np.concatenate([block.astype(np.float32) for _, block in opened.stream(range(7))])
         rows = np.concatenate([block.astype(np.float32) for _, block in opened.stream(range(7), rows=[(3, 20), (39, 40)])])
         np.testing.assert_array_equal(rows, whole.reshape(7, 40, 6, 3)[:, [*range(3, 20), 39]].reshape(7, -1, 3))

@@ -50,7 +50,7 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
     asset = method.encode(capture)
     whole = evaluate(asset, capture)["holdout"]
     texels = np.arange(WIDTH, HEIGHT * WIDTH)  # the first row is not covered
-    sample = capture.kept(texels)
+    sample = capture.load(texels)
     kept = score_asset(asset.at(texels), sample, "holdout", whole["peak"])
     (fitted, *_) = contest(sample, [method], "holdout", whole["peak"])
     for score in (kept, fitted):
@@ -62,7 +62,7 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
 
 @pytest.mark.slow
 def test_every_family_is_told_apart(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     methods = [
         RelightingMap(k=9, basis="spherical-harmonics"),
         EigenMap(components=8),
@@ -77,7 +77,7 @@ def test_every_family_is_told_apart(capture: Capture) -> None:
 
 
 def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     nearest, every = contest(sample, [], "holdout", 1.0)
     found = nearest_image(sample, np.arange(sample.width))
     train = sample.indices("train")
@@ -90,7 +90,7 @@ def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
 
 
 def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     train = sample.indices("train")
     responses = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)
     values = spectrum(sample)

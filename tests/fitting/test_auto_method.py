@@ -39,12 +39,12 @@ def smooth(bumps: np.random.Generator):
 
 @pytest.fixture
 def shadows(make_capture) -> Capture:
-    return make_capture(shadowed(np.random.default_rng(0)), lights=150, validation=20, holdout=0, encoding="half", name="shadows").kept()
+    return make_capture(shadowed(np.random.default_rng(0)), lights=150, validation=20, holdout=0, encoding="half", name="shadows").load()
 
 
 @pytest.fixture
 def cosines(make_capture) -> Capture:
-    return make_capture(smooth(np.random.default_rng(1)), lights=60, validation=12, holdout=0, encoding="half").kept()
+    return make_capture(smooth(np.random.default_rng(1)), lights=60, validation=12, holdout=0, encoding="half").load()
 
 
 def size(method: EigenMap | ClusteredEigenMap, capture: Capture) -> int:
@@ -79,9 +79,9 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
 
 
 def test_train_lights_stand_in_for_validation(make_capture) -> None:
-    capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).kept()
+    capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).load()
     assert isinstance(within_budget(capture, 4), EigenMap)
-    few = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS - 1, holdout=3, name="few").kept()
+    few = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS - 1, holdout=3, name="few").load()
     said: list[str] = []
     assert within_budget(few, 4, say=said.append) == EigenMap(components=4, encoding="uint8")
     assert f"fewer than {LEAST_LIGHTS} train lights" in said[0]

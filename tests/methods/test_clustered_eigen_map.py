@@ -72,7 +72,7 @@ def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
 
 def test_bytes_cost_little(make_capture) -> None:
     response, _ = planted(4, 3, seed=5)
-    capture = make_capture(response, lights=60, holdout=0).kept()
+    capture = make_capture(response, lights=60, holdout=0).load()
     settings = {"spread": 0.3, "ridge": 1e-3}
     images = np.stack([capture.image(i) for i in capture.indices("train")])
     assets = [ClusteredEigenMap(4, 3, encoding=encoding, **settings).encode(capture) for encoding in ("float", "uint8")]
@@ -89,7 +89,7 @@ def test_more_clusters_serve_shadows(make_capture) -> None:
     labels, reach = rng.integers(12, size=(HEIGHT, WIDTH)), rng.uniform(0, 0.3, (HEIGHT, WIDTH))
     capture = make_capture(
         lambda d: np.where((walls @ d[:2])[labels] > reach, 0, d[2])[..., None] * [1, 0.8, 0.6], lights=80, holdout=20
-    ).kept()
+    ).load()
     one, six = (evaluate(ClusteredEigenMap(c, 2).encode(capture), capture)["holdout"]["psnr"] for c in (1, 6))
     assert six > one + 3
 

@@ -92,7 +92,7 @@ SMOOTH: dict[str, Capture] = {}
 def smooth(make_capture) -> Capture:
     """300 lights on the hemisphere, kept in memory for all tests that read them."""
     if not SMOOTH:
-        SMOOTH["300"] = make_capture(softly_shadowed(16, 20), lights=300, holdout=30).kept()
+        SMOOTH["300"] = make_capture(softly_shadowed(16, 20), lights=300, holdout=30).load()
     return SMOOTH["300"]
 
 
@@ -174,7 +174,7 @@ def test_more_components_than_numbers(make_capture) -> None:
 
 @pytest.mark.slow
 def test_validation_lights_steer_and_holdout_does_not(make_capture) -> None:
-    capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).kept()
+    capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).load()
     assert EigenMap(8).encode(capture).manifest["source"]["fit"]["chosen_by"] == "validation"
     without = capture.with_roles([None if light.role == "holdout" else light.role for light in capture.lights])
     blind = capture.with_roles([None if light.role == "validation" else light.role for light in capture.lights])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The sole illuminant of a light image: a sun of unit irradiance, or a point lamp of unit irradiance at one meter."""
+"""The only light of a light image: a sun of unit irradiance, or a point light of unit irradiance at one meter."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
-POINT_WATTS = 4 * math.pi  # a lamp of P watts gives the irradiance P / (4 pi d^2) at d meters
+POINT_WATTS = 4 * math.pi  # a point light of P watts gives the irradiance P / (4 pi d^2) at d meters
 
 
-class Illuminant:
-    """A sun and a point lamp of ours, one of them lit at a time."""
+class SoleLight:
+    """A sun and a point light of our own, at most one of them on."""
 
     def __init__(self, scene: bpy.types.Scene, sun_angle: float, by_shadow_rays_alone: bool = False) -> None:
         self._sun = _point_light(scene, "SUN")
         self._sun.data.angle = sun_angle
-        if by_shadow_rays_alone:  # bounced rays may not reach it, and must then not be counted on
+        if by_shadow_rays_alone:  # bounced rays may not reach it
             self._sun.data.cycles.use_multiple_importance_sampling = False
         self._point = _point_light(scene, "POINT")
         self._point.data.shadow_soft_size = 0.0
 
-    def aim(self, light: dict[str, Any]) -> None:
-        """Light up `light` {kind: directional, direction} (towards the light) or {kind: point, position}."""
-        directional = light["kind"] == "directional"
-        self._sun.data.energy = 1.0 if directional else 0.0
-        self._point.data.energy = 0.0 if directional else POINT_WATTS
-        if directional:
+    def aim(self, light: dict[str, Any] | None) -> None:
+        """Turn on `light` {kind: directional, direction} (towards the light, unit) or {kind: point, position} (m); None: no light."""
+        kind = None if light is None else light["kind"]
+        self._sun.data.energy = 1.0 if kind == "directional" else 0.0
+        self._point.data.energy = POINT_WATTS if kind == "point" else 0.0
+        if kind == "directional":
             # A sun shines along its local -z.
             self._sun.rotation_quaternion = Vector(light["direction"]).to_track_quat("Z", "Y")
-        else:
+        elif kind == "point":
             self._point.location = light["position"]
 
 

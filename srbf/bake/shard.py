@@ -1,4 +1,4 @@
-"""`--part prepare` and `--part I/N`: one bake as several commands, for farms whose tasks must be known beforehand."""
+"""Shards: one bake as several commands, for farms whose tasks are fixed before they run."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from srbf.errors import InputError
 
 
 @dataclass(frozen=True)
-class Part:
-    """The lights that one of `count` commands bakes, from 1 on; number 0: the preparation, which comes before all of them."""
+class Shard:
+    """The lights that command `number` of `count` bakes, from 1 on; number 0: the preparation, which comes before all of them."""
 
     number: int
     count: int
 
     @staticmethod
-    def parse(text: str) -> Part:
-        """From the command line's word; InputError on any other."""
+    def parse(text: str) -> Shard:
+        """From `prepare` or `I/N`; InputError for others."""
         if text == "prepare":
-            return Part(0, 0)
+            return Shard(0, 0)
         found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
         number, count = (int(word) for word in found.groups()) if found else (0, 0)
         if not 1 <= number <= count:
-            raise InputError(f"expected --part prepare or I/N with I from 1 to N, found {text!r}")
-        return Part(number, count)
+            raise InputError(f"expected `shard` prepare or I/N with I from 1 to N, found {text!r}")
+        return Shard(number, count)
 
     @property
     def is_preparation(self) -> bool:
@@ -34,19 +34,19 @@ class Part:
 
     @property
     def name(self) -> str:
-        """As the command line has it."""
+        """As on the command line."""
         return "prepare" if self.is_preparation else f"{self.number}/{self.count}"
 
     @property
     def lock(self) -> str:
-        """The file that is held while it is baked."""
-        return f".part-{self.number}-of-{self.count}.lock"
+        """The lock file held while it is baked."""
+        return f".shard-{self.number}-of-{self.count}.lock"
 
     @property
     def scratch(self) -> str:
-        """Its folder for what a worker hands over."""
-        return f"part-{self.number}-of-{self.count}"
+        """Its folder for the worker's files."""
+        return f"shard-{self.number}-of-{self.count}"
 
     def of(self, order: Sequence[PlannedLight]) -> list[PlannedLight]:
-        """Every N-th light of the order of rendering, so that each part covers the domain; none in the preparation."""
+        """Every N-th light of the order of rendering, so that each shard covers the domain; none in the preparation."""
         return [] if self.is_preparation else list(order[self.number - 1 :: self.count])

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from srbf.bake.accumulation import NOTHING, Accumulation
 from srbf.bake.folder import LOG, LONGEST_LOG, sweep
 from srbf.bake.settings import PlannedLight
-from srbf.bake.sums import NOTHING, Sums
 
 LIGHT = PlannedLight(3, (0.0, 0.0, 1.0), "validation", 8, 0)
 SINGLE = 1e-6  # float32's rounding of a few sums
@@ -53,20 +53,20 @@ def test_the_noise_of_an_indirect_image_is_its_own() -> None:
 
 def test_what_is_written_is_read_and_what_is_damaged_is_nothing(tmp_path: Path) -> None:
     total = NOTHING.with_pass(2, np.ones((3, 4, 3), np.float32), None, squares=True)
-    sums = Sums(tmp_path, [LIGHT])
-    assert sums.passes(LIGHT) == 0 and sums.can_grow(LIGHT)
-    sums.write(LIGHT, total, keep=True)
-    again = Sums(tmp_path, [LIGHT])
+    accumulation = Accumulation(tmp_path, [LIGHT])
+    assert accumulation.passes(LIGHT) == 0 and accumulation.can_grow(LIGHT)
+    accumulation.write(LIGHT, total, keep=True)
+    again = Accumulation(tmp_path, [LIGHT])
     assert (again.passes(LIGHT), again.samples(LIGHT), again.can_grow(LIGHT)) == (1, 2, True)
     np.testing.assert_array_equal(again.read(LIGHT).mean, total.mean)
-    path = next((tmp_path / "sums").glob("0003*"))
+    path = next((tmp_path / "accumulation").glob("0003*"))
     whole = path.read_bytes()
     for damaged in (b"", whole[:100], whole[: len(whole) // 2], whole[:300] + bytes([whole[300] ^ 1]) + whole[301:]):
         path.write_bytes(damaged)
-        broken = Sums(tmp_path, [LIGHT])
+        broken = Accumulation(tmp_path, [LIGHT])
         assert broken.passes(LIGHT) == 0
-    sums.write(LIGHT, total, keep=False)
-    kept = Sums(tmp_path, [LIGHT])
+    accumulation.write(LIGHT, total, keep=False)
+    kept = Accumulation(tmp_path, [LIGHT])
     assert (kept.passes(LIGHT), kept.samples(LIGHT), kept.can_grow(LIGHT)) == (1, 2, False)
     assert kept.read(LIGHT).whole is None
 

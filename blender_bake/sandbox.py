@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`python confine.py SCRATCH COMMAND…`: become COMMAND, able to write below SCRATCH alone.
+"""`python sandbox.py SCRATCH COMMAND…`: run COMMAND in this process, able to write only below SCRATCH.
 
-The second wall around a .blend that nobody vouches for; the first is `hardening`, inside Blender. Linux's Landlock refuses every write,
-creation, renaming and removal elsewhere, and every TCP connection, whoever asks and by whatever path; reading stays free. Other systems
-and older kernels have the first wall alone. Everywhere Blender's temporary folder and its user's folder are put below SCRATCH, so that
-the user's own start-up scripts and add-ons do not run either. Stands alone: it needs neither Blender nor this package.
+The second protection against an untrusted .blend; the first is `sanitize`, inside Blender. Linux's Landlock refuses every write,
+creation, renaming and removal elsewhere, and every TCP connection; reading stays allowed. Other systems and older kernels have only the
+first. On all of them Blender's temporary folder and its user's folder are below SCRATCH, so that the user's start-up scripts and add-ons
+do not run. This file needs neither Blender nor this package.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ import struct
 import sys
 from pathlib import Path
 
-CONFINED = "SRBF_CONFINED"  # in the environment of what runs behind the second wall
-UNCONFINED = "SRBF_UNCONFINED"  # set by users whose Blender cannot start behind it
-LAUNCHERS = {"snap", "flatpak"}  # what these start needs rights that a confined process has given up
+SANDBOXED = "SRBF_CONFINED"  # in the environment of a sandboxed process
+UNSANDBOXED = "SRBF_UNCONFINED"  # set by users whose Blender cannot start in the sandbox
+LAUNCHERS = {"snap", "flatpak"}  # what these start needs rights that a sandboxed process has given up
 
 # linux/landlock.h
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
@@ -32,13 +32,13 @@ BIND_AND_CONNECT = 0b11  # TCP, from the fourth on
 
 
 def main() -> None:
-    """Confine this process as far as the system can, then be the command."""
+    """Sandbox this process as far as the system can, then replace it by the command."""
     scratch, command = Path(sys.argv[1]).resolve(), sys.argv[2:]
     os.environ.update(environment(scratch))
     program = shutil.which(command[0])
     launched = program is not None and Path(program).resolve().name in LAUNCHERS
-    if not (launched or os.environ.get(UNCONFINED)) and confine(scratch):
-        os.environ[CONFINED] = "1"
+    if not (launched or os.environ.get(UNSANDBOXED)) and restrict_writes(scratch):
+        os.environ[SANDBOXED] = "1"
     try:
         os.execvp(command[0], command)
     except OSError as error:
@@ -46,13 +46,13 @@ def main() -> None:
 
 
 def environment(scratch: Path) -> dict[str, str]:
-    """Where Blender keeps what is temporary and what is its user's: below `scratch`, which goes when the bake ends."""
+    """Environment variables that put Blender's temporary and user folders below `scratch`, which is deleted when the bake ends."""
     places = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME"), str(scratch))
     return {**places, "BLENDER_USER_RESOURCES": str(scratch / "user"), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
-def confine(folder: Path) -> bool:
-    """Give up, for this process and its children, writing anywhere but below `folder`; False where the system has no such thing."""
+def restrict_writes(folder: Path) -> bool:
+    """Restrict this process and its children to writing below `folder`; False where the system has no such thing."""
     if sys.platform != "linux":
         return False
     system = ctypes.CDLL(None, use_errno=True)

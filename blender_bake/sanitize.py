@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A .blend is hostile until shown otherwise: what in it would run Python or OSL, or write files, is disarmed before it is first evaluated.
+"""Sanitizing an untrusted .blend: its scripts, OSL shaders and whatever writes files are disabled before it is first evaluated.
 
 Blender calls `load_post` handlers after a file is read and before its dependency graph is evaluated, which is when drivers run and physics
-write their disk caches. What stands as saved, such as values of drivers, is what its author last saw.
+write their disk caches. Driven values stay as saved.
 """
 
 from __future__ import annotations
@@ -14,30 +14,30 @@ from typing import Any
 
 import bpy
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
-CONFINED = "SRBF_CONFINED"  # see `confine`: nothing outside the scratch folder can be written whatever Blender tries
+SANDBOXED = "SRBF_CONFINED"  # set by `sandbox`: nothing outside the scratch folder can be written
 SHOWN = 6  # names in a warning
-ARMING = ("use_disk_cache", "use_external", "cache_type")  # properties that no animation may turn back
+REVERTING = ("use_disk_cache", "use_external", "cache_type")  # properties that no animation may turn back
 
 
-def disarm() -> list[str]:
-    """Take from the file just read all that runs code or writes files; returns a line for each kind of thing that the user may miss.
+def sanitize() -> list[str]:
+    """Remove from the file just read all that runs code or writes files; returns a line for each kind of thing that the user may miss.
 
-    Raises WorkerError where opening the scene further would touch files on disk.
+    WorkerError where opening the scene further would change files on disk.
     """
     said = [
-        _line(list(_drivers_with_python()), "do not run, their values stand as saved", "drivers that need Python"),
-        _line(list(_osl()), "do not run: nodes pass nothing on, cameras are perspective ones", "OSL scripts"),
+        _line(list(_drivers_with_python()), "do not run, their values are kept as saved", "drivers that need Python"),
+        _line(list(_osl()), "do not run: their nodes have no output, cameras are perspective ones", "OSL scripts"),
         _line(list(_simulations()), "are left out, since Blender would write their caches", "fluids that are replayed rather than baked"),
     ]
     for block in _blocks():
         for curves, curve in list(_curves(block)):
-            if curve.data_path.endswith(ARMING) or (isinstance(block, bpy.types.Camera) and curve.data_path == "type"):
+            if curve.data_path.endswith(REVERTING) or (isinstance(block, bpy.types.Camera) and curve.data_path == "type"):
                 curves.remove(curve)
     _disk_caches()
     for scene in bpy.data.scenes:
-        _disarm_scene(scene)
+        _sanitize_scene(scene)
     for text in bpy.data.texts:
         text.use_module = False
     for tree in [scene.node_tree for scene in bpy.data.scenes if getattr(scene, "node_tree", None)] + list(bpy.data.node_groups):
@@ -46,11 +46,11 @@ def disarm() -> list[str]:
     return [line for line in said if line]
 
 
-def _disarm_scene(scene: bpy.types.Scene) -> None:
+def _sanitize_scene(scene: bpy.types.Scene) -> None:
     """No OSL, no compositor, sequencer or Freestyle, no cache of renders; nothing animated that `scene.configure` sets."""
     scene.animation_data_clear()
     for marker in scene.timeline_markers:
-        marker.camera = None  # it would win over the receiver's
+        marker.camera = None  # it would override the receiver's
     scene.cycles.shading_system = False
     render = scene.render
     for name in ("use_compositing", "use_sequencer", "use_freestyle", "use_render_cache"):
@@ -66,7 +66,7 @@ def _disarm_scene(scene: bpy.types.Scene) -> None:
 
 
 def _drivers_with_python() -> Iterator[str]:
-    """Remove every scripted driver that Blender does not evaluate by itself; their names."""
+    """Remove every scripted driver that needs Python; yields their names."""
     for block in _blocks():
         for curve in list(block.animation_data.drivers) if getattr(block, "animation_data", None) else ():
             if curve.driver.type == "SCRIPTED" and not curve.driver.is_simple_expression:
@@ -75,7 +75,7 @@ def _drivers_with_python() -> Iterator[str]:
 
 
 def _osl() -> Iterator[str]:
-    """Cycles compiles and runs what they name, from files too: `shading_system` is off, script cameras become perspective ones."""
+    """Yields the names of OSL nodes and cameras, whose scripts Cycles would compile and run; cameras become perspective ones."""
     for tree in _trees():
         for node in tree.nodes:
             if node.bl_idname == "ShaderNodeScript":
@@ -87,7 +87,7 @@ def _osl() -> Iterator[str]:
 
 
 def _simulations() -> Iterator[str]:
-    """Remove fluid domains that simulate while they are looked at: Mantaflow writes their folder, and builds Python from their settings."""
+    """Remove fluid domains that simulate when evaluated: Mantaflow writes their folder and builds Python from their settings."""
     for obj in bpy.data.objects:
         for modifier in list(obj.modifiers):
             if modifier.type == "FLUID" and modifier.fluid_type == "DOMAIN" and modifier.domain_settings.cache_type == "REPLAY":
@@ -96,13 +96,13 @@ def _simulations() -> Iterator[str]:
 
 
 def _disk_caches() -> None:
-    """Physics not baked keep their cache in memory.
+    """Set physics that are not baked to cache in memory.
 
-    Turning a disk cache off deletes its files: that is done where there are none, or where they cannot be deleted.
+    Turning a disk cache off deletes its files, so it is done only where there are none, or where they cannot be deleted; else WorkerError.
     """
     found = [(owner, cache) for owner, cache in _point_caches() if cache.use_disk_cache and not (cache.is_baked or cache.use_external)]
-    confined = os.environ.get(CONFINED) == "1"
-    kept = [repr(owner.name) for owner, _ in found if not confined and _cache_folder(owner).exists()]
+    sandboxed = os.environ.get(SANDBOXED) == "1"
+    kept = [repr(owner.name) for owner, _ in found if not sandboxed and _cache_folder(owner).exists()]
     if kept:
         raise WorkerError(
             f"expected physics baked or cached in memory, found an unfinished disk cache of {', '.join(kept[:SHOWN])}, which Blender would "

@@ -1,4 +1,4 @@
-"""What a bake has rendered so far, on disk: a running sum a light, from which the capture's images are written."""
+"""What a bake has rendered so far, on disk: a running sum per light, from which the capture's images are written."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from srbf.bake.settings import PlannedLight
 from srbf.errors import ImageError
 from srbf.io import files
 
-SUMS = "sums"
-LATE = 30.0  # seconds after which a shared folder shows what another machine wrote
+ACCUMULATION = "accumulation"
+LATE = 30.0  # seconds that a shared folder may take to show what another machine wrote
 POLL = 0.25
 
 
 @dataclass(frozen=True)
 class Sum:
-    """`samples` of a light in `passes`; the arrays (H, W, 3) float32 are sums over samples, or None once they are no longer needed.
+    """The sum of a light's `samples` samples, rendered in `passes` passes; arrays (H, W, 3) float32, None where not kept.
 
-    `direct`, of an indirect capture, is the part of `whole` that is direct diffuse light. `squares` is the sum over passes of samples
-    times the square of the capture's image, as the pass alone would have it: what tells a validation light's noise.
+    whole: sum over samples of all light. direct: of an indirect capture, its direct diffuse part. squares: sum over passes of the pass's
+    samples times the square of the image that the pass alone gives; the noise of validation lights is estimated from it.
     """
 
     passes: int
@@ -38,7 +38,7 @@ class Sum:
     squares: Float32[ndarray, "H W 3"] | None = None
 
     def with_pass(self, samples: int, whole: ndarray, direct: ndarray | None, squares: bool) -> Sum:
-        """The sum with one more pass: the means `whole` and `direct` of `samples` samples."""
+        """The sum with one more pass, of which `whole` and `direct` (H, W, 3) are the means over `samples` samples."""
         return Sum(
             self.passes + 1,
             self.samples + samples,
@@ -57,7 +57,7 @@ class Sum:
         return None if self.direct is None else self.direct / np.float32(self.samples)
 
     def noise_variance(self) -> Float32[ndarray, "H W 3"]:
-        """Variance of the mean, unbiased, from how the passes differ: (sum s x^2 - (sum s x)^2 / S) / ((passes - 1) S)."""
+        """Unbiased variance of the mean, from the differences of the passes: (sum s x^2 - (sum s x)^2 / S) / ((passes - 1) S)."""
         assert self.whole is not None and self.squares is not None and self.passes > 1
         own = self.whole if self.direct is None else self.whole - self.direct
         spread = self.squares - own * own / np.float32(self.samples)
@@ -67,15 +67,15 @@ class Sum:
 NOTHING = Sum(0, 0, None)
 
 
-class Sums:
-    """The folder of sums, one file a light: read once, then written as passes come. A light's file appears whole or not at all.
+class Accumulation:
+    """The folder of running sums, one file per light, each written atomically; counts are read once.
 
-    It is written after the light's images, so that after a kill they are at least as far as it says; the pass in question is then
-    rendered and written once more, to the same bits.
+    A light's file is written after its images. After a kill the images may therefore be one pass ahead; that pass is rendered again and
+    gives bit-identical output.
     """
 
     def __init__(self, folder: Path, lights: Sequence[PlannedLight]) -> None:
-        self._folder = folder / SUMS
+        self._folder = folder / ACCUMULATION
         files.make_folder(self._folder)
         self._known = {light.index: self._read_counts(light.index) for light in lights}
 
@@ -86,15 +86,15 @@ class Sums:
         return self._known[light.index][1]
 
     def checksum(self, light: PlannedLight) -> str:
-        """Of the light's images when they were written."""
+        """Checksum of the light's images when they were written."""
         return self._known[light.index][3]
 
     def can_grow(self, light: PlannedLight) -> bool:
-        """Whether another pass can be added: nothing is there yet, or its sum is."""
+        """Whether another pass can be added: there is none yet, or the sum is kept."""
         return self._known[light.index][2] or self.passes(light) == 0
 
     def read(self, light: PlannedLight) -> Sum:
-        """What is there of `light`; nothing where its file is missing or damaged."""
+        """The sum of `light`; an empty one where its file is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
             passes, samples = (int(n) for n in stored["counts"])
             arrays = {name: stored[name] for name in ("whole", "direct", "squares") if name in stored}
@@ -102,7 +102,7 @@ class Sums:
         return NOTHING
 
     def write(self, light: PlannedLight, total: Sum, keep: bool, checksum: str = "") -> None:
-        """Commit `total`, whose images have this `checksum`; without `keep` only its counts."""
+        """Write `total`, whose images have this `checksum`; without `keep` only its counts."""
         arrays = {"whole": total.whole, "direct": total.direct, "squares": total.squares} if keep else {}
         with files.atomic_path(self._path(light.index)) as temporary:
             counts = np.array([total.passes, total.samples])
@@ -110,14 +110,14 @@ class Sums:
         self._known[light.index] = (total.passes, total.samples, keep, checksum)
 
     def forget(self, light: PlannedLight) -> None:
-        """Begin `light` anew."""
+        """Drop the sum of `light`, so that it is rendered from the start."""
         self._path(light.index).unlink(missing_ok=True)
         self._known[light.index] = (0, 0, False, "")
 
     def refresh(self, light: PlannedLight, passes: int = 0, patience: float = 0.0) -> bool:
-        """Read again what another process may have written; whether so many `passes` are there.
+        """Read the counts of `light` again, which another process may have written; True where it has at least `passes` passes.
 
-        A folder shared by several machines may show late what one of them wrote: it is looked for `patience` seconds long.
+        A shared folder may show late what another machine wrote: waits up to `patience` seconds.
         """
         deadline = time.monotonic() + patience
         while True:
@@ -130,7 +130,7 @@ class Sums:
         return self._folder / f"{index:04d}.npz"
 
     def _read_counts(self, index: int) -> tuple[int, int, bool, str]:
-        """(passes, samples, whether the sum is there, checksum of the images) of a file whose every byte is as it was written."""
+        """(passes, samples, whether the sum is kept, checksum of the images); zeros where the file is missing or damaged."""
         path = self._path(index)
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), zipfile.ZipFile(path) as archive:
             if archive.testzip() is None:
@@ -140,13 +140,13 @@ class Sums:
 
 
 def save_array(path: Path, array: ndarray) -> None:
-    """An array of the bake's own, with a checksum."""
+    """Write an array for the bake's own use, with a checksum."""
     with files.atomic_path(path) as temporary:
         np.savez(temporary, array=array)
 
 
 def load_array(path: Path) -> ndarray:
-    """What `save_array` wrote; ImageError where it is damaged."""
+    """Read an array of `save_array`; ImageError where it is damaged."""
     try:
         with np.load(path) as stored:
             return stored["array"]
@@ -155,8 +155,8 @@ def load_array(path: Path) -> ndarray:
 
 
 def remove(folder: Path) -> None:
-    """Remove a capture's sums: it can then no longer be gone on with."""
-    shutil.rmtree(folder / SUMS, ignore_errors=True)
+    """Delete a capture's accumulation folder: no samples can be added to it after that."""
+    shutil.rmtree(folder / ACCUMULATION, ignore_errors=True)
 
 
 def _added(total: ndarray | None, part: ndarray) -> Float32[ndarray, "H W 3"]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A material as a physically based surface, read from its nodes: what of them the camera sees, in glTF's terms."""
+"""A physically based material in glTF's terms, read from the nodes of a Blender material as the camera sees it."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
 
 
 @dataclass(frozen=True)
-class Look:
-    """One surface: colors linear Rec.709, roughness as Blender and glTF have it (the square root of the microfacets' width).
+class PbrMaterial:
+    """A material with constant parameters: colors linear Rec.709, roughness as in Blender and glTF (square root of the microfacets' width).
 
-    `specular` scales the reflection of what is no metal, 0 to 1. `inside` is what light takes on on its way through a solid body, beside
-    the base color: a Glass BSDF tints it at both walls. `emission` is radiance. `varies`: the base color is but a guess at a network of
-    textures, which only a bake of the diffuse albedo tells at each point.
+    specular: scale of a dielectric's reflection, 0 to 1. inside: attenuation color of light through a solid body, besides the base color,
+    which a Glass BSDF applies at both walls. emission: radiance. varies: the base color is a guess at a network of textures; a bake of
+    the diffuse albedo has its value at each point.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Look:
 
     @property
     def is_diffuse(self) -> bool:
-        """Whether it has an albedo that a bake can tell."""
+        """Whether it has an albedo that can be baked."""
         return self.metallic < 0.5 and self.transmission < 0.5
 
     def record(self) -> dict[str, Any]:
@@ -48,44 +48,44 @@ class Look:
         return asdict(self)
 
 
-def look_of(material: bpy.types.Material | None) -> Look:
-    """The look of a slot's material; of several mixed BSDFs that of the one with the largest share, the first where they share alike.
+def pbr_material_of(material: bpy.types.Material | None) -> PbrMaterial:
+    """The material of a slot; of several mixed BSDFs the one with the largest share, the first of equal ones.
 
-    A share that varies over the surface counts as one half. What is transparent beside it becomes alpha, what is so all through a pane of
-    IOR 1. Mixed with light by the path of the ray, what a camera's ray meets.
+    A share that varies over the surface counts as one half. A transparent BSDF beside it becomes alpha; alone, it becomes a pane of
+    IOR 1. Mixes by light path are those of a camera ray.
     """
     if material is None:
-        return Look("(none)", specular=0.0)
+        return PbrMaterial("(none)", specular=0.0)
     if material.node_tree is None or not material.use_nodes:
-        return Look(material.name_full, tuple(material.diffuse_color[:3]), material.metallic, material.roughness)
+        return PbrMaterial(material.name_full, tuple(material.diffuse_color[:3]), material.metallic, material.roughness)
     output = material.node_tree.get_output_node("CYCLES") or material.node_tree.get_output_node("ALL")
     shares = [] if output is None else _shares(Place(output.inputs["Surface"]), 1.0)
     if not shares:
-        return Look(material.name_full, (0.0, 0.0, 0.0), specular=0.0)
-    looks = [(share.weight, share.known, _of_shader(material.name_full, share.shader)) for share in shares]
-    emission = sum(weight * np.array(look.emission) for weight, _, look in looks)
+        return PbrMaterial(material.name_full, (0.0, 0.0, 0.0), specular=0.0)
+    found = [(share.weight, share.known, _of_shader(material.name_full, share.shader)) for share in shares]
+    emission = sum(weight * np.array(surface.emission) for weight, _, surface in found)
     emission = tuple(float(c) for c in np.atleast_1d(emission))
-    surfaces = [(weight, known, look) for (weight, known, look), share in zip(looks, shares, strict=True) if share.is_surface]
+    surfaces = [(weight, known, surface) for (weight, known, surface), share in zip(found, shares, strict=True) if share.is_surface]
     if not surfaces:
-        clear = next((look for _, _, look in looks if look.transmission > 0), None)
-        return replace(clear or Look(material.name_full, (0.0, 0.0, 0.0), specular=0.0), emission=emission)
-    weight, _, look = max(surfaces, key=lambda surface: surface[0])
-    others = [other for w, _, other in surfaces if other is not look and w > 0 and other.is_diffuse]
+        clear = next((surface for _, _, surface in found if surface.transmission > 0), None)
+        return replace(clear or PbrMaterial(material.name_full, (0.0, 0.0, 0.0), specular=0.0), emission=emission)
+    weight, _, surface = max(surfaces, key=lambda surface: surface[0])
+    others = [other for w, _, other in surfaces if other is not surface and w > 0 and other.is_diffuse]
     mixed = any(share.is_surface and not share.known for share in shares) and bool(others)
     clear_share = sum(
-        w for (w, known, other), share in zip(looks, shares, strict=True) if known and not share.is_surface and other.transmission
+        w for (w, known, other), share in zip(found, shares, strict=True) if known and not share.is_surface and other.transmission
     )
     return replace(
-        look,
+        surface,
         emission=emission,
-        alpha=look.alpha * min(1.0, max(0.0, 1.0 - clear_share)),
-        varies=look.varies or (mixed and look.is_diffuse),
+        alpha=surface.alpha * min(1.0, max(0.0, 1.0 - clear_share)),
+        varies=surface.varies or (mixed and surface.is_diffuse),
     )
 
 
 @dataclass(frozen=True)
 class _Share:
-    """A BSDF or emission (its output), how much of the surface it is, and whether that is the same all over."""
+    """A BSDF or emission (its output), its share of the surface, and whether that is constant."""
 
     weight: float
     known: bool
@@ -111,19 +111,19 @@ def _shares(place: Place, weight: float, known: bool = True) -> list[_Share]:
     return _shares(first, weight * (1 - t), known) + _shares(second, weight * t, known)
 
 
-def _of_shader(name: str, shader: Place) -> Look:
+def _of_shader(name: str, shader: Place) -> PbrMaterial:
     kind = shader.node.type
 
     def socket(*names: str) -> Place | None:
         return next((place for place in map(shader.input, names) if place is not None), None)
 
     base = socket("Base Color", "Color")
-    look = Look(name, _triple(color(base, GRAY)), specular=0.0, varies=base is not None and value(base) is None)
+    surface = PbrMaterial(name, _triple(color(base, GRAY)), specular=0.0, varies=base is not None and value(base) is None)
     roughness = number(socket("Roughness"), 1.0)
     if kind == "BSDF_PRINCIPLED":
         shines = color(socket("Emission Color", "Emission"), (0, 0, 0)) * number(socket("Emission Strength"), 0.0)
         return replace(
-            look,
+            surface,
             metallic=_unit(number(socket("Metallic"), 0.0)),
             roughness=_unit(roughness),
             specular=_unit(2 * number(socket("Specular IOR Level", "Specular"), 0.5)),
@@ -133,20 +133,20 @@ def _of_shader(name: str, shader: Place) -> Look:
             emission=tuple(float(max(c, 0.0)) for c in shines),
         )
     if kind in GLOSSY:
-        return replace(look, metallic=1.0, roughness=_unit(roughness), specular=1.0)
+        return replace(surface, metallic=1.0, roughness=_unit(roughness), specular=1.0)
     if kind in GLASS:
-        look = replace(look, roughness=_unit(roughness), ior=number(socket("IOR"), IOR), transmission=1.0, inside=look.base_color)
-        return replace(look, specular=1.0 if kind == "BSDF_GLASS" else 0.0)
+        surface = replace(surface, roughness=_unit(roughness), ior=number(socket("IOR"), IOR), transmission=1.0, inside=surface.base_color)
+        return replace(surface, specular=1.0 if kind == "BSDF_GLASS" else 0.0)
     if kind == "BSDF_TRANSPARENT":
-        return replace(look, roughness=0.0, ior=1.0, transmission=1.0)
+        return replace(surface, roughness=0.0, ior=1.0, transmission=1.0)
     if kind == "EMISSION":
         shines = color(base, GRAY) * number(socket("Strength"), 1.0)
-        return replace(look, base_color=(0.0, 0.0, 0.0), emission=tuple(float(max(c, 0.0)) for c in shines), varies=False)
-    return look
+        return replace(surface, base_color=(0.0, 0.0, 0.0), emission=tuple(float(max(c, 0.0)) for c in shines), varies=False)
+    return surface
 
 
 def _alpha(place: Place | None) -> float:
-    """1 where it varies: a glTF factor cannot cut out."""
+    """The alpha; 1 where it varies, since a glTF factor is constant."""
     found = value(place)
     return 1.0 if found is None else float(found.mean())
 

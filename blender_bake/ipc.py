@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the worker speaks to its host: JSON lines out on the real stdout and in on stdin, arrays as files in the scratch folder."""
+"""Messages between the worker and its host: JSON lines to stdout and from stdin, arrays as files in the scratch folder."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ import numpy as np
 
 
 class WorkerError(Exception):
-    """A failure told to the host in one line: expected, found, what to do."""
+    """A failure, sent to the host in one line: expected, found, what to do."""
 
 
-class Channel:
-    """Events out. Blender's own chatter, from C as from Python, goes to stderr once this is made."""
+class Events:
+    """Events to the host. Once this is made, Blender's own output, of C and of Python, goes to stderr."""
 
     def __init__(self) -> None:
         sys.stdout.flush()
@@ -28,17 +28,17 @@ class Channel:
         os.dup2(2, 1)
 
     def emit(self, event: str, **fields: Any) -> None:
-        """One JSON line, flushed."""
+        """Send one JSON line, flushed."""
         self._out.write(json.dumps({"event": event, **fields}) + "\n")
         self._out.flush()
 
     def warn(self, message: str) -> None:
-        """A line for the user that does not stop the bake."""
+        """Send a warning for the user."""
         self.emit("warning", message=message)
 
 
 def hand_over(scratch: Path, name: str, array: np.ndarray) -> str:
-    """Write a float32 array for the host to take; returns the file's name."""
+    """Write an array as float32 for the host; returns the file's name. WorkerError where it cannot be written."""
     file = f"{name}.npy"
     try:
         np.save(scratch / file, np.ascontiguousarray(array, np.float32))
@@ -48,9 +48,9 @@ def hand_over(scratch: Path, name: str, array: np.ndarray) -> str:
 
 
 class Requests:
-    """What the host asks for on stdin, a JSON line each; its end is the host's death, even by kill -9, and ours.
+    """The host's requests on stdin, a JSON line each. The worker exits when stdin ends, that is when the host does, even by kill -9.
 
-    Iterate the requests as they come, until the host ends them with `{"end": true}`: what it asked for and was not begun is dropped.
+    Iterates over the requests as they come, until `{"end": true}`, which drops those not begun.
     """
 
     def __init__(self) -> None:
@@ -84,6 +84,6 @@ class Requests:
 
 
 def leave(status: int) -> NoReturn:
-    """Exit at once: after a failed driver Blender can hang for ever in its own shutdown."""
+    """Exit at once: after a failed driver Blender can hang in its own shutdown."""
     sys.stderr.flush()
     os._exit(status)

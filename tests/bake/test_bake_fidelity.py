@@ -46,8 +46,8 @@ KEPT = ["simplified", "linked_lights", "indirect_only", "holdout_occluder", "sha
 
 
 @pytest.fixture(scope="session")
-def left(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    return built("left_behind.py", tmp_path_factory.mktemp("left"))
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    return built("bake_fidelity.py", tmp_path_factory.mktemp("left"))
 
 
 def bake(scene: Path, folder: Path, receiver: str = "lightmap:Ground", **settings: object) -> Baked:
@@ -62,7 +62,7 @@ def own(scene: Path, folder: Path) -> np.ndarray:
     """(3, 32, 32, 3) Blender's own bake of the file."""
     out = folder / "own.npy"
     suns = [",".join(map(str, sun)) for sun in SUNS]
-    line = [sys.executable, str(SCENES / "left_behind.py"), "bake", str(scene), "Ground", str(out), *suns]
+    line = [sys.executable, str(SCENES / "bake_fidelity.py"), "bake", str(scene), "Ground", str(out), *suns]
     subprocess.run(line, check=True, capture_output=True, timeout=120)
     return np.load(out)
 
@@ -74,33 +74,33 @@ def check_equal(got: np.ndarray, expected: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("name", [*CARRIED, *OVERHEAD, *KEPT])
-def test_a_bake_has_the_light_of_blenders_own(left, tmp_path: Path, name: str) -> None:
-    expected = own(left(name), tmp_path)
-    capture = bake(left(name), tmp_path / "capture").capture
+def test_a_bake_has_the_light_of_blenders_own(made, tmp_path: Path, name: str) -> None:
+    expected = own(made(name), tmp_path)
+    capture = bake(made(name), tmp_path / "capture").capture
     got = np.stack([capture.image(i) for i in range(len(SUNS))])
     check_equal(got, expected)
     cosines = np.array([z / np.linalg.norm((x, y, z)) for x, y, z in SUNS])
     assert (cosines - got.mean(axis=(1, 2, 3))).max() > LOST  # so that an empty scene would not pass
 
 
-def test_an_indirect_bake_keeps_hair_and_says_what_rays_will_miss(left, tmp_path: Path) -> None:
-    baked = bake(left("hair"), tmp_path / "capture", transport="indirect")
+def test_an_indirect_bake_keeps_hair_and_says_what_rays_will_miss(made, tmp_path: Path) -> None:
+    baked = bake(made("hair"), tmp_path / "capture", transport="indirect")
     assert any("scene.glb" in line and "hair of 'Ground'" in line for line in baked.said)
     capture = baked.capture
     parts = [read_image(capture.folder / light["direct"]) for light in capture.manifest["lights"]]
-    check_equal(np.stack([capture.image(i) + part for i, part in enumerate(parts)]), own(left("hair"), tmp_path))
+    check_equal(np.stack([capture.image(i) + part for i, part in enumerate(parts)]), own(made("hair"), tmp_path))
 
 
-def test_fog_is_no_wall_in_the_scene_file(left, tmp_path: Path) -> None:
+def test_fog_is_no_wall_in_the_scene_file(made, tmp_path: Path) -> None:
     """A box of fog has triangles that stop no light: direct light by rays would be black beneath it."""
-    baked = bake(left("fog_box"), tmp_path / "capture", transport="indirect", samples=2)
+    baked = bake(made("fog_box"), tmp_path / "capture", transport="indirect", samples=2)
     assert any("volumes of 'Cube'" in line for line in baked.said)
     assert b'"Cube"' not in (baked.capture.folder / "scene.glb").read_bytes()
 
 
-def test_a_receiver_of_nothing_but_instances_is_their_mesh(left, tmp_path: Path) -> None:
+def test_a_receiver_of_nothing_but_instances_is_their_mesh(made, tmp_path: Path) -> None:
     """Nine blocks of 0.5 x 0.5 m, 0.6 m apart, under a ball: nine charts, whose middle one the ball shades."""
-    capture = bake(left("only_instances"), tmp_path / "capture").capture
+    capture = bake(made("only_instances"), tmp_path / "capture").capture
     covered = capture.coverage() > 0
     position = capture.geometry("position")[covered]
     assert covered.mean() > 0.3
@@ -111,14 +111,14 @@ def test_a_receiver_of_nothing_but_instances_is_their_mesh(left, tmp_path: Path)
     assert noon[near].max() < 0.2 and noon[np.linalg.norm(position[:, :2], axis=1) > 0.3].min() > 0.95
 
 
-def test_what_simplify_would_cull_still_casts(left, tmp_path: Path) -> None:
+def test_what_simplify_would_cull_still_casts(made, tmp_path: Path) -> None:
     """A lid of the square's size, 1.5 m up and 0.5 m aside, which the camera does not see, leaves a quarter of it lit at noon."""
-    capture = bake(left("culled"), tmp_path / "capture", samples=4).capture
+    capture = bake(made("culled"), tmp_path / "capture", samples=4).capture
     assert capture.image(0).mean() == pytest.approx(0.25, abs=0.02)
 
 
-def test_a_render_only_screw_is_what_is_baked(left, tmp_path: Path) -> None:
-    capture = bake(left("screwed_receiver"), tmp_path / "capture", samples=2).capture
+def test_a_render_only_screw_is_what_is_baked(made, tmp_path: Path) -> None:
+    capture = bake(made("screwed_receiver"), tmp_path / "capture", samples=2).capture
     radius = np.linalg.norm(capture.geometry("position")[capture.coverage() > 0][:, :2], axis=1)
     assert radius.min() > 0.19  # of 3 steps, the viewport's, the disc's hole would reach in to 0.1
 
@@ -134,16 +134,16 @@ def test_a_render_only_screw_is_what_is_baked(left, tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("kind", ["lightmap", "vertices"])
-def test_what_hides_a_receiver_is_named(left, tmp_path: Path, name: str, words: str, kind: str) -> None:
+def test_what_hides_a_receiver_is_named(made, tmp_path: Path, name: str, words: str, kind: str) -> None:
     with pytest.raises(BakeError, match=words) as caught:
-        bake(left(name), tmp_path / "capture", f"{kind}:Ground", **({"width": 4, "height": 1} if kind == "vertices" else {}))
+        bake(made(name), tmp_path / "capture", f"{kind}:Ground", **({"width": 4, "height": 1} if kind == "vertices" else {}))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "capture" / "capture.json").exists()
 
 
-def test_equal_bakes_are_equal_to_the_bit(left, tmp_path: Path) -> None:
-    """With hair, particles and instances too: every worker sets them apart anew."""
+def test_equal_bakes_are_equal_to_the_bit(made, tmp_path: Path) -> None:
+    """With hair, particles and instances too: every worker sets them apart again."""
     for name in ("hair", "node_curves_and_instances"):
-        first, second = (bake(left(name), tmp_path / f"{name} {i}", samples=2).capture.folder for i in range(2))
+        first, second = (bake(made(name), tmp_path / f"{name} {i}", samples=2).capture.folder for i in range(2))
         for path in [*sorted(first.rglob("*.exr")), first / "capture.json"]:
             assert path.read_bytes() == (second / path.relative_to(first)).read_bytes(), path.name
