@@ -8,7 +8,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError, ShaderError
-from srbf.export import dds, exr, uint8
+from srbf.export import dds, exr, png
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
@@ -19,7 +19,7 @@ IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
 MODEL = "model.glb"  # what the example shows in place of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
 METHODS = {"relighting-map": "relighting_map", "eigen-map": "eigen_map", "clustered-eigen-map": "clustered_eigen_map"}
-WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": dds.write, "bc1": dds.write}
+WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
 _SAMPLER_PRECISION = re.compile(r"\b(?:high|medium|low)p\s+(?=[iu]?sampler)")
@@ -35,7 +35,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     maps of other functions than Gaussians, which no shader knows.
     """
     if asset.method == "relighting-map" and asset.manifest["basis"]["kind"] != "gaussian":
-        raise InputError(f"expected relighting maps of Gaussians for Godot, found {asset.manifest['basis']['kind']}; fit without --basis")
+        raise InputError(f"expected relighting maps of Gaussians for Godot, found {asset.manifest['basis']['kind']}; fit with Gaussians")
     shutil.copytree(engine_root("godot"), folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".godot", "*.uid", "*.import"))
     for name in METHODS.values():
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))

@@ -16,7 +16,6 @@ from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.bake.survey import size_of_begun, with_frame
 from srbf.capture import MANIFEST
-from srbf.cli.parameters import parse_sun_angle
 from srbf.errors import InputError
 from srbf.sphere import point_set
 
@@ -41,12 +40,9 @@ def test_a_lone_light_gets_the_largest_sun() -> None:
     assert BakeSettings(Receiver("view"), lights=1).with_matched_sun().sun_angle == pytest.approx(np.pi)
 
 
-def test_sun_angle_as_text() -> None:
-    assert parse_sun_angle("auto") == "auto" and parse_sun_angle("0.1") == 0.1
-    with pytest.raises(InputError, match="--sun-angle auto or a number of radians, found 'wide'"):
-        parse_sun_angle("wide")
+def test_a_sun_angle_is_a_number() -> None:
     with pytest.raises(InputError, match="sun angle"):
-        BakeSettings(Receiver("view"), sun_angle=parse_sun_angle("nan"))
+        BakeSettings(Receiver("view"), sun_angle=float("nan"))
 
 
 def test_lightmaps_share_an_atlas_and_others_stand_alone() -> None:
