@@ -48,7 +48,10 @@ class Command(typer.core.TyperCommand):
 
 
 class CommandTable(Mapping[str, Any]):
-    """Commands by name; `functions` says where each is, `module:function`, to import once it is asked for."""
+    """Commands by name; `functions` says where each is, `module:function`, to import once it is asked for.
+
+    A module may have a subclass of Command of its own as `COMMAND`.
+    """
 
     def __init__(self, functions: Mapping[str, str]) -> None:
         self._functions = functions
@@ -56,9 +59,10 @@ class CommandTable(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         if name not in self._loaded:
-            module, _, function = self._functions[name].partition(":")
+            place, _, function = self._functions[name].partition(":")
+            module = import_module(place)
             alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
-            alone.command(name, cls=Command)(getattr(import_module(module), function))
+            alone.command(name, cls=getattr(module, "COMMAND", Command))(getattr(module, function))
             self._loaded[name] = typer.main.get_command(alone)
         return self._loaded[name]
 

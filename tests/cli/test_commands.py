@@ -68,6 +68,13 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert "holdout" in ok("evaluate", asset, capture.folder) and "k" in ok("info", asset)
 
 
+def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {"point_lights": [[0, 0, 1]], "by_distance": []}
+    monkeypatch.setattr("srbf.cli.evaluate.compare_with_point_lights", lambda *_: found)
+    result = json.loads(ok("evaluate", asset, tmp_path / "scene.blend", "--point-reference", 1, "--json"))
+    assert result == {**found, "lamps": [[0, 0, 1]]}  # for one version
+
+
 @pytest.mark.parametrize(
     "flags", [[], ["--centers", "hammersley3", "--spread", "min"], ["--domain", "sphere", "--ridge", "0.1", "--spread", "0.7"]]
 )
