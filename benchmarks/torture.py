@@ -30,7 +30,7 @@ HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "data" / "scenes"
 WORKER_TIMEOUT = "2"  # seconds; an answer of the fake takes a thousandth
 Trials = Iterator[Callable[[], object]]
-KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-sums"), ("--samples", "auto"))
+KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-accumulation"), ("--samples", "auto"))
 DAMAGES = ("cut", "emptied", "flipped", "zeroed", "removed")
 LIES = ("nan", "short", "small", "wrong", "error")
 

@@ -24,7 +24,7 @@ def let_light_through(scene: bpy.types.Scene, names: list[str]) -> None:
             shown = sorted(o.name for o in scene.objects if o.type in {"MESH", "EMPTY", "CURVE", "SURFACE", "FONT", "META"})
             listed = ", ".join(repr(n) for n in shown[:12]) + (", …" if len(shown) > 12 else "")
             raise WorkerError(
-                f"expected an object {name!r} for --no-shadow, found none in scene {scene.name!r}; there are {listed}"
+                f"expected an object {name!r} for --no-cast-shadow, found none in scene {scene.name!r}; there are {listed}"
                 f"{elsewhere.hint(scene, name)}"
             )
         shows = obj.type == "EMPTY" and obj.instance_collection is not None

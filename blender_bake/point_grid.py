@@ -60,7 +60,7 @@ def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     if not free:
         raise WorkerError(
             f"expected room for point lights in the box {_shown(low)} to {_shown(high)} m, found all {len(points)} in or at geometry; "
-            "choose another --light-box or a smaller spacing, or turn the normals of a closed room inwards"
+            "choose another --light-bounds or a smaller spacing, or turn the normals of a closed room inwards"
         )
     rng = np.random.default_rng(asked["seed"])
     random: list[np.ndarray] = []
@@ -71,7 +71,7 @@ def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
         if is_free(point, solids, clearance):
             random.append(point)
     if len(random) < asked["random"]:
-        raise WorkerError(f"expected {asked['random']} random free places in the box, found {len(random)}; choose another --light-box")
+        raise WorkerError(f"expected {asked['random']} random free places in the box, found {len(random)}; choose another --light-bounds")
     return {
         "box": [*low.tolist(), *high.tolist()],
         "grid": [point.tolist() for point in free],

@@ -45,7 +45,7 @@ class FirstLights:
         """The error of `count` black images."""
         return BakeError(
             f"every one of {count} light images is black: does light reach {self._place} from where the lights stand? "
-            "Mend the scene, then bake with --restart"
+            "Mend the scene, then bake with `restart=True`"
         )
 
     def look(self, image: np.ndarray) -> None:
@@ -66,7 +66,7 @@ class FirstLights:
         if not self._varied:
             raise BakeError(
                 f"the first {self._count} light images all hold {value:g} and nothing else: {self._place} does not answer to light. "
-                "Mend the scene, then bake with --restart"
+                "Mend the scene, then bake with `restart=True`"
             )
 
 
@@ -85,5 +85,5 @@ def check_disk(folder: Path, needed: int) -> None:
     if free < needed:
         raise WriteError(
             f"expected {needed / 1e9:.2f} GB free for the whole capture at {folder}, found {free / 1e9:.2f} GB; "
-            "free some, choose another -o, or a smaller --size"
+            "free some, choose another folder, or a smaller `size`"
         )

@@ -66,7 +66,7 @@ def hold(folder: Path) -> Iterator[None]:
 def hold_part(folder: Path, part: Part) -> Iterator[None]:
     """Hold one part of a bake beside others of as many; BakeError where another process holds it, or all of the folder."""
     if not folder.is_dir():
-        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run `shard=prepare` first")
     # A part holds the folder for a moment, to find its place: so no bake of all of it can begin unseen, and none be under way.
     whole = locked(folder, LOCK, FINDING_A_PLACE)
     if whole is None:
@@ -144,7 +144,7 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
         if force or (restart and not finished):
             _empty(folder)
             return False
-        raise ManifestError(f"{error}; {'--force' if finished else '--restart'} bakes anew") from error
+        raise ManifestError(f"{error}; {'`force=True`' if finished else '`restart=True`'} bakes anew") from error
     if recorded.get("tidying"):
         tidy(folder)
         return is_finished(folder, identity, force, restart)
@@ -156,11 +156,13 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
         return finished and not _may_grow(folder, recorded, identity)
     if not (force or (restart and not finished)):
         if not changed:
-            raise OutputExistsError(f"expected an unfinished capture to restart at {folder}, found a finished one; --force replaces it")
+            raise OutputExistsError(
+                f"expected an unfinished capture to restart at {folder}, found a finished one; `force=True` replaces it"
+            )
         state = "a finished capture" if finished else "a capture half done"
         raise OutputExistsError(
             f"expected {state} of the same scene and settings at {folder}, found another {', '.join(changed)}; "
-            f"choose another -o, or {'--force' if finished else '--restart'} to bake anew"
+            f"choose another folder, or {'`force=True`' if finished else '`restart=True`'} to bake anew"
         )
     _empty(folder)
     return False
@@ -181,7 +183,7 @@ def is_past_parts(folder: Path, identity: dict[str, Any]) -> bool:
     if state == MANIFEST and not _may_grow(folder, recorded, identity):
         return True
     if state != STATE or not (folder / SUMS / PREPARED).is_file():
-        raise BakeError(f"expected a prepared capture at {folder}, found none; run --part prepare first")
+        raise BakeError(f"expected a prepared capture at {folder}, found none; run `shard=prepare` first")
     return False
 
 
@@ -209,8 +211,8 @@ def _may_grow(folder: Path, recorded: dict[str, Any], asked: dict[str, Any]) -> 
     more = not recorded.get("validation_curve") if wants == "auto" else wants > has
     if more and not any((folder / SUMS).glob("[0-9]*")):
         raise OutputExistsError(
-            f"expected the sums of {folder}, to add to its {has} samples a texel, found none: they are kept by --keep-sums, "
-            "--samples auto and --time; choose another -o, or --force to bake anew"
+            f"expected the sums of {folder}, to add to its {has} samples a texel, found none: they are kept by `keep_accumulation=True`, "
+            "`samples=auto` and `time_limit`; choose another folder, or `force=True` to bake anew"
         )
     return more
 

@@ -99,7 +99,7 @@ class CaptureImages:
         """BakeError where a worker tells of another receiver than what is prepared."""
         assert self.prepared is not None
         if without_uv(facts) != self.prepared["facts"] or uv_checksum(facts) != self.prepared["uv"]:
-            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add `restart=True`")
 
     def require_size(self, light: PlannedLight, image: ndarray) -> None:
         """BakeError where an answer has not the size of the receiver."""

@@ -44,7 +44,7 @@ def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> No
 def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
     """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_PER_TASK lights."""
     if bake.is_open_ended:
-        raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time")
+        raise InputError("`farm` needs its tasks beforehand: expected a number of `samples`, found `samples=auto` or `time_limit`")
     lights = len(plan_lights(bake.settings))
     count = min(lights, tasks or -(-lights // LIGHTS_PER_TASK))
     command = ["-m", "srbf", "bake", "{{Param.Scene}}", "-o", "{{Param.Capture}}", *_flags(bake)]
@@ -61,9 +61,9 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
             {"name": "Python", "type": "STRING", "default": "python3", "description": "A Python that has srbf."},
         ],
         "steps": [
-            _step("Prepare", [*command, "--part", "prepare"]),
+            _step("Prepare", [*command, "--shard", "prepare"]),
             {
-                **_step("Bake", [*command, "--part", f"{{{{Task.Param.Part}}}}/{count}"], "Prepare"),
+                **_step("Bake", [*command, "--shard", f"{{{{Task.Param.Part}}}}/{count}"], "Prepare"),
                 "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{count}"}]},
             },
             _step("Finish", command, "Bake"),
@@ -91,12 +91,12 @@ def arguments(settings: BakeSettings) -> list[str]:
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",
-        "light-box": None if points is None or points.box is None else ",".join(map(repr, points.box)),
+        "light-bounds": None if points is None or points.box is None else ",".join(map(repr, points.box)),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
-    flags += [f"--no-shadow={name}" for name in settings.no_shadow]
+    flags += [f"--no-cast-shadow={name}" for name in settings.no_shadow]
     flags += ["--keep-scene-lights"] if settings.keep_scene_lights else []
     return flags + (["--denoise"] if settings.denoise else [])
 
@@ -104,12 +104,12 @@ def arguments(settings: BakeSettings) -> list[str]:
 def _flags(bake: Bake) -> list[str]:
     crew = {
         "workers": bake.crew.workers,
-        "lights-a-worker": bake.crew.lights_per_worker,
-        "hang-after": bake.crew.worker_timeout,
+        "lights-per-worker": bake.crew.lights_per_worker,
+        "worker-timeout": bake.crew.worker_timeout,
         "blender": bake.blender,
     }
     flags = [f"--{name}={value}" for name, value in crew.items() if value is not None]
-    flags += ["--keep-sums"] if bake.keep_sums else []
+    flags += ["--keep-accumulation"] if bake.keep_sums else []
     for flag in (*flags, *arguments(bake.settings), bake.scene.stem):
         if "{{" in flag and flag != "--light-list={{Param.LightList}}":
             raise InputError(f"expected names without {{{{, which a job template reads as its own, found {flag!r}; rename it")

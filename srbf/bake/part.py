@@ -25,7 +25,7 @@ class Part:
         found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
         number, count = (int(word) for word in found.groups()) if found else (0, 0)
         if not 1 <= number <= count:
-            raise InputError(f"expected --part prepare or I/N with I from 1 to N, found {text!r}")
+            raise InputError(f"expected prepare or I/N with I from 1 to N, found {text!r}")
         return Part(number, count)
 
     @property

@@ -63,7 +63,7 @@ class Bake:
 
     def __post_init__(self) -> None:
         if self.seconds is not None and self.settings.denoise:
-            raise InputError("--denoise needs a given number of samples, found --time; give --samples, or take --denoise off")
+            raise InputError("`denoise` needs a given number of samples, found `time_limit`; give `samples`, or take `denoise` off")
 
     @property
     def is_open_ended(self) -> bool:
@@ -87,7 +87,9 @@ class Bake:
         identity = self._identity()
         existed = self.folder.exists()
         if part is not None and self.is_open_ended:
-            raise InputError("--part needs to know how much there is to do: expected --samples N, found --samples auto or --time")
+            raise InputError(
+                "`shard` needs to know how much there is to do: expected a number of `samples`, found `samples=auto` or `time_limit`"
+            )
         if part is not None and not part.is_preparation:
             return self._run_beside(part, identity, reporter)
         with folder.hold(self.folder):
@@ -172,7 +174,7 @@ class _Passes:
         with self._renderer() as crew, self._alarm(crew):
             if self._images.prepared is None:
                 if self._part is not None and not self._part.is_preparation:
-                    raise BakeError(f"expected {self._folder} prepared, found it damaged; run --part prepare again")
+                    raise BakeError(f"expected {self._folder} prepared, found it damaged; run `shard=prepare` again")
                 self._reporter.progress(0, 1, "opening the scene")
                 crew.open()
                 assert self._facts is not None
@@ -348,7 +350,7 @@ class _Passes:
         path = self._folder / STATE
         began = files.read_json(path).get("blender", blender) if path.is_file() else blender
         if began != blender:
-            raise BakeError(f"expected Blender {began}, which began {self._folder}, found {blender}; use it, or add --restart")
+            raise BakeError(f"expected Blender {began}, which began {self._folder}, found {blender}; use it, or add `restart=True`")
         files.write_json(path, {**self._identity, "blender": blender})
 
     def _start(self, scratch: Path) -> Worker:

@@ -43,7 +43,7 @@ class Receiver:
             return Receiver("lightmap", name, uv_layer, unwrap=unwrap)
         if (kind == "vertices" and name) or kind == "view":
             if uv_layer is not None:
-                raise InputError(f"--uv-layer belongs to a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
+                raise InputError(f"`uv_layer` belongs to a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
             return Receiver("view" if kind == "view" else "vertices", name or None)
         raise InputError(f"expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found {text!r}")
 
@@ -140,9 +140,9 @@ class BakeSettings:
             if not getattr(self, name) >= 0:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
         if self.samples == "auto" and (self.validation < 1 or self.holdout_samples < 2):
-            raise InputError("--samples auto judges by validation lights of at least 2 samples, found none; leave --validation as it is")
+            raise InputError("`samples=auto` judges by validation lights of at least 2 samples, found none; leave `validation` as it is")
         if self.denoise and (self.samples == "auto" or self.receiver.kind != "view" or self.transport != "combined"):
-            raise InputError("--denoise is for views of transport combined and a given number of samples, found another; take it off")
+            raise InputError("`denoise` is for views of transport combined and a given number of samples, found another; take it off")
         if max(self.width, self.height) > LARGEST_SIDE:
             raise InputError(f"expected a size of at most {LARGEST_SIDE} texels a side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
@@ -151,16 +151,16 @@ class BakeSettings:
             raise InputError("expected vertices with transport combined, found indirect: rays have no footprint to spread over at a point")
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
-                raise InputError("expected point lights without --light-list and --sun-angle, which are of directional ones")
+                raise InputError("expected point lights without `light_list` and `sun_angle`, which are of directional ones")
             if self.samples == "auto":
                 raise InputError("expected a number of samples with point lights, found auto, which judges by fits of directional ones")
             if self.transport != "combined":
-                raise InputError("expected --transport combined with point lights: only a sun's direct light is taken apart")
+                raise InputError("expected `transport=combined` with point lights: only a sun's direct light is taken apart")
 
     def with_matched_sun(self) -> BakeSettings:
         """The same with a sun as large as the train lights stand apart: penumbrae as soft as that many lights can resolve."""
         if self.points is not None:
-            raise InputError("expected directional lights for a matched sun, found point lights; leave --sun-angle away")
+            raise InputError("expected directional lights for a matched sun, found point lights; leave `sun_angle` out")
         train = [light.place for light in plan_lights(self) if light.role == "train"]
         return replace(self, sun_angle=min(mean_spacing(np.array(train)), float(np.pi)))
 

@@ -51,22 +51,22 @@ def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[
     """
     if bake.settings.receiver.kind == "vertices":
         if texels_per_meter is not None:
-            raise InputError("--texels-per-meter belongs to a lightmap, found it with vertices")
+            raise InputError("`texels_per_meter` belongs to a lightmap, found it with vertices")
         facts = survey(bake, {"vertices": True}, say)
         return _sized(bake, facts["width"], facts["height"])
     if texels_per_meter is None:
         return bake
     if bake.settings.receiver.kind != "lightmap":
-        raise InputError("--texels-per-meter belongs to a lightmap, found it with a view; give its --size")
+        raise InputError("`texels_per_meter` belongs to a lightmap, found it with a view; give its `size`")
     if not (texels_per_meter > 0 and math.isfinite(texels_per_meter)):
-        raise InputError(f"expected --texels-per-meter above 0, found {texels_per_meter:g}")
+        raise InputError(f"expected `texels_per_meter` above 0, found {texels_per_meter:g}")
     facts = survey(bake, {"texels_per_meter": texels_per_meter}, say)
     side = MULTIPLE * math.ceil(facts["side"] / MULTIPLE)
     if side > LARGEST_SIDE:
         most = math.floor(LARGEST_SIDE * math.sqrt(facts["uv_area"] / facts["world_area"]) * 100) / 100
         raise InputError(
             f"expected a lightmap of at most {LARGEST_SIDE} texels a side, found {side} at {texels_per_meter:g} texels a meter on "
-            f"{facts['world_area']:.4g} square meters; take --texels-per-meter {most:g} or less, or --separate lightmaps"
+            f"{facts['world_area']:.4g} square meters; take `texels_per_meter={most:g}` or less, or `separate=True` lightmaps"
         )
     say(f"{side}x{side} texels: {texels_per_meter:g} a meter on {facts['world_area']:.4g} square meters, UVs fill {facts['uv_area']:.0%}")
     return _sized(bake, side, side)
@@ -83,7 +83,7 @@ def with_frame(bake: Bake, longer: int, anew: bool, say: Callable[[str], None] =
     found = survey(bake, {"frame": True}, say)["frame"]
     aspect = float(found["aspect"])
     width, height = (longer, max(1, round(longer / aspect))) if aspect >= 1 else (max(1, round(longer * aspect)), longer)
-    say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; --size WxH gives another")
+    say(f"{width}x{height} texels: the shape of the camera's frame, {found['text']}; `size=WxH` gives another")
     return _sized(bake, width, height)
 
 

@@ -27,14 +27,14 @@ def command(blender: Path | None, job: Path) -> list[str]:
     confined = [sys.executable, str(Path(package.origin).parent / "confine.py"), str(job.parent)] if sys.platform != "win32" else []
     if blender is not None:
         if shutil.which(blender) is None:
-            raise BakeError(f"cannot start Blender at {blender}: expected a program, found none; correct --blender")
+            raise BakeError(f"cannot start Blender at {blender}: expected a program, found none; correct `blender`")
         script = str(Path(package.origin).parent / "__main__.py")
         return [*confined, str(blender), "--background", "--factory-startup", "--disable-autoexec", "--python", script, "--", str(job)]
     if importlib.util.find_spec("bpy") is None:
         version = f"{sys.version_info.major}.{sys.version_info.minor}"
         raise MissingLibraryError(
             f"baking needs Blender: this Python {version} has no bpy (there is one for 3.11 and 3.13); "
-            "add --blender /path/to/blender, or install srbf[blender] under such a Python"
+            "add `blender=/path/to/blender`, or install srbf[blender] under such a Python"
         )
     return [*confined, sys.executable, "-m", "blender_bake", str(job)]
 

@@ -34,6 +34,7 @@ OTHERWISE_NAMED = {  # arguments of the library whose flag has another name
     "seconds": "time_limit",
 }
 ARGUMENT = re.compile(r"`(\w+)(?:=([^`]*))?`")  # `name`, or `name=value` as a call in Python has it
+QUOTED = re.compile(r"[\"']([\w.:/-]+)[\"']")  # a value that a shell takes without its quotes
 
 
 def present(word: str, flags: Collection[str]) -> str:
@@ -52,10 +53,10 @@ def in_flags(message: str, parameters: Sequence[Any]) -> str:
 
     def flag(found: re.Match[str]) -> str:
         name, value = found[1], found[2]
-        parameter = by_name.get(name) or by_name.get(OTHERWISE_NAMED.get(name, ""))
+        parameter = by_name.get(OTHERWISE_NAMED.get(name, "")) or by_name.get(name)
         if parameter is None:
             return found[0]
-        return called(parameter) if value in (None, "True") else f"{called(parameter)} {value.strip(chr(34) + chr(39))}"
+        return called(parameter) if value in (None, "True") else f"{called(parameter)} " + QUOTED.sub(r"\1", value)
 
     return ARGUMENT.sub(flag, message)
 

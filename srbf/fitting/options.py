@@ -78,7 +78,7 @@ def more_maps_than_lights(chosen: RelightingMap | Planes, capture: Capture) -> s
     if not isinstance(chosen, RelightingMap) or chosen.k <= lights:
         return None
     return (
-        f"caution: {chosen.k} maps of {lights} train lights hold more than was seen; more photographs, or -k {lights} and fewer, cost less"
+        f"caution: {chosen.k} maps of {lights} train lights hold more than was seen; more photographs, or `k={lights}` and fewer, cost less"
     )
 
 

@@ -137,7 +137,7 @@ def test_parts_in_any_order_give_the_same_bits(blend, plain: Path, tmp_path: Pat
     folder = tmp_path / "capture"
     settings = BakeSettings(Receiver("lightmap", "Plane"), 24, 24, lights=20, samples=8, validation=1, holdout=1, holdout_samples=8)
     bake = Bake(blend("emissive"), folder, settings)
-    with pytest.raises(BakeError, match="--part prepare first"):
+    with pytest.raises(BakeError, match="shard=prepare. first"):
         bake.run(Reporter(), part=Part(1, 3))
     assert bake.run(Reporter(), part=Part.parse("prepare"))
     assert bake.run(Reporter(), part=Part(3, 3))
@@ -186,7 +186,7 @@ def test_every_light_is_in_one_part() -> None:
         assert sorted(light.index for light in lights) == list(range(len(order)))
     assert Part.parse("prepare").of(order) == []
     for text in ("0/3", "4/3", "1", "prepared", "1/3/5", "-1/3"):
-        with pytest.raises(InputError, match="--part"):
+        with pytest.raises(InputError, match="expected prepare or I/N"):
             Part.parse(text)
 
 
@@ -228,9 +228,9 @@ def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
 def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.compute.dask_client.CONNECTING", 1.0)
     for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, seconds=60.0)):
-        with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
+        with pytest.raises(InputError, match="expected a number of `samples`, found `samples=auto` or `time_limit`"):
             template(bake)
-        with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
+        with pytest.raises(InputError, match="expected a number of `samples`, found `samples=auto` or `time_limit`"):
             bake.run(Reporter(), part=Part(1, 2))
     with pytest.raises(InputError, match="rename"):
         template(Bake(bake_of(tmp_path).scene, tmp_path / "c", BakeSettings(Receiver("lightmap", "{{Param.Scene}}"))))
@@ -240,7 +240,7 @@ def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatc
         pass
     with pytest.raises(InputError, match="relighting-map.*eigen-map"):
         fit(tmp_path, tmp_path / "asset", method="eigen-map", dask="tcp://x:1")
-    for flags in (["--part", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--part", "1/2", "--force"]):
+    for flags in (["--shard", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--shard", "1/2", "--force"]):
         words = srbf("bake", tmp_path / "scene.blend", "-o", tmp_path / "x", "--receiver", "view", *flags)
         refused = subprocess.run(words, capture_output=True, text=True)
         assert refused.returncode == 2 and len(refused.stderr.strip().splitlines()) == 1 and not (tmp_path / "x").exists()
@@ -270,15 +270,15 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     ):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise"}
-    assert not missing and "--no-shadow=Roof" in flags
+    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise", "no_shadow"}
+    assert not missing and "--no-cast-shadow=Roof" in flags
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
     assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))
     point_lights = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
     flags = arguments(BakeSettings(Receiver("view"), points=point_lights))
     (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
-    (light_box,) = (flag.removeprefix("--light-box=") for flag in flags if flag.startswith("--light-box="))
+    (light_box,) = (flag.removeprefix("--light-bounds=") for flag in flags if flag.startswith("--light-bounds="))
     assert PointGrid.parse(light_set, light_box) == PointGrid(point_lights.spacing, point_lights.box)
     job = template(bake_of(tmp_path, lights=77), None)
     assert [step["name"] for step in job["steps"]] == ["Prepare", "Bake", "Finish", "Fit"]

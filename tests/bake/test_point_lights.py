@@ -47,8 +47,8 @@ def test_words_of_a_light_set() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"sun_angle": 0.1}, "--sun-angle"),
-        ({"light_list": Path("l.lp")}, "--light-list"),
+        ({"sun_angle": 0.1}, "sun_angle"),
+        ({"light_list": Path("l.lp")}, "light_list"),
         ({"transport": "indirect"}, "combined"),
         ({"samples": "auto"}, "auto"),
     ],
@@ -101,7 +101,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
 @pytest.mark.blender
 def test_no_room_is_said(blend, tmp_path: Path) -> None:
     settings = settings_with(PointGrid(0.2, (-1.2, -0.2, 0.8, -0.8, 0.2, 1.2)))
-    with pytest.raises(BakeError, match="--light-box"):
+    with pytest.raises(BakeError, match="--light-bounds"):
         with_free_point_lights(Bake(blend("blocks"), tmp_path, settings))
     settings = settings_with(PointGrid(0.001))
     with pytest.raises(BakeError, match="larger spacing"):
@@ -112,7 +112,7 @@ def test_no_room_is_said(blend, tmp_path: Path) -> None:
 def test_a_white_plane_under_point_lights(blend, tmp_path: Path) -> None:
     """cos / d^2 of irradiance, through the command; and a directional asset of the plane foretells it, since nothing casts a shadow."""
     flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 64, "--holdout-samples", 64]
-    points = ["--light-set", "point:0.8", "--light-box", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
+    points = ["--light-set", "point:0.8", "--light-bounds", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
     done = subprocess.run(
         [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "point_lights", *map(str, flags + points)],
         capture_output=True,

@@ -145,7 +145,7 @@ def test_texels_per_meter(bake, scene, tmp_path: Path, unwrap: str) -> None:
 
 def test_a_density_that_no_lightmap_can_have(scene, tmp_path: Path) -> None:
     planned = Bake(scene("shared"), tmp_path / "dense", BakeSettings(Receiver("lightmap", "Tilted"), **SMALL))
-    with pytest.raises(InputError, match=r"at most 16384 .* found \d+ at 1e\+06 texels a meter on 8 square.*--texels-per-meter 5792.61 or"):
+    with pytest.raises(InputError, match=r"at most 16384 .* found \d+ at 1e\+06 texels a meter on 8 square.*texels_per_meter=5792.61` or"):
         with_size(planned, 1e6)
     with pytest.raises(InputError, match="above 0"):
         with_size(planned, -1.0)
@@ -342,7 +342,7 @@ def test_denoising_brings_few_samples_nearer_to_many(bake) -> None:
         return float(np.sqrt(np.mean([((capture.image(i) - clean.image(i))[covered] ** 2).mean() for i in range(2)])))
 
     assert error(denoised) < error(noisy)
-    with pytest.raises(InputError, match="--denoise is for views"):
+    with pytest.raises(InputError, match="`denoise` is for views"):
         bake("views", "lightmap:Plane", folder="none", denoise=True)
 
 

@@ -114,7 +114,7 @@ def test_samples_added_later_give_the_bits_of_one_bake(blend, tmp_path: Path) ->
     assert (folder / "sums").is_dir() and not (whole / "sums").exists()
     assert job(blend, folder, **eight).run(Reporter())
     assert contents(folder) == contents(whole)
-    with pytest.raises(OutputExistsError, match="sums.*--keep-sums"):
+    with pytest.raises(OutputExistsError, match="sums.*keep_accumulation"):
         job(blend, folder, **{**eight, "samples": 16}).run(Reporter())
     assert contents(folder) == contents(whole)
 
@@ -170,7 +170,7 @@ def test_other_settings_are_refused_and_named(blend, tmp_path: Path) -> None:
     assert job(blend, folder).run(Reporter())
     before = contents(folder)
     assert not job(blend, folder).run(Reporter())  # complete already
-    with pytest.raises(OutputExistsError, match="samples.*--force"):
+    with pytest.raises(OutputExistsError, match="samples.*force=True"):
         job(blend, folder, samples=2).run(Reporter())
     assert contents(folder) == before
     (folder / "capture.json").rename(tmp_path / "manifest")

@@ -86,7 +86,7 @@ def test_a_receiver_comes_back_from_its_manifest() -> None:
     [
         ("surfel:A", None, "lightmap:OBJECT, vertices:OBJECT or view"),
         ("vertices:", None, "vertices:OBJECT"),
-        ("vertices:A", "UV", "--uv-layer belongs to a lightmap receiver, found it with vertices"),
+        ("vertices:A", "UV", "`uv_layer` belongs to a lightmap receiver, found it with vertices"),
     ],
 )
 def test_receivers_that_no_bake_has(word: str, layer: str | None, words: str) -> None:
@@ -98,7 +98,7 @@ def test_what_only_some_receivers_can() -> None:
     with pytest.raises(InputError, match="vertices with transport combined"):
         BakeSettings(Receiver("vertices", "A"), transport="indirect")
     for receiver, transport in ((Receiver("lightmap", "A"), "combined"), (Receiver("view"), "indirect")):
-        with pytest.raises(InputError, match="--denoise is for views"):
+        with pytest.raises(InputError, match="`denoise` is for views"):
             BakeSettings(receiver, transport=transport, denoise=True)
 
 
