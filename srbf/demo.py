@@ -105,7 +105,7 @@ def run_demo(
         baked = Bake(blend, capture_folder, settings).run(reporter)
     except OutputExistsError as error:
         raise OutputExistsError(
-            f"expected this demo's own capture at {capture_folder}, found another; choose another -o, or delete it"
+            f"expected this demo's own capture at {capture_folder}, found another; choose another folder, or delete it"
         ) from error
     if baked:
         timings["bake"] = clock() - started

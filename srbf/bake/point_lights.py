@@ -38,7 +38,7 @@ class PointGrid:
                 raise InputError(f"expected a box x0,y0,z0,x1,y1,z1 with each first value the smaller, found {self.box}")
 
     @staticmethod
-    def parse(light_set: str, light_box: str | None) -> PointGrid:
+    def parse(light_set: str, light_bounds: str | None) -> PointGrid:
         """From the command line: `point:SPACING` and `x0,y0,z0,x1,y1,z1`; InputError on other words."""
         kind, _, spacing = light_set.partition(":")
         box: Box | None = None
@@ -47,13 +47,13 @@ class PointGrid:
         except ValueError:
             kind, meters = "", 0.0
         if kind != "point":
-            raise InputError(f"expected --light-set point:SPACING, the spacing in meters, found {light_set!r}")
-        if light_box is not None:
+            raise InputError(f"expected `light_set` point:SPACING, the spacing in meters, found {light_set!r}")
+        if light_bounds is not None:
             try:
-                x0, y0, z0, x1, y1, z1 = (float(word) for word in light_box.split(","))
+                x0, y0, z0, x1, y1, z1 = (float(word) for word in light_bounds.split(","))
                 box = (x0, y0, z0, x1, y1, z1)
             except ValueError as error:
-                raise InputError(f"expected --light-box x0,y0,z0,x1,y1,z1 in meters, found {light_box!r}") from error
+                raise InputError(f"expected `light_bounds` x0,y0,z0,x1,y1,z1 in meters, found {light_bounds!r}") from error
         return PointGrid(meters, box)
 
     def places(self, validation: int, holdout: int) -> tuple[Float64[ndarray, "L 3"], Float64[ndarray, "V 3"], Float64[ndarray, "H 3"]]:

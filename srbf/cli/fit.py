@@ -10,7 +10,7 @@ import typer
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
-from srbf.cli.method_flags import with_method_flags
+from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
@@ -19,6 +19,8 @@ from srbf.evaluation.errors_by_role import TrainWatch, evaluate
 from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
 from srbf.methods import FitRun, method_of
+
+COMMAND = FitCommand
 
 
 @with_method_flags

@@ -9,14 +9,14 @@ from dataclasses import MISSING, Field, fields
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
-import typer.core
 
+from srbf.cli.group import Command
 from srbf.fitting.auto_method import DEFAULT_BUDGET
 from srbf.fitting.options import AUTO
 from srbf.registry import all_methods, method_names
 
 
-class FitCommand(typer.core.TyperCommand):
+class FitCommand(Command):
     """A command in which `-k`, `--components` and `--clusters` may be bare: then they have the default of the method that they imply."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

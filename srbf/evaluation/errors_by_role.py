@@ -252,7 +252,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
     """(what the relit images are compared with, what the peak is taken of)."""
     if asset.transport == "combined":
         if direct != "none":
-            raise InputError(f"expected an indirect asset for --direct {direct}, found a combined one: it holds the direct light already")
+            raise InputError(f"expected an indirect asset for `direct={direct}`, found a combined one: it holds the direct light already")
         combined = capture.combined()
         return combined, combined
     whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
@@ -260,7 +260,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
         if capture.transport == "combined":
             raise InputError(
                 f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
-                "add its direct light: --direct ray or shadow-map"
+                "add its direct light: `direct=ray` or shadow-map"
             )
         return capture, whole
     return capture.combined(), whole

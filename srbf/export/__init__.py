@@ -16,7 +16,7 @@ from srbf.io.files import atomic_folder, check_replaceable, checksums, write_jso
 __all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
 
 TARGETS: dict[str, str] = {  # by name: the module whose `write` fills a folder, imported when it is asked for
-    **{name: f"srbf.export.{name}" for name in ("exr", "uint8", "dds", "ktx2", "gltf")},
+    **{name: f"srbf.export.{name}" for name in ("exr", "png", "dds", "ktx2", "gltf")},
     **{name: f"srbf.export.{name}" for name in ("godot", "unity", "unreal", "hlsl", "metal", "wgsl")},
     "web": "srbf.viewer.site",
 }
@@ -66,7 +66,7 @@ def export(
         if min_psnr is not None and not psnr >= min_psnr:
             raise InputError(
                 f"expected at least {min_psnr:g} dB of {target} as {exported.encoding}, found {psnr:.2f}; "
-                "nothing was written: take a larger --encoding, or lower --min-psnr"
+                "nothing was written: take a larger `encoding`, or lower `min_psnr`"
             )
         source = exported.manifest.setdefault("source", {})
         source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3), "notes": list(written.notes)}

@@ -15,7 +15,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill `folder` with the asset as EXRs, half floats unless told; half floats that are there already stay as they are."""
     encoding = settings.encoding or "half"
     if encoding != "half" and encoding != "float":
-        raise InputError(f"expected --encoding half or float for EXR files, found {encoding}")
+        raise InputError(f"expected `encoding` half or float for EXR files, found {encoding}")
     no_levels(settings, "EXR files")
     stored, scale, bias = in_encoding(asset, encoding)
     with_layers(asset, "exr", stored, scale, bias, layer_entries(stem(asset), encoding, scale, bias)).write(folder)

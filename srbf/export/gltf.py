@@ -82,7 +82,7 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
     document = Glb({"asset": {"version": "2.0", "generator": "srbf export"}})
     kind = asset.receiver.get("kind")
     if kind == "vertices":
-        raise InputError("expected a lightmap or a view, found an asset of vertices; give the mesh with a UV for each: --mesh FILE.glb")
+        raise InputError("expected a lightmap or a view, found an asset of vertices; give the `mesh` with a UV for each, a .glb")
     if kind == "view":
         wide, high = asset.width / max(asset.width, asset.height), asset.height / max(asset.width, asset.height)
         around = np.array([[-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]], np.float32)
@@ -95,7 +95,7 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
         mesh = texel_mesh(asset)
         positions, uv, triangles = _y_up(mesh.positions), mesh.uv, mesh.triangles
         normals = None if mesh.normals is None else _y_up(mesh.normals)
-        notes.append("the mesh is rebuilt from the lightmap's texels; --mesh FILE.glb takes the scene's own")
+        notes.append("the mesh is rebuilt from the lightmap's texels; `mesh`, a .glb, takes the scene's own")
     attributes = {"POSITION": document.add_accessor(positions, bounds=True)}
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -149,7 +149,7 @@ def _light_up(document: Glb, asset: Asset, picture: int, path: Path | None) -> i
             count = document.json["accessors"][primitive.get("indices", attributes["POSITION"])]["count"]
             lit += count // 3
     if not lit:
-        raise InputError(f"expected a mesh with a UV set in {path}, found none; unwrap it, or leave --mesh out")
+        raise InputError(f"expected a mesh with a UV set in {path}, found none; unwrap it, or leave `mesh` out")
     document.use_extension(EXTENSION)
     document.use_extension(UNLIT)
     return lit

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import ShaderError
-from srbf.export import dds, exr, uint8
+from srbf.export import dds, exr, png
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
@@ -20,7 +20,7 @@ DATA = "asset"  # the folder of the asset's images, which Godot's own importers 
 IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
 MODEL = "model.glb"  # what the example shows in place of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
-WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": dds.write, "bc1": dds.write}
+WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
 _SAMPLER_PRECISION = re.compile(r"\b(?:high|medium|low)p\s+(?=[iu]?sampler)")

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage, sparse
 
 from srbf.arrays import Float32
 from srbf.asset import Asset
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.io.containers.texture_array import level_size
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 GUTTER = 2.5  # of a level's texels between two charts: half a texel into one a bilinear sample takes the next, whose nearest is its own
 
@@ -51,6 +55,8 @@ def smaller_levels(
 
 def shares(size: int, smaller: int) -> sparse.csr_matrix:
     """(smaller, size): the share of each texel in each smaller one, which covers size / smaller of them."""
+    from scipy import sparse
+
     edges = np.arange(smaller + 1) * (size / smaller)
     rows, columns, shares = [], [], []
     for i in range(smaller):
@@ -87,6 +93,8 @@ def levels_without_bleeding(asset: Asset) -> int:
 
 def chart_gap(coverage: Float32[ndarray, "H W"]) -> int | None:
     """The fewest uncovered texels, across, down or aslant, between two charts (connected covered texels); None of fewer than two."""
+    from scipy import ndimage
+
     covered = coverage > 0
     labels, count = ndimage.label(covered, np.ones((3, 3)))
     if count < 2:

@@ -57,7 +57,7 @@ def write_scene_mesh(
     if output.suffix.lower() != SUFFIX:
         raise InputError(f"expected -o NAME{SUFFIX}, found {output.name!r}; a binary glTF is written")
     if output.exists() and not (force and output.is_file()):
-        raise OutputExistsError(f"expected no {output} yet, found one; choose another -o, or add --force")
+        raise OutputExistsError(f"expected no {output} yet, found one; choose another, or `force=True`")
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found {'a folder' if scene.is_dir() else 'no such file'}")
     opened = None if capture is None else Capture.open(capture)
@@ -81,7 +81,7 @@ def lightmap_receivers(capture: Capture) -> list[dict[str, Any]]:
     kinds = {str(one.get("kind", "none")) for one in found}
     if kinds != {"lightmap"} or not all("object" in one and "uv_layer" in one for one in found):
         raise InputError(
-            f"expected a lightmap's capture at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; leave --capture out"
+            f"expected a lightmap's capture at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; leave `capture` out"
         )
     return found
 

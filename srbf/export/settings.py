@@ -39,4 +39,4 @@ Target = Callable[[Asset, Path, Settings], Written]  # fills an existing empty f
 def no_levels(settings: Settings, where: str) -> None:
     """InputError where mip levels are asked of files that hold none."""
     if settings.levels not in ("auto", 0, 1):
-        raise InputError(f"expected no mip levels in {where}, found --levels {settings.levels}; export dds or ktx2")
+        raise InputError(f"expected no mip levels in {where}, found `levels={settings.levels}`; export dds or ktx2")

@@ -32,7 +32,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
     InputError without positions, and where no three texels are neighbors.
     """
     if "position" not in asset.images:
-        raise InputError("expected a position map to rebuild the mesh from, found none; give the mesh: --mesh FILE.glb")
+        raise InputError("expected a position map to rebuild the mesh from, found none; give a `mesh`, a .glb")
     covered, position = asset.covered, asset.images["position"]
     near = _near(covered, position)
     number = np.cumsum(covered.ravel()).reshape(covered.shape) - 1
@@ -48,7 +48,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
         found.append(quads[chosen][:, [a, b, c]])
     triangles = np.concatenate(found)
     if not len(triangles):
-        raise InputError("expected texels that are neighbors on the surface to rebuild the mesh from, found none; give it: --mesh FILE.glb")
+        raise InputError("expected texels that are neighbors on the surface to rebuild the mesh from, found none; give a `mesh`, a .glb")
     points = position[covered]
     normal = asset.images["normal"][covered] if "normal" in asset.images else None
     if normal is not None:

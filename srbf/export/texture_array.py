@@ -33,7 +33,7 @@ def write(suffix: str, asset: Asset, folder: Path, settings: Settings = PLAIN) -
     """
     form = settings.encoding or "bc7"
     if form == "float":
-        raise InputError(f"expected --encoding {', '.join(get_args(TexelFormat))} for a texture array, found {form}")
+        raise InputError(f"expected `encoding` {', '.join(get_args(TexelFormat))} for a texture array, found {form}")
     if form == "bc1" and asset.stored.shape[3] > 3:
         raise InputError(
             f"expected bc7 for scalar planes, four to a layer, found bc1, which has three channels; export {asset.method} as bc7"
@@ -107,11 +107,11 @@ def _levels(asset: Asset, settings: Settings) -> tuple[int, list[str]]:
         clustered = "no mip levels: scalars of different clusters have no mean; relight to a texture and filter that"
         return clean, [clustered] if "cluster_index" in asset.tables else []
     if not 0 <= settings.levels <= most:
-        raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found --levels {settings.levels}")
+        raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found `levels={settings.levels}`")
     levels = max(1, settings.levels)
     if levels > 1 and "cluster_index" in asset.tables:
         raise InputError(
-            "expected no mip levels of a clustered eigen map, whose scalars mean another thing in every cluster, found --levels "
-            f"{levels}; relight it to a texture and let the GPU filter that"
+            "expected no mip levels of a clustered eigen map, whose scalars mean another thing in every cluster, found "
+            f"`levels={levels}`; relight it to a texture and let the GPU filter that"
         )
     return levels, [f"from level {clean} on, charts share texels: {levels} levels where {clean} keep them apart"] if levels > clean else []

@@ -19,7 +19,7 @@ def keep(asset: Asset, count: int, encoding: Encoding | None = None) -> Asset:
     if have is None:
         raise InputError(f"expected relighting maps or an eigen map to keep fewer of, found {asset.method}; fit again with fewer")
     if not 1 <= count <= have:
-        raise InputError(f"expected to keep 1 to {have} of the asset's {have}, found --keep {count}")
+        raise InputError(f"expected `count` of 1 to {have}, as many as the asset has, found {count}")
     manifest = {key: value for key, value in asset.manifest.items() if key not in ("error", "sha256")}
     manifest["source"] = {**manifest.get("source", {}), "kept": {"of": have}}
     return method.reduced(asset, manifest, count, encoding or asset.held)

@@ -93,7 +93,7 @@ class RelightingMap(Method):
 
     def __post_init__(self) -> None:
         if not 1 <= self.k <= 2048:
-            raise InputError(f"expected 1 to 2048 maps (the layers of a texture array), found -k {self.k}")
+            raise InputError(f"expected 1 to 2048 maps (the layers of a texture array), found `k={self.k}`")
         if self.ridge != "auto" and not (np.isfinite(self.ridge) and self.ridge >= 0):
             raise InputError(f"expected a ridge of auto, 0 or more, found {self.ridge:g}")
         if self.domain not in ("auto", *get_args(Domain)):
@@ -121,7 +121,7 @@ class RelightingMap(Method):
             raise InputError(f"expected train lights in {capture.folder}, found none")
         if len(train) < self.k and self.ridge == 0:
             raise InputError(
-                f"expected as many train lights as maps, found {len(train)} lights for -k {self.k}; lower -k, or leave --ridge auto"
+                f"expected as many train lights as maps, found {len(train)} lights for `k={self.k}`; lower `k`, or leave `ridge=auto`"
             )
         domain = domain_of_capture(capture, self.domain)
         if self.basis == "hemispherical-harmonics":

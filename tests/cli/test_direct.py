@@ -122,7 +122,7 @@ def test_a_combined_asset_takes_no_direct_light(capture: Capture, make_capture, 
     whole = make_capture(lambda d: np.full((10, 14, 3), d[2]), name="combined")
     ok("fit", whole.folder, "-o", tmp_path / "combined asset", "-k", 9)
     combined = tmp_path / "combined asset"
-    for command in (("relight", combined, "-o", tmp_path / "x.exr"), ("evaluate", combined, whole.folder)):
+    for command in (("relight", combined, "-o", tmp_path / "x.exr", "--ambient-only"), ("evaluate", combined, whole.folder)):
         assert "holds the direct light already" in refused(*command, "--direct", "ray")
 
 

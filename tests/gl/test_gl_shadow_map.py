@@ -62,7 +62,7 @@ def test_a_wide_sun_softens_it(context: Any) -> None:
 
 def test_point_lights_are_refused_and_environments_pass(context: Any) -> None:
     with ShadowMapper(build_plane(), context=context) as mapper:
-        with pytest.raises(InputError, match="--direct ray"):
+        with pytest.raises(InputError, match="direct='ray'"):
             mapper.response([PointLight((0.0, 0.0, 1.0))])
         assert (mapper.response([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
 

@@ -166,7 +166,7 @@ def test_the_table_is_the_gaussian(plane: Asset) -> None:
 
 def test_too_few_lights(make_capture) -> None:
     capture = make_capture(lambert((3, 3)), lights=10)
-    with pytest.raises(InputError, match="10 lights for -k 25"):
+    with pytest.raises(InputError, match="10 lights for `k=25`"):
         RelightingMap(k=25, ridge=0).encode(capture)
     assert RelightingMap(k=25).encode(capture).k == 25
 

@@ -124,7 +124,7 @@ def test_the_command_wants_an_asset_and_at_most_one_capture(fitted: tuple[Captur
     capture, folders = fitted
     named = {"capture": str(capture.folder), "asset": str(folders[0])}
     done = CliRunner().invoke(app, ["view", *(named[name] for name in given), "--no-browser"])
-    assert done.exit_code == (2 if not given else 1)
+    assert done.exit_code == 2 and len(done.stderr.strip().splitlines()) == 1
 
 
 def test_an_asset_that_cannot_be_read_is_said_and_the_other_stays(
