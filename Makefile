@@ -12,18 +12,18 @@ PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*
 .PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check torture bench extension web clean
 setup: $(VENV)/.installed
 
-$(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
+$(VENV)/.installed: pyproject.toml blender_bake/pyproject.toml scripts/debian-packages scripts/make-venv
 	sh scripts/debian-packages
 	sh scripts/make-venv $(PYTHON) $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export]'
+	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export]'
 	touch $@
 
 setup-test: $(VENV)/.tested-by
 
 $(VENV)/.tested-by: $(VENV)/.installed
 	sh scripts/debian-packages test
-	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export,test,dev]'
+	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev]'
 	touch $@
 
 demo: setup $(PAGE)
