@@ -40,7 +40,7 @@ test: setup-test
 	$(BIN)/pytest -n 2 --dist loadfile
 
 test-fast: setup-test
-	$(BIN)/pytest -m "not blender and not engines" -n 2
+	$(BIN)/pytest -m "not blender and not engines and not packaging" -n 2
 
 test-godot: setup-test
 	sh scripts/godot-chroot
