@@ -9,7 +9,7 @@ MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
 PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.glsl)
 
-.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check torture bench extension web clean
+.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check docs torture bench extension web clean
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml blender_bake/pyproject.toml scripts/debian-packages scripts/make-venv
@@ -23,7 +23,7 @@ setup-test: $(VENV)/.tested-by
 
 $(VENV)/.tested-by: $(VENV)/.installed
 	sh scripts/debian-packages test
-	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev]'
+	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev,docs]'
 	touch $@
 
 demo: setup $(PAGE)
@@ -61,6 +61,11 @@ check: setup-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The pages and the reference of the library as a site, build/site; fails on a broken link.
+docs: export NO_MKDOCS_2_WARNING = 1
+docs: setup-test
+	$(BIN)/mkdocs build --strict --quiet
 
 torture: setup-test
 	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)
