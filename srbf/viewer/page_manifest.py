@@ -8,7 +8,7 @@ from typing import Any
 
 from srbf.asset import Asset
 from srbf.evaluation.rate_distortion import family_of, name_of
-from srbf.relighting.alpha import receiver_kind
+from srbf.relighting.alpha import receiver_kind as receiver_kind
 from srbf.viewer.camera import fitted_camera
 
 NAME = "viewer.json"
