@@ -21,7 +21,8 @@ from typing import get_args
 import numpy as np
 
 from srbf.asset import Asset, layer_entries
-from srbf.capture import COVERED, MANIFEST, Capture, Quantity, Role
+from srbf.capture import COVERED, MANIFEST, Capture, Quantity
+from srbf.captured_light import Role
 from srbf.encode.quantization import quantize
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram
 from srbf.evaluation.leave_one_out import leave_one_out

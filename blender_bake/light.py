@@ -25,7 +25,8 @@ class SoleLight:
 
     def aim(self, light: dict[str, Any] | None) -> None:
         """Turn on `light` {kind: directional, direction} (towards the light, unit) or {kind: point, position} (m); None: no light."""
-        kind = None if light is None else light["kind"]
+        light = {"kind": None} if light is None else light
+        kind = light["kind"]
         self._sun.data.energy = 1.0 if kind == "directional" else 0.0
         self._point.data.energy = POINT_WATTS if kind == "point" else 0.0
         if kind == "directional":

@@ -63,8 +63,8 @@ def pbr_material_of(material: bpy.types.Material | None) -> PbrMaterial:
     if not shares:
         return PbrMaterial(material.name_full, (0.0, 0.0, 0.0), specular=0.0)
     found = [(share.weight, share.known, _of_shader(material.name_full, share.shader)) for share in shares]
-    emission = sum(weight * np.array(surface.emission) for weight, _, surface in found)
-    emission = tuple(float(c) for c in np.atleast_1d(emission))
+    emitted = np.sum([weight * np.array(surface.emission) for weight, _, surface in found], axis=0)
+    emission = tuple(float(c) for c in emitted)
     surfaces = [(weight, known, surface) for (weight, known, surface), share in zip(found, shares, strict=True) if share.is_surface]
     if not surfaces:
         clear = next((surface for _, _, surface in found if surface.transmission > 0), None)

@@ -17,8 +17,8 @@ from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.io import files
-from srbf.io.containers import TextureArray, read_texture_array
-from srbf.io.containers.texture_array import level_bytes, level_size
+from srbf.io.containers import read_texture_array
+from srbf.io.containers.texture_array import TextureArray, level_bytes, level_size
 from srbf.io.image import Encoding, read_image, require_finite, write_images
 from srbf.registry import method_named
 from srbf.sphere import Domain

@@ -8,7 +8,8 @@ from typing import Any
 from srbf import asset as assets
 from srbf import capture as captures
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture
+from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.errors import ManifestError
 from srbf.io.image import size_of
 from srbf.methods import method_of

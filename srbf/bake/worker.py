@@ -27,7 +27,7 @@ def command(blender: Path | None, job: Path) -> list[str]:
     """
     package = importlib.util.find_spec("blender_bake")
     if package is None or package.origin is None:
-        raise MissingLibraryError("expected the package blender_bake beside srbf, found none; install srbf again")
+        raise MissingLibraryError("baking needs srbf-blender, found it missing; pip install srbf[blender]")
     sandboxed = [sys.executable, str(Path(package.origin).parent / "sandbox.py"), str(job.parent)] if sys.platform != "win32" else []
     if blender is not None:
         if shutil.which(blender) is None:

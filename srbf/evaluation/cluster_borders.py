@@ -9,7 +9,8 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
 from srbf.light_domain import domain_of_capture
 from srbf.methods import responses

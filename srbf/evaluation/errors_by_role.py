@@ -12,7 +12,8 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
 from srbf.io.float16 import finite_to_float32

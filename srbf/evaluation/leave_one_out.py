@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, role_error, squared_errors
 from srbf.light_domain import domain_of_capture

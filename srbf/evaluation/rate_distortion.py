@@ -12,7 +12,8 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import Capture, Role
+from srbf.capture import Capture
+from srbf.captured_light import Role
 from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.temporal_stability import Reference, dense_reference
 from srbf.light_domain import domain_of_capture

@@ -20,7 +20,8 @@ from srbf.export.rounding import blocks_alone, blocks_together
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.io.containers import write_texture_array
 from srbf.io.containers.blocks import BlockFormat
-from srbf.io.containers.texture_array import TexelFormat, TextureArray
+from srbf.io.containers.dds_header import TexelFormat
+from srbf.io.containers.texture_array import TextureArray
 
 MOST_LAYERS = 2048  # of a texture array in Vulkan, Direct3D and WebGL; WebGPU promises 256
 WEBGPU_LAYERS = 256

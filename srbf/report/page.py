@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.evaluation.rate_distortion import family_of, name_of, texel_bytes
 from srbf.info import folder_bytes
 from srbf.io.files import write_text

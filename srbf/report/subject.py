@@ -11,8 +11,9 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture, Role
-from srbf.evaluation.errors_by_role import COVERED, psnr
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
+from srbf.evaluation.errors_by_role import psnr
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import responses
 from srbf.report.point_lights import demonstration_point_lights

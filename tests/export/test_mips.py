@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from srbf.asset import LAYERS, Asset
+from srbf.asset import Asset
 from srbf.export import Settings, export
 from srbf.export.mips import chart_gap, levels_without_bleeding, smaller_levels
 from srbf.io.containers import read_texture_array
@@ -38,7 +38,7 @@ def charts(make: Callable[..., Asset], height: int = 45, width: int = 70, **flag
 def as_level(asset: Asset, layers: np.ndarray, coverage: np.ndarray | None = None) -> Asset:
     """The asset with float layers of another size."""
     entries = [{**entry, "encoding": "float"} for entry in asset.layers]
-    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], LAYERS[asset.method]: entries}
+    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], asset.layers_key: entries}
     one = np.ones((len(layers), layers.shape[3]), np.float32)
     return replace(
         asset, manifest=manifest, stored=layers, scale=one, bias=0 * one, images={} if coverage is None else {"coverage": coverage}
