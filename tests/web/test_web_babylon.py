@@ -35,4 +35,4 @@ def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, 
     expected = np.minimum(relight(asset, LIGHTS["several"]), BRIGHTEST)
     assert (np.abs(shown - expected) <= tolerance(asset, LIGHTS["several"])).all()
     clustered = browser.serve(complete(make_planes(scalars=5, clusters=7)))
-    assert "found a clustered eigen map" in browser.response("babylon-material", asset=clustered, **job)["error"]
+    assert "found clustered-eigen-map" in browser.response("babylon-material", asset=clustered, **job)["error"]

@@ -1,6 +1,7 @@
 /** An equirectangular map as many directional lights: `srbf.lights.environment_samples`. */
+import type { DistantLight } from "./asset_frame";
 import type { EnvironmentLight } from "./lights";
-import { determinant, type Matrix4, type Triple, turned } from "./matrix";
+import { determinant, type Matrix4, turned } from "./matrix";
 
 const UPRIGHT = 1e-8; // how far the turned zenith's row may be from (0, 0, 1), as numpy.allclose has it
 
@@ -12,7 +13,7 @@ export function* environmentSamples(
   light: EnvironmentLight,
   domain: "sphere" | "hemisphere",
   assetFromWorld: Matrix4,
-): Generator<readonly [Triple, Triple]> {
+): Generator<DistantLight> {
   const { width, height, pixels, color } = light;
   const scale = Math.cbrt(determinant(assetFromWorld));
   const rotation = assetFromWorld.map((row) => row.map((value) => value / scale));

@@ -8,8 +8,8 @@ import type { Subject } from "./subject";
 
 /** The scene's name, and what its asset is. */
 export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): void {
-  const { manifest, layers } = asset;
-  const many = manifest.scalars === undefined ? `${layers.count} maps` : `${manifest.scalars} planes`;
+  const { manifest, method, tables } = asset;
+  const many = `${tables.maps} ${method.mapsName}`;
   const name = document.createElement("h1");
   name.textContent = facts.title;
   const line = document.createElement("p");

@@ -41,8 +41,7 @@ import fullscreenVertex from "../../glsl/stages/fullscreen.vert";
 import heightFragment from "../../glsl/stages/shadow_height.frag";
 import shadowVertex from "../../glsl/stages/shadow.vert";
 import tintFragment from "../../glsl/stages/shadow_transmittance.frag";
-import { type Asset, type DirectionalLight, type FloatImage, type Light, SrbfError, type Triple } from "../src";
-import { turned } from "../src/matrix";
+import { type Asset, type DirectionalLight, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
 import { type DirectReceivers, directReceivers } from "./direct_points";
 import { fromThree } from "./frames";
 
@@ -147,7 +146,7 @@ export class DirectLight {
   }
 
   private add(sun: DirectionalLight): void {
-    const towards = unit(turned(this.asset.assetFromWorld, sun.direction));
+    const towards = moved(sun, this.asset.assetFromWorld).direction;
     const suns = disc(towards, this.sunAngle);
     for (const direction of suns) {
       this.setFrame(this.around(direction));

@@ -1,5 +1,5 @@
 /** Where an asset's receivers are: bounds, and the place of a texel. */
-import { type Asset, type FloatImage, IDENTITY, type Triple } from "../src";
+import { type Asset, type FloatImage, IDENTITY, receiverKind, type Triple } from "../src";
 import { carried, type Matrix4 } from "../src/matrix";
 
 export interface Bounds {
@@ -48,7 +48,7 @@ export class Receivers {
     if (axes[0].length === 0) return { center: [0, 0, 0], radius: 1 };
     const ends = axes.map((values) => {
       values.sort((a, b) => a - b);
-      const outer = this.asset.manifest.source?.receiver?.kind === "view" ? Math.floor(values.length / 20) : 0;
+      const outer = receiverKind(this.asset.manifest) === "view" ? Math.floor(values.length / 20) : 0;
       return [values[outer], values[values.length - 1 - outer]];
     });
     const center = ends.map(([least, most]) => (least + most) / 2) as unknown as Triple;

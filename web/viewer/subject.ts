@@ -1,6 +1,6 @@
 /** The assets that the page can switch between, each relit once it is asked for; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
-import type { Asset, FloatImage, Light } from "../src";
+import type { Asset, FloatImage, Light, Triple } from "../src";
 import { alphaTexture } from "../src/three/textures";
 import { DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
@@ -42,16 +42,15 @@ export class Subject {
     return this.relighting.lightmap as Texture;
   }
 
-  /** How many maps, or scalar planes, there are to be looked at. */
-  get planes(): number {
-    return this.asset.manifest.scalars ?? this.asset.layers.count;
+  /** How many coefficient maps there are to look at. */
+  get maps(): number {
+    return this.asset.tables.maps;
   }
 
-  /** Where its basis has a center on the captured half of the sky. */
-  get centers(): readonly (readonly [number, number, number])[] {
-    const { basis, manifest } = this.asset;
-    const centers = basis.kind === "gaussian" ? basis.centers : basis.functions.centers;
-    return centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // light functions reach past the horizon
+  /** Centers of its light functions within the captured domain. */
+  get centers(): readonly Triple[] {
+    const { tables, manifest } = this.asset;
+    return tables.centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // some light functions lie past the horizon
   }
 
   /** Draw the lightmap under `lights`. */

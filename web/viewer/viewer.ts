@@ -9,7 +9,7 @@ import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { directionalState, type DirectionalState, environmentState, isPointLightState, lightOf, type LightState, rounded } from "./light_state";
 import { listen, tabled } from "./keys";
 import { checkGpu, type Loaded } from "./loading";
-import { mapRange } from "./map_range";
+import { mapPlace, mapRange } from "./map_range";
 import { element, lineOf, say } from "./messages";
 import { Panel, type PanelFacts } from "./panel";
 import { along } from "./path";
@@ -123,7 +123,7 @@ export class Viewer {
 
   private panelFacts(): PanelFacts {
     return {
-      maps: this.subject.planes,
+      maps: this.subject.maps,
       hasPositions: this.subject.asset.position !== undefined,
       hasDirect: this.subject.hasDirect,
       assets: this.loaded.facts.assets.map(({ name }) => name),
@@ -153,7 +153,7 @@ export class Viewer {
         this.uniforms.layers.value = layers;
         this.uniforms.ambient.value = ambient;
         this.uniforms.coverage.value = subject.alpha;
-        this.state.map = Math.min(this.state.map, subject.planes - 1);
+        this.state.map = Math.min(this.state.map, subject.maps - 1);
         this.sky.show(this.skyPoints());
         this.sky.errors = undefined;
         this.panel.tell(this.panelFacts());
@@ -198,7 +198,7 @@ export class Viewer {
       const plain = this.begun();
       const state = decodeState(hash, plain);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
-      state.map = Math.min(state.map, this.subject.planes - 1);
+      state.map = Math.min(state.map, this.subject.maps - 1);
       if (!this.loaded.references) Object.assign(state, { compare: "off", errors: false });
       Object.assign(this.state, { eye: undefined }, state);
       for (const light of state.lights) {
@@ -345,11 +345,10 @@ export class Viewer {
 
   private chooseMap(): void {
     const { asset } = this.subject;
-    const planes = asset.manifest.scalars !== undefined;
-    const layer = planes ? Math.floor(this.state.map / 4) : this.state.map;
+    const { layer, channel } = mapPlace(asset, this.state.map);
     const shader = this.uniforms;
     shader.layer.value = layer;
-    shader.channel.value = planes ? this.state.map % 4 : -1;
+    shader.channel.value = channel ?? -1;
     (shader.layerScale.value as Vector4).fromArray(asset.scale, 4 * layer);
     (shader.layerBias.value as Vector4).fromArray(asset.bias, 4 * layer);
   }
@@ -429,7 +428,7 @@ export class Viewer {
         if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
-        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.planes : this.state.map;
+        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.maps : this.state.map;
         this.state.show = "map";
       },
       nextView: () => {

@@ -3,18 +3,19 @@ import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
+import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
-import { SceneAsset } from "./scene_asset";
+import { SceneAsset, sourceOf } from "./scene_asset";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 
 export interface RelightingMapOptions extends TargetOptions {
   /**
    * `maps`: materials sum the layers at every pixel. `lightmap`: `update` draws a lightmap whenever a light changes, and materials sample it, with mip
-   * maps if asked for; clustered eigen maps know only this.
+   * maps if asked for; the only choice for clustered eigen maps.
    */
   source?: "maps" | "lightmap";
 }
@@ -36,14 +37,10 @@ export class SrbfRelightingMap extends SceneAsset {
   private drawn = "";
   private added: Added | undefined;
 
-  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingMapOptions = {}) {
     super(asset);
-    const clustered = asset.manifest.method === "clustered-eigen-map";
-    this.source = options.source ?? (clustered ? "lightmap" : "maps");
-    if (clustered && this.source === "maps") {
-      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
-    }
+    this.source = sourceOf(asset, options.source);
     this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
     this.uniforms = assetUniforms(asset, this.textures);
     if (this.source === "lightmap") {
@@ -85,7 +82,7 @@ export class SrbfRelightingMap extends SceneAsset {
       options: {
         channel: options.channel ?? 1,
         uvOrigin: options.uvOrigin ?? "top",
-        receivers: options.receivers ?? (manifest.source?.receiver?.kind === "view" ? "map" : "vertex"),
+        receivers: options.receivers ?? receiversFrom(manifest),
         direct: options.direct ?? (manifest.transport === "indirect" ? "engine" : "asset"),
       },
     };

@@ -1,6 +1,7 @@
 /** What both renderers' classes share: an asset with lights in a three.js scene. */
 import { type Light as ThreeLight, Matrix4 } from "three";
 import type { Asset } from "../asset";
+import { SrbfError } from "../errors";
 import { type Light, moved } from "../lights";
 import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
@@ -47,4 +48,13 @@ export class SceneAsset {
   protected assetFromScene(): Matrix4 {
     return threeMatrix(multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene)));
   }
+}
+
+/** Where materials take the light from. @throws SrbfError on `maps` for layers that must not be filtered. */
+export function sourceOf(asset: Asset, asked?: "maps" | "lightmap"): "maps" | "lightmap" {
+  const { filterable, name } = asset.method;
+  if (!filterable && asked === "maps") {
+    throw new SrbfError(`expected source "lightmap" for ${name}, found "maps": its layers must not be filtered between texels`);
+  }
+  return asked ?? (filterable ? "maps" : "lightmap");
 }

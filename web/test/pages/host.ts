@@ -7,7 +7,7 @@ import { type Job, lightOfJson } from "./job";
 export async function host(job: Job) {
   const asset = await loadAsset(job.asset, { verify: true });
   const lights = job.lights.map(lightOfJson);
-  return { weights: [...projectedWeights(asset, lights, asset.assetFromWorld)], pointLights: frameValues(asset, lights).pointLights };
+  return { weights: [...projectedWeights(asset, lights)], pointLights: frameValues(asset, lights).pointLights };
 }
 
 /** The layers as they were decoded, level after level. */

@@ -5,10 +5,11 @@ import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
 import { checkCompression } from "../../compression";
 import { SrbfError } from "../../errors";
+import { receiversFrom } from "../../manifest";
 import { needPositions } from "../../shader";
 import type { TargetOptions } from "../lightmap_pass";
 import type { MaterialOptions } from "../material";
-import { SceneAsset } from "../scene_asset";
+import { SceneAsset, sourceOf } from "../scene_asset";
 import { SrbfTextures } from "../textures";
 import { NodeInputs } from "./inputs";
 import { applyLight } from "./material";
@@ -32,14 +33,10 @@ export class SrbfRelightingNodes extends SceneAsset {
   private readonly quad?: QuadMesh;
   private drawn = "";
 
-  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingNodesOptions = {}) {
     super(asset);
-    const clustered = asset.manifest.method === "clustered-eigen-map";
-    this.source = options.source ?? (clustered ? "lightmap" : "maps");
-    if (clustered && this.source === "maps") {
-      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
-    }
+    this.source = sourceOf(asset, options.source);
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
     this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16);
@@ -58,8 +55,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   light(options: MaterialOptions = {}): N {
     const uv = placeOf(options);
     if (this.target) return (texture(this.target.texture, uv) as N).rgb;
-    const kind = this.asset.manifest.source?.receiver?.kind;
-    const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
+    const receivers = options.receivers ?? receiversFrom(this.asset.manifest);
     return relit(this.inputs, uv, receivers === "map" ? this.mapped(uv) : this.inputs.assetFromScene.mul(vec4(positionWorld as N, 1)).xyz);
   }
 
