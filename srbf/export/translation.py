@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from srbf.errors import ShaderError
-from srbf.gl.includes import shader_root
+from srbf.gl.includes import dependence_order, shader_root
 
 _TOKEN = re.compile(
     r"(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<directive>^[ \t]*\#[^\n]*)|(?P<space>\s+)"
@@ -115,29 +115,11 @@ def library_paths(root: Path | None = None) -> list[str]:
 def pack_files(
     paths: Iterable[str], root: Path | None = None, prepare: Callable[[str, str], str] = lambda text, path: text
 ) -> list[PackFile]:
-    """The files and all that they include, each once, after what it includes; `prepare` (text, path) is asked in that order.
+    """The files and all that they include, each once, after what it includes; `prepare` (text, path) is called in that order.
 
-    ShaderError on a missing file or GLSL past the subset.
+    ShaderError on a missing file, a cycle, or GLSL outside the subset.
     """
-    base = shader_root() if root is None else root
-    found: dict[str, PackFile | None] = {}
-
-    def visit(path: str, origin: str) -> None:
-        if path in found:
-            return
-        found[path] = None
-        place = base / path
-        if not place.is_file():
-            raise ShaderError(f'{origin}: expected "{path}" in the shader pack at {base}, found no such file')
-        text = place.read_text(encoding="utf-8")
-        for match in re.finditer(r'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE):
-            visit(match[1], path)
-        del found[path]
-        found[path] = parse(prepare(text, path), path)  # last, so that the order is that of dependence
-
-    for path in paths:
-        visit(path, "translation")
-    return [file for file in found.values() if file is not None]
+    return [parse(prepare(text, path), path) for path, text in dependence_order(paths, root).items()]
 
 
 def without(nodes: Sequence[Node], name: str) -> list[Node]:
