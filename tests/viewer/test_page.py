@@ -60,7 +60,7 @@ def test_a_sun_dragged_over_the_sky_relights(chromium: Any, asset: Asset, url: s
     chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT)
     before = chromium.state()["lights"][0]["direction"]
     assert shows(chromium, asset, [DirectionalLight(tuple(before))])
-    x, y, w, h = chromium("run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('sky').getBoundingClientRect())")
+    x, y, w, h = chromium("run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('directions').getBoundingClientRect())")
     middle = [x + w / 2, y + h / 2]
     chromium("drag", path=[[middle[0] - 40, middle[1] + 30], [middle[0] + 10, middle[1] - 20], [middle[0] + 55, middle[1] - 5]])
     light = chromium.state()["lights"][0]["direction"]
@@ -95,8 +95,8 @@ def test_point_lights_and_suns_together_are_numpys(
         "Point light x (m)": -0.5,
         "Point light z (m)": 1.25,
         "Aim x (m)": 0.5,
-        "Full within (°)": 12,
-        "None past (°)": 35,
+        "Inner half-angle (°)": 12,
+        "Outer half-angle (°)": 35,
     }.items():
         chromium("number", name=name, value=value)
     (lights,) = lights_of(chromium, tmp_path)

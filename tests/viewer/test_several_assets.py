@@ -58,7 +58,7 @@ def test_the_page_switches_between_them(chromium: Any, fitted: tuple[Capture, li
     expected = shown_as(relight(planes, SUN))
     assert (np.abs(expected - shown_as(relight(maps, SUN))) > 2 * STEP).any()
     assert (np.abs(chromium.texels(14, 10, ZOOM) - expected) <= STEP).all()
-    assert "eigen map · 5 planes" in chromium("run", script="document.getElementById('title').textContent")
+    assert "eigen map · 5 components" in chromium("run", script="document.getElementById('title').textContent")
     there = chromium("address")
     chromium("open", url=there, width=WIDTH, height=HEIGHT)
     assert (np.abs(chromium.texels(14, 10, ZOOM) - expected) <= STEP).all(), "the address opens the second"
@@ -82,7 +82,7 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
     for name, index in {"best": int(np.argmax(told["psnr"])), "worst": int(np.argmin(told["psnr"]))}.items():
         x, y, z = capture.directions()[index]
         script = f"""(() => {{
-            const sky = document.getElementById('sky'), ratio = sky.width / sky.clientWidth;
+            const sky = document.getElementById('directions'), ratio = sky.width / sky.clientWidth;
             const radius = Math.min(sky.clientWidth, sky.clientHeight) / 2 - 12;
             const r = radius * Math.sin(Math.acos({z}) / 2) / Math.sin(54 * Math.PI / 180);
             const flat = Math.hypot({x}, {y}) || 1, at = [sky.clientWidth / 2 + r * {x} / flat, sky.clientHeight / 2 - r * {y} / flat];

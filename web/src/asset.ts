@@ -38,7 +38,7 @@ export interface LoadOptions {
 /**
  * Fetch and decode the asset at `url`, a folder that holds asset.json.
  *
- * @throws SrbfError in one line where a file is missing, damaged, or not what asset.json says.
+ * @throws SrbfError in one line where a file is missing, damaged, or differs from asset.json.
  */
 export async function loadAsset(url: string, options: LoadOptions = {}): Promise<Asset> {
   const fetcher = options.fetch ?? ((target: string) => fetch(target));

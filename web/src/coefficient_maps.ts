@@ -1,4 +1,4 @@
-/** What eigen maps and clustered ones share: scalar coefficient maps, four to a layer, of smooth RGB light functions with an octahedral table. */
+/** What eigen maps and clustered ones share: scalar coefficient maps, four per layer, of smooth RGB light functions with an octahedral table. */
 import { SrbfError } from "./errors";
 import { decodeFloat, decodeHalf } from "./exr";
 import type { AssetFiles } from "./files";
@@ -9,7 +9,7 @@ import type { Fail, Tables } from "./methods/method";
 import type { NodeKit } from "./methods/node_kit";
 import type { N } from "./three/tsl/nodes";
 
-/** Keys of asset.json. A cluster has `scalars` + 1 light functions: that of the mean, and one a component. */
+/** Keys of asset.json. A cluster has `scalars` + 1 light functions: that of the mean, and one per component. */
 interface CoefficientManifest extends Manifest {
   scalars?: number;
   clusters?: number;

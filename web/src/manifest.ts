@@ -65,12 +65,12 @@ export function isPicture(manifest: Manifest): boolean {
   return (receiverKind(manifest) ?? "view") === "view";
 }
 
-/** Where materials take receivers' positions from unless they are told: a view's mesh is not at hand, so from its position map. */
+/** Default source of receivers' positions in materials: a view has no mesh, so its position map. */
 export function receiversFrom(manifest: Manifest): "map" | "vertex" {
   return receiverKind(manifest) === "view" ? "map" : "vertex";
 }
 
-/** `value` as a manifest. @throws SrbfError that names the key which is not as the schema says. */
+/** `value` as a manifest. @throws SrbfError that names the key which breaks the schema. */
 export function checkManifest(value: unknown, where: string): Manifest {
   const manifest = value as Manifest;
   const fail = (expected: string, found: unknown): never => {

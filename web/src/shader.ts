@@ -1,11 +1,11 @@
-/** What every engine's shader of an asset is made of: its text, its defines, and the numbers that change with the lights. */
+/** The parts of every engine's shader of an asset: its text, its defines, and the numbers that change with the lights. */
 import type { Asset } from "./asset";
 import { inAssetFrame } from "./asset_frame";
 import { SrbfError } from "./errors";
 import type { Light } from "./lights";
 import { type PointLightUniforms, pointLightUniforms } from "./point_light";
 
-/** Numbers of a frame: `weights` is vec4 after vec4, one for each light function. */
+/** The numbers of one frame: `weights` is vec4 after vec4, one for each light function. */
 export interface FrameValues {
   readonly weights: Float32Array;
   readonly pointLights: readonly PointLightUniforms[];

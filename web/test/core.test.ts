@@ -108,7 +108,7 @@ describe("manifests", () => {
     expect(() => checkManifest({ ...MANIFEST, ...change }, "asset.json")).toThrow(message);
   });
 
-  it("says what is lit by its own key, and by the source of older assets only without one", () => {
+  it("read the receiver's kind from its own key, and from the source of assets that lack it", () => {
     const kind = (keys: object) => receiverKind(checkManifest({ ...MANIFEST, ...keys }, "asset.json"));
     expect(kind({ receiver: { kind: "view" }, source: { receiver: { kind: "lightmap" } } })).toBe("view");
     expect(kind({ receivers: [{ kind: "lightmap" }, { kind: "lightmap" }] })).toBe("lightmap");
@@ -124,11 +124,11 @@ describe("manifests", () => {
 });
 
 describe("loading", () => {
-  const answering = (status: number, body: string) => async () => new Response(body, { status });
+  const serving = (status: number, body: string) => async () => new Response(body, { status });
 
   it("says what a server did not have", async () => {
-    await expect(loadAsset("http://x/a", { fetch: answering(404, "") })).rejects.toThrow("expected a file at http://x/a/asset.json, found status 404");
-    await expect(loadAsset("http://x/a/", { fetch: answering(200, "<html>") })).rejects.toThrow("expected JSON at http://x/a/asset.json");
+    await expect(loadAsset("http://x/a", { fetch: serving(404, "") })).rejects.toThrow("expected a file at http://x/a/asset.json, found status 404");
+    await expect(loadAsset("http://x/a/", { fetch: serving(200, "<html>") })).rejects.toThrow("expected JSON at http://x/a/asset.json");
   });
 
   it("names the damaged file", async () => {

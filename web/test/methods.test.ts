@@ -31,8 +31,8 @@ describe("the asset's frame", () => {
   const asset = { manifest: { domain: "sphere" } as Manifest, assetFromWorld: turn };
 
   it("takes every kind of light along", () => {
-    const sky = environmentLight(4, 2, new Float32Array(24).fill(1));
-    const { distant, punctual } = inAssetFrame(asset, [directionalLight([1, 0, 0]), pointLight([1, 0, 0], { a0: 1 }), sky]);
+    const environment = environmentLight(4, 2, new Float32Array(24).fill(1));
+    const { distant, punctual } = inAssetFrame(asset, [directionalLight([1, 0, 0]), pointLight([1, 0, 0], { a0: 1 }), environment]);
     const [sun, ...texels] = distant;
     expect(sun).toEqual([[0, 1, 0], [1, 1, 1]]);
     expect(punctual).toMatchObject([{ position: [5, 2, 0], a0: 2 }]);

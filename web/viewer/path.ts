@@ -1,11 +1,11 @@
-/** Where a light is on its way: a turn about the vertical, or a swing over the zenith and back. */
+/** A light's place along its path: a turn about the vertical, or a swing over the zenith and back. */
 import type { Triple } from "../src";
 import { type LightState, rounded } from "./light_state";
 import type { State } from "./state";
 
 const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
 
-/** `light` after `turns` rounds of `path`; lamps turn about `center`, and swing along x by the scene's `radius`. */
+/** `light` after `turns` rounds of `path`; point lights turn about `center`, and swing along x by the scene's `radius`. */
 export function along(light: LightState, path: State["path"], turns: number, center: Triple, radius: number): LightState {
   const angle = 2 * Math.PI * turns;
   if (path === "none" || light.kind === "environment") return light;
@@ -25,7 +25,7 @@ function turned([x, y, z]: Triple, angle: number): Triple {
   return [c * x - s * y, s * x + c * y, z];
 }
 
-/** Along its own azimuth; at angle 0 it is where it is, up to the widest tilt. */
+/** Along its own azimuth; at angle 0 it is unchanged; the swing reaches the widest tilt. */
 function swung([x, y, z]: Triple, angle: number): Triple {
   const azimuth = Math.hypot(x, y) > 1e-9 ? Math.atan2(y, x) : 0;
   const tilt = Math.acos(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z))));

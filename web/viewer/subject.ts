@@ -1,4 +1,4 @@
-/** The assets that the page can switch between, each relit once it is asked for; and the direct light of indirect ones. */
+/** The assets that the page can switch between, each loaded when it is first chosen; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
 import type { Asset, FloatImage, Light, Triple } from "../src";
 import { alphaTexture } from "../src/three/textures";
@@ -8,12 +8,12 @@ import { lineOf, say } from "./messages";
 import { ViewerRelighting } from "./relighting";
 import type { State } from "./state";
 
-/** One asset at work. */
+/** One asset, relit. */
 export class Subject {
   readonly facts: AssetFacts;
   readonly asset: Asset;
   readonly coverage?: FloatImage;
-  /** What the picture is cut out by: a view's coverage; 1 everywhere of anything else. */
+  /** The picture's alpha: a view's coverage, 1 everywhere for other assets. */
   readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
   private readonly direct?: DirectLight;
@@ -33,7 +33,7 @@ export class Subject {
     }
   }
 
-  /** Whether its direct light can be added, so that it may be shown with it, without it, or as that alone. */
+  /** Whether its direct light can be added. */
   get hasDirect(): boolean {
     return this.direct !== undefined;
   }

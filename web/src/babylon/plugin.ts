@@ -16,7 +16,7 @@ export interface PluginOptions {
   uv?: "uv" | "uv2";
   /** Where v is 0: `top` as glTF has it, `bottom` otherwise. */
   uvOrigin?: "top" | "bottom";
-  /** Where receivers are: `vertex`, as the mesh stands, or `map`, as the asset recorded it. */
+  /** Receivers' positions: `vertex`, from the mesh, or `map`, as the asset recorded them. */
   receivers?: "vertex" | "map";
   /** Who adds the direct diffuse light of the scene's lights. */
   direct?: "asset" | "engine";
@@ -28,7 +28,7 @@ export interface SharedFrame {
   pointLights: Float32Array;
   pointLightCount: number;
   room: number;
-  /** Column by column. */
+  /** Column-major. */
   assetFromScene: Float32Array;
 }
 
@@ -47,7 +47,7 @@ export class SrbfPlugin extends MaterialPluginBase {
     super(material, "Srbf", 200, { SRBF: true, ...shaderDefines(asset, 1) }, false, false);
     this.constants = constantVectors(asset);
     this.registerForExtraEvents = true; // so that hardBindForSubMesh is called
-    this._pluginManager._addPlugin(this); // asks for the code at once, so not from the constructor of the base
+    this._pluginManager._addPlugin(this); // asks for the code at once, so not in the base's constructor
     this._enable(true);
   }
 

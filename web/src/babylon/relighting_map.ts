@@ -18,7 +18,7 @@ export const Z_UP_FROM_LEFT_HANDED: Matrix4 = [
   [0, 0, 0, 1],
 ];
 
-/** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+/** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` after every change, and `dispose` at the end. */
 export class SrbfRelightingMap {
   /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
@@ -46,7 +46,7 @@ export class SrbfRelightingMap {
     return new SrbfRelightingMap(await loadAsset(url, options), scene, options);
   }
 
-  /** Light `material` by this asset: irradiance in the place of its direct diffuse light, or radiance in that of all its light. */
+  /** Light `material` by this asset: irradiance replaces its direct diffuse light, radiance replaces all its light. */
   apply(material: PBRMaterial, options: PluginOptions = {}): PBRMaterial {
     const { manifest } = this.asset;
     const receivers = options.receivers ?? receiversFrom(manifest);
@@ -58,7 +58,7 @@ export class SrbfRelightingMap {
     return material;
   }
 
-  /** Bring the uniforms to the lights as they are now. */
+  /** Update the uniforms to the current lights. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
     const room = pointLightRoom(values.pointLights.length);

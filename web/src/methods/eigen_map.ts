@@ -1,4 +1,4 @@
-/** Eigen maps: scalar coefficient maps of RGB light functions, four to a stored layer. */
+/** Eigen maps: scalar coefficient maps of RGB light functions, four per stored layer. */
 import { checkCoefficientMaps, readCoefficientMaps } from "../coefficient_maps";
 import shader from "../shaders/eigen_map.glsl";
 import type { Method } from "./method";

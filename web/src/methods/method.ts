@@ -17,9 +17,9 @@ export interface Method {
   readonly layersKey: string;
   /** Numbers in `scale` and `bias` of a layer. */
   readonly layerChannels: 3 | 4;
-  /** What a stored layer is: one RGB coefficient map, or four scalar ones, a channel each. */
+  /** Coefficient maps per stored layer: one in RGB, or four scalar ones, one per channel. */
   readonly mapsPerLayer: 1 | 4;
-  /** What its coefficient maps are called in a title, such as "maps". */
+  /** Name of its coefficient maps in a title, such as "maps". */
   readonly mapsName: string;
   /** Whether layers may be filtered between texels; otherwise a lightmap is drawn from them first, and that is filtered. */
   readonly filterable: boolean;

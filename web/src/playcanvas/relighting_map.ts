@@ -21,7 +21,7 @@ interface Shown {
   options: ShaderOptions & { channel: 0 | 1 };
 }
 
-/** An asset that PlayCanvas shows under WebGL2 by materials of its own. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+/** An asset that PlayCanvas shows under WebGL2 with its own materials. Set `lights`, call `update` after every change, and `dispose` at the end. */
 export class SrbfRelightingMap {
   /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
@@ -46,7 +46,7 @@ export class SrbfRelightingMap {
     return new SrbfRelightingMap(await loadAsset(url, options), device, options);
   }
 
-  /** A material that shows this asset alone: none of the scene's lights, no fog, no skins; tone mapped and encoded as the camera asks. */
+  /** A material that shows only this asset, without the scene's lights, fog or skins; tone mapped and encoded for the camera. */
   material(options: ShowOptions = {}): ShaderMaterial {
     const receivers = options.receivers ?? receiversFrom(this.asset.manifest);
     if (receivers === "map") needPositions(this.asset, 1);
@@ -66,7 +66,7 @@ export class SrbfRelightingMap {
     return material;
   }
 
-  /** Bring the materials to the lights as they are now. */
+  /** Update the materials to the current lights. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
     const room = pointLightRoom(values.pointLights.length);

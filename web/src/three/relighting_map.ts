@@ -25,7 +25,7 @@ const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
 
 /**
  * An asset that lights three.js materials. Add lights by `follow` (three's own, in three's world) or to `lights` (of the library, in the asset's
- * world: Blender's, z up), call `update` once a frame, `dispose` at the end.
+ * world: Blender's, z up), call `update` once per frame, `dispose` at the end.
  */
 export class SrbfRelightingMap extends SceneAsset {
   readonly textures: SrbfTextures;
@@ -54,17 +54,17 @@ export class SrbfRelightingMap extends SceneAsset {
     return new SrbfRelightingMap(await loadAsset(url, options), options);
   }
 
-  /** The lightmap that `update` draws (v downwards), for shaders of your own; only with `source: "lightmap"`. */
+  /** The lightmap that `update` draws (v downwards), for your own shaders; only with `source: "lightmap"`. */
   get lightmap(): Texture | undefined {
     return this.pass?.target.texture;
   }
 
   /**
-   * Add `texture` of the asset's size to the sum of its maps before the clamp, or show it `alone`: direct light of an indirect asset, in its quantity.
+   * Add `texture`, of the asset's size, to the sum of its maps before the clamp, or show it `alone`: an indirect asset's direct light, in its quantity.
    * Only with `source: "lightmap"`; the next `update` draws it.
    */
   add(texture?: Texture, alone = false): void {
-    if (!texture && !this.added) return; // nothing to draw anew
+    if (!texture && !this.added) return; // nothing to redraw
     this.added = texture && { texture, alone };
     this.drawn = "";
   }
@@ -101,9 +101,9 @@ export class SrbfRelightingMap extends SceneAsset {
   }
 
   /**
-   * Bring uniforms, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   * Update the uniforms, and the lightmap where there is one, to the current lights. The renderer is needed for `source: "lightmap"`.
    *
-   * @throws SrbfError on lamps where the asset has no positions for them, or more layers and lamps than the GPU's uniforms hold.
+   * @throws SrbfError on point lights where the asset has no positions, or more layers and point lights than the GPU's uniforms hold.
    */
   update(renderer?: WebGLRenderer): void {
     const frame = this.frame();
@@ -145,8 +145,8 @@ export class SrbfRelightingMap extends SceneAsset {
     const needed = uniformVectors(this.asset, room);
     if (needed > most) {
       throw new SrbfError(
-        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} lamps; ` +
-          (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
+        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} point lights; ` +
+          (this.pass ? "fit with fewer layers, or follow fewer point lights" : 'take source: "lightmap", or an eigen map'),
       );
     }
   }

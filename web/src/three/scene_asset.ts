@@ -10,7 +10,7 @@ import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 
 /** An asset, and the lights that shine on it: three's own by `follow`, in three's world, and those of the library in `lights`. */
 export class SceneAsset {
-  /** Lights of the library beside the followed ones, in the asset's world: Blender's, z up, meters. */
+  /** Lights of the library besides the followed ones, in the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
   /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
   readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
@@ -18,7 +18,7 @@ export class SceneAsset {
 
   constructor(readonly asset: Asset) {}
 
-  /** Take three.js lights as they are at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
+  /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
   follow(...lights: ThreeLight[]): this {
     for (const light of lights) {
       checkKind(light);
@@ -32,14 +32,14 @@ export class SceneAsset {
     return this;
   }
 
-  /** Every light as the library has it, in the asset's world. */
+  /** All lights as lights of the library, in the asset's world. */
   currentLights(): Light[] {
     const worldFromScene = rowsOf(this.worldFromScene);
     const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
     return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
   }
 
-  /** The numbers that shaders take of the lights as they are now. */
+  /** The current lights' numbers for shaders. */
   protected frame(): FrameValues {
     return frameValues(this.asset, this.currentLights());
   }

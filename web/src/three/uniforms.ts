@@ -23,7 +23,7 @@ export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
   return uniforms;
 }
 
-/** Write the numbers of a frame. */
+/** Write the numbers of one frame. */
 export function setFrame(uniforms: Uniforms, textures: SrbfTextures, frame: FrameValues): void {
   if (textures.weights) {
     (textures.weights.image.data as Float32Array).set(frame.weights);

@@ -3,7 +3,7 @@ import { frameValues, loadAsset } from "../../src";
 import { projectedWeights } from "../../src/weights";
 import { type Job, lightOfJson } from "./job";
 
-/** Folded weights in double precision, and the lamps' uniforms. */
+/** Projected weights in double precision, and the point lights' uniforms. */
 export async function host(job: Job) {
   const asset = await loadAsset(job.asset, { verify: true });
   const lights = job.lights.map(lightOfJson);

@@ -74,7 +74,7 @@ export class NodeInputs {
     return (textureLoad(ambient, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).rgb;
   }
 
-  /** Write the numbers of a frame. @throws SrbfError on more point lights than there is room for. */
+  /** Write the numbers of one frame. @throws SrbfError on more point lights than there is room for. */
   set(frame: FrameValues): void {
     if (frame.pointLights.length > this.maxPointLights) {
       throw new SrbfError(`expected at most ${this.maxPointLights} point lights, found ${frame.pointLights.length}; set maxPointLights when the asset is loaded`);

@@ -17,13 +17,13 @@ import { type N, texelAt } from "./nodes";
 import { relit } from "./relit";
 
 export interface RelightingNodesOptions extends TargetOptions {
-  /** As of `SrbfRelightingMap`. */
+  /** As in `SrbfRelightingMap`. */
   source?: "maps" | "lightmap";
-  /** Room for point and spot lights; their number may change without compiling anew. */
+  /** Room for point and spot lights; their number may change without recompiling. */
   maxPointLights?: number;
 }
 
-/** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once a frame. */
+/** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once per frame. */
 export class SrbfRelightingNodes extends SceneAsset {
   readonly textures: SrbfTextures;
   readonly source: "maps" | "lightmap";
@@ -59,7 +59,7 @@ export class SrbfRelightingNodes extends SceneAsset {
     return relit(this.inputs, uv, receivers === "map" ? this.mapped(uv) : this.inputs.assetFromScene.mul(vec4(positionWorld as N, 1)).xyz);
   }
 
-  /** How much of a view is there, a float node; none where it fills its picture, and of a lightmap. */
+  /** A view's coverage, a float node; undefined where it fills its picture, and for lightmaps. */
   alpha(options: MaterialOptions = {}): N | undefined {
     const { alpha } = this.textures;
     return alpha && (texture(alpha, placeOf(options)) as N).r;
@@ -74,9 +74,9 @@ export class SrbfRelightingNodes extends SceneAsset {
   }
 
   /**
-   * Bring the nodes, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   * Update the nodes, and the lightmap where there is one, to the current lights. The renderer is needed for `source: "lightmap"`.
    *
-   * @throws SrbfError on lamps where the asset has no positions for them, and on more lamps than `maxPointLights`.
+   * @throws SrbfError on point lights where the asset has no positions, and on more than `maxPointLights` of them.
    */
   update(renderer?: Renderer): void {
     const frame = this.frame();
