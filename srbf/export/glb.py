@@ -1,4 +1,4 @@
-"""Binary glTF 2.0 put together and taken apart: a JSON document and one buffer [Khronos, glTF 2.0]."""
+"""Writing and reading binary glTF 2.0: a JSON document and one buffer [Khronos, glTF 2.0]."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HEADER = 12  # bytes
 
 @dataclass
 class Document:
-    """A glTF document and its buffer, to be added to."""
+    """A glTF document under construction, and its buffer."""
 
     json: dict[str, Any] = field(default_factory=lambda: {"asset": {"version": "2.0", "generator": "srbf export"}})
     body: bytearray = field(default_factory=bytearray)

@@ -1,7 +1,7 @@
-"""The shader pack taken apart: its small GLSL as functions, constants, structs and comments, for the dialects' writers.
+"""Parses the shader pack: its GLSL subset as functions, constants, structs and comments, for the dialects' writers.
 
-A translation keeps names, comments and lines, so that what ships can be read beside the pack. It knows no list of files: whatever the
-pack holds is translated, and GLSL that a dialect has no word for is refused by name.
+A translation keeps names, comments and lines, so that it can be read beside the pack. There is no list of files: everything in the
+pack is translated, and GLSL without an equivalent in a dialect is refused by name.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ VECTORS = frozenset(f"{kind}vec{n}" for kind in ("", "i", "u", "b") for n in (2,
 MATRICES = frozenset({"mat2", "mat3", "mat4"})
 ASSIGNMENTS = frozenset({"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="})
 SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
-# What no dialect has a word for, or another meaning: the pack does without.
+# Without an equivalent in some dialect, or with another meaning there: the pack does not use them.
 UNTRANSLATABLE = frozenset(
     {"mod", "texture", "textureGather", "textureOffset", "dFdx", "dFdy", "discard", "while", "do", "switch", "uniform", "varying"}
     | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "inout"}
@@ -45,7 +45,7 @@ class Token:
 
 @dataclass(frozen=True)
 class Group:
-    """What stands between a pair of brackets."""
+    """The content of a pair of brackets."""
 
     opening: str
     inside: tuple[Node, ...]
@@ -123,7 +123,7 @@ def pack_files(
 
 
 def without(nodes: Sequence[Node], name: str) -> list[Node]:
-    """Nodes of a function's body without what `#ifdef name` adds there: as where `name` is never defined."""
+    """Nodes of a function's body as if `name` were never defined."""
     kept: list[Node] = []
     branch = ""
     for node in nodes:
@@ -138,7 +138,7 @@ def without(nodes: Sequence[Node], name: str) -> list[Node]:
 
 
 def parse(text: str, path: str) -> PackFile:
-    """A file of the pack as items; ShaderError on what is neither function, struct, constant, directive nor comment."""
+    """A file of the pack as items; ShaderError on anything but functions, structs, constants, directives and comments."""
     nodes = list(_grouped(iter(tokens(text)), None, path))
     items: list[Item] = []
     i = 0
@@ -158,7 +158,7 @@ def parse(text: str, path: str) -> PackFile:
 
 
 def tokens(text: str) -> list[Token]:
-    """GLSL as words; joined again they are the text."""
+    """GLSL as tokens; joined, they give the text."""
     return [Token(str(match.lastgroup), match[0]) for match in _TOKEN.finditer(text)]
 
 
@@ -202,7 +202,7 @@ def _grouped(source: Iterator[Token], closing: str | None, path: str) -> Iterato
                 raise ShaderError(f"{path}: expected brackets in pairs, found {token.text!r} where {closing!r} was open")
             return
         elif token.kind == "name" and token.text in UNTRANSLATABLE:
-            raise ShaderError(f"{path}: expected GLSL that every dialect has a word for, found {token.text}; write it another way")
+            raise ShaderError(f"{path}: expected GLSL with an equivalent in every dialect, found {token.text}; write it another way")
         else:
             yield token
     if closing is not None:

@@ -16,7 +16,7 @@ from srbf.errors import InputError
 from srbf.gl.coefficient_maps import ComponentPasses
 from srbf.gl.context import Limits, create_context
 from srbf.gl.depth_buffer import DepthView
-from srbf.gl.environment import Sky
+from srbf.gl.environment import EnvironmentWeights
 from srbf.gl.programs import Programs
 from srbf.gl.relighting_map import MapPasses
 from srbf.gl.textures import AssetTextures
@@ -93,7 +93,7 @@ class Relighter:
                 self._programs = Programs(self._context, self._resources)
                 self._sky = None
                 if environments == "gpu":
-                    self._sky = Sky(self._context, asset, self._programs, self._textures, self._resources)
+                    self._sky = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise

@@ -103,7 +103,7 @@ def test_lights_that_come_later(make_asset, emitted) -> None:
     found, response = emitted(asset, [SUN, spot], later=[SECOND, POINT])
     lights = [light_of(point_light) for point_light in (SUN, SECOND, POINT)]
     assert (np.abs(found - relight(asset, lights)) <= tolerance(asset, lights)).all()
-    assert response["notes"] == ["not shown: light of Spot (suns and points are)"]
+    assert response["notes"] == ["not shown: light of Spot (only suns and point lights are)"]
 
 
 def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:

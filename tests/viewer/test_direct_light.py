@@ -73,7 +73,9 @@ def test_point_lights_say_that_their_direct_light_is_missing(
     chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
     assert "indirect light only" not in chromium("run", script="document.getElementById('status').textContent")
     chromium("choose", selector=".chip.add", value="point")
-    assert "point, spot and environment lights: indirect light only" in chromium("run", script="document.getElementById('status').textContent")
+    assert "point, spot and environment lights: indirect light only" in chromium(
+        "run", script="document.getElementById('status').textContent"
+    )
 
 
 def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[[Path], str], tmp_path: Path) -> None:

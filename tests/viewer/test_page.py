@@ -60,7 +60,9 @@ def test_a_sun_dragged_over_the_sky_relights(chromium: Any, asset: Asset, url: s
     chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT)
     before = chromium.state()["lights"][0]["direction"]
     assert shows(chromium, asset, [DirectionalLight(tuple(before))])
-    x, y, w, h = chromium("run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('directions').getBoundingClientRect())")
+    x, y, w, h = chromium(
+        "run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('directions').getBoundingClientRect())"
+    )
     middle = [x + w / 2, y + h / 2]
     chromium("drag", path=[[middle[0] - 40, middle[1] + 30], [middle[0] + 10, middle[1] - 20], [middle[0] + 55, middle[1] - 5]])
     light = chromium.state()["lights"][0]["direction"]
@@ -127,6 +129,7 @@ def test_an_address_of_nonsense_is_said_in_one_line(chromium: Any, asset: Asset,
         "#{'tone':'loud'}": "another tone",
         "#{'lights':[{'kind':'point'}]}": "of on",
     }.items():
+        chromium("address")  # once the page has written its own
         went = "addEventListener('hashchange', () => done(), {once: true})"
         waited = f"new Promise((done) => {{ {went}; location.hash = {json.dumps(hash_)}; }})"
         chromium("run", script=waited)

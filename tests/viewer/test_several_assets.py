@@ -93,7 +93,7 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
     assert colors["best"][2] > colors["best"][0] + 60
 
 
-def test_a_spectrum_is_the_singular_values_of_the_answers(
+def test_a_spectrum_is_the_singular_values_of_the_responses(
     chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]
 ) -> None:
     capture, folders = fitted
@@ -103,12 +103,12 @@ def test_a_spectrum_is_the_singular_values_of_the_answers(
     values = np.linalg.svd(responses - responses.mean(axis=0), compute_uv=False) / np.sqrt(responses.size)
     np.testing.assert_allclose(told["capture"][:20], values[:20], rtol=2e-3)
     assert told["scalars"] == 5
-    assert len(told["asset"]) == 5, "five planes answer in five dimensions"
+    assert len(told["asset"]) == 5, "five components span five dimensions"
     assert len(ask(f"{url}spectrum-0.json")["asset"]) > 15, "six maps of three channels in eighteen at most"
     assert ask(f"{url}spectrum-0.json")["scalars"] == 18
     chromium("open", url=url + PICTURE + ",'spectrum':true}", width=WIDTH, height=HEIGHT)
     drawn = json.loads(chromium("run", script="document.getElementById('spectrum').dataset.drawn"))
-    assert drawn == {"asset": len(ask(f"{url}spectrum-0.json")["asset"]), "capture": len(told["capture"]), "scalars": 18}
+    assert drawn == {"asset": len(ask(f"{url}spectrum-0.json")["asset"]), "capture": len(told["capture"]), "components": 18}
 
 
 def test_assets_of_other_captures_are_refused(make_asset: Callable[..., Asset], built: Path, tmp_path: Path) -> None:
