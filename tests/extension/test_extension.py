@@ -49,7 +49,7 @@ def test_registers_and_unregisters_twice(in_blender) -> None:
 
 def test_what_is_refused_and_when(in_blender, make_asset, tmp_path) -> None:
     make_asset("moved", asset_from_world=[[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    make_asset("view", source={"receiver": {"kind": "view", "camera": "Camera"}})
+    make_asset("view", receiver={"kind": "view", "camera": "Camera"})  # its own key, before what the source says
     make_asset("other layer", source={"receiver": {"kind": "lightmap", "object": "Plane", "uv_layer": "gone"}})
     make_asset("outside")
     manifest = json.loads((tmp_path / "outside" / "asset.json").read_text())

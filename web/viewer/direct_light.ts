@@ -44,17 +44,11 @@ import transmittanceFragment from "../../glsl/stages/shadow_transmittance.frag";
 import { type Asset, type DirectionalLight, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
 import { type DirectReceivers, directReceivers } from "./direct_points";
 import { fromThree } from "./frames";
+import { across, cross, discDirections } from "./sun_disc";
 
 const SIZE = 2048; // texels per side of a shadow map
 const NOTHING = -1e30; // height where no occluder is
 const KNOTS = 8; // of a transmittance by cosine
-// Sixteen points that fill the unit disc evenly and keep its area [Sobol1967], for suns that have a size.
-const DISC = [
-  [0, 0], [-0.70710678, 0], [0, 0.5], [0, -0.8660254], [0.55901699, -0.55901699], [-0.25, 0.25], [-0.66143783, -0.66143783], [0.4330127, 0.4330127],
-  [-0.89454251, 0.37053164], [0.61108887, -0.2531213], [0.31730434, 0.76604044], [-0.16570679, -0.40005157], [-0.51646436, -0.21392654], [0.83277376, 0.34494618],
-  [0.09567086, -0.23096988], [-0.28701257, 0.69290965],
-] as const; // prettier-ignore
-
 /** What direct light needs besides the maps: images of the asset, and the scene that casts shadows. */
 export interface DirectInputs {
   normal: FloatImage;
@@ -147,7 +141,7 @@ export class DirectLight {
 
   private add(sun: DirectionalLight): void {
     const towards = moved(sun, this.asset.assetFromWorld).direction;
-    const suns = disc(towards, this.sunAngle);
+    const suns = discDirections(towards, this.sunAngle);
     for (const direction of suns) {
       this.setFrame(this.around(direction));
       this.clear(this.heights, NOTHING);
@@ -183,20 +177,20 @@ export class DirectLight {
 
   /** A square across the light that holds every point, and a hundredth more on every side. */
   private around(toLight: Triple): Frame {
-    const across = unit(cross(toLight, Math.abs(toLight[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
-    const up = cross(toLight, across);
+    const right = across(toLight);
+    const up = cross(toLight, right);
     const [least, most] = [[Infinity, Infinity], [-Infinity, -Infinity]];
     const { bounds } = this.receivers;
     for (let i = 0; i < bounds.length; i += 3) {
       const [x, y, z] = [bounds[i], bounds[i + 1], bounds[i + 2]];
-      const flat = [x * across[0] + y * across[1] + z * across[2], x * up[0] + y * up[1] + z * up[2]];
+      const flat = [x * right[0] + y * right[1] + z * right[2], x * up[0] + y * up[1] + z * up[2]];
       for (const a of [0, 1]) {
         least[a] = Math.min(least[a], flat[a]);
         most[a] = Math.max(most[a], flat[a]);
       }
     }
     const extent = Math.max(most[0] - least[0], most[1] - least[1], 1e-6) * 1.02;
-    return { across, up, toLight, low: [(least[0] + most[0] - extent) / 2, (least[1] + most[1] - extent) / 2], extent };
+    return { across: right, up, toLight, low: [(least[0] + most[0] - extent) / 2, (least[1] + most[1] - extent) / 2], extent };
   }
 
   /** Split the triangles that cast shadows into opaque and translucent ones. */
@@ -279,15 +273,6 @@ function reflectance(asset: Asset, albedo: FloatImage | undefined): Float32Array
   return out;
 }
 
-/** Unit directions that fill a sun's disc of angular diameter `angle` (rad). */
-function disc(direction: Triple, angle: number): Triple[] {
-  if (angle === 0) return [direction];
-  const across = unit(cross(direction, Math.abs(direction[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
-  const up = cross(direction, across);
-  const t = Math.tan(angle / 2);
-  return DISC.map(([x, y]) => unit([0, 1, 2].map((c) => direction[c] + t * (x * across[c] + y * up[c])) as unknown as Triple));
-}
-
 function blending(kind: "add" | "max" | "multiply") {
   const factors = kind === "multiply" ? { blendSrc: DstColorFactor, blendDst: ZeroFactor } : { blendSrc: OneFactor, blendDst: OneFactor };
   return { blending: CustomBlending, blendEquation: kind === "max" ? MaxEquation : AddEquation, ...factors, depthTest: false, depthWrite: false, side: 2 } as const;
@@ -307,11 +292,4 @@ function unculled(geometry: BufferGeometry, material: RawShaderMaterial): Mesh {
   const mesh = new Mesh(geometry, material);
   mesh.frustumCulled = false;
   return mesh;
-}
-
-const cross = (a: Triple, b: Triple): Triple => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-
-function unit(v: Triple): Triple {
-  const length = Math.hypot(...v);
-  return [v[0] / length, v[1] / length, v[2] / length];
 }

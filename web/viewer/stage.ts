@@ -19,6 +19,7 @@ import type { Light, Triple } from "../src";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
+import { panAndZoom } from "./pan_zoom";
 import type { Receivers } from "./receivers";
 import { BACKGROUND, COLORS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
@@ -73,7 +74,7 @@ export class Stage {
     this.gizmos = new PointLightGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
       this.orbit.enabled = !dragging && this.hasMesh;
     });
-    this.panByPointer(canvas, changed);
+    panAndZoom(canvas, state, size, this, changed);
   }
 
   /** Whether the mesh is shown, rather than a picture. */
@@ -213,7 +214,8 @@ export class Stage {
     return { zoom, left: snapped(w / 2 - mx * zoom), top: snapped(h / 2 - my * zoom), wide: width * zoom, high: height * zoom };
   }
 
-  private fit(): number {
+  /** Screen pixels per texel at which the picture fits the canvas. */
+  fit(): number {
     const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
     return Math.max(1e-3, Math.min((w - 48) / this.size.width, (h - 112) / this.size.height));
   }
@@ -281,51 +283,5 @@ export class Stage {
       this.lit.push(shown);
     });
     this.scene.updateMatrixWorld(true);
-  }
-
-  private panByPointer(canvas: HTMLCanvasElement, changed: Changed): void {
-    const held = new Map<number, [number, number]>();
-    const begin = () => {
-      if (this.state.zoom) return;
-      this.state.zoom = this.fit();
-      this.state.middle = [this.size.width / 2, this.size.height / 2];
-    };
-    const zoomed = (factor: number, x: number, y: number) => {
-      begin();
-      const { zoom, left, top } = this.spread();
-      const next = Math.min(64, Math.max(0.05, zoom * factor));
-      const [u, v] = [(x - left) / zoom, (y - top) / zoom];
-      this.state.zoom = next;
-      this.state.middle = [u - (x - canvas.clientWidth / 2) / next, v - (y - canvas.clientHeight / 2) / next];
-      changed();
-    };
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        if (this.hasMesh) return;
-        event.preventDefault();
-        zoomed(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
-      },
-      { passive: false },
-    );
-    canvas.addEventListener("pointerdown", (event) => {
-      if (!this.hasMesh) held.set(event.pointerId, [event.offsetX, event.offsetY]);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      const from = held.get(event.pointerId);
-      if (!from || this.hasMesh || this.gizmos.dragging) return;
-      const to: [number, number] = [event.offsetX, event.offsetY];
-      const other = [...held].find(([id]) => id !== event.pointerId)?.[1];
-      if (other) {
-        const apart = (p: [number, number]) => Math.hypot(p[0] - other[0], p[1] - other[1]);
-        zoomed(apart(to) / Math.max(1, apart(from)), (to[0] + other[0]) / 2, (to[1] + other[1]) / 2);
-      } else if (event.buttons) {
-        begin();
-        this.state.middle = [this.state.middle[0] - (to[0] - from[0]) / this.state.zoom, this.state.middle[1] - (to[1] - from[1]) / this.state.zoom];
-        changed();
-      }
-      held.set(event.pointerId, to);
-    });
-    for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) canvas.addEventListener(end, (event) => held.delete(event.pointerId));
   }
 }

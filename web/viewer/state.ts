@@ -1,6 +1,6 @@
 /** The page's state, and its URL: `#` followed by the state as JSON. */
 import { SrbfError, type Triple } from "../src";
-import { checkLight, type LightState, round } from "./light_state";
+import { checkLight, directionalState, type LightState, round, rounded } from "./light_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
 export const SHOWS = ["picture", "false color", "negative", "map"] as const;
@@ -42,6 +42,31 @@ export interface State {
   playing: boolean;
   /** Whether the camera orbits while the path plays, with twice its period. */
   turntable: boolean;
+}
+
+/** What the page shows of an asset at first. */
+export function firstState({ quantity, width, height }: { quantity: "irradiance" | "radiance"; width: number; height: number }, view: State["view"]): State {
+  return {
+    asset: 0,
+    lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
+    selected: 0,
+    exposure: quantity === "radiance" || view === "scene" ? 1.65 : 0,
+    tone: "linear",
+    show: "picture",
+    map: 0,
+    terms: "both",
+    errors: false,
+    spectrum: false,
+    compare: "off",
+    split: 0.5,
+    view,
+    zoom: 0,
+    middle: [width / 2, height / 2],
+    path: "none",
+    seconds: 8,
+    playing: false,
+    turntable: false,
+  };
 }
 
 /** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be redrawn. */

@@ -6,13 +6,13 @@ import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
-import { directionalState, type DirectionalState, environmentState, isPointLightState, lightOf, type LightState, rounded } from "./light_state";
+import { type DirectionalState, environmentState, isPointLightState, lightOf, rounded } from "./light_state";
 import { listen, tabled } from "./keys";
 import { checkGpu, type Loaded } from "./loading";
 import { mapPlace, mapRange } from "./map_range";
 import { element, lineOf, say } from "./messages";
 import { Panel, type PanelFacts } from "./panel";
-import { along } from "./path";
+import { Playback } from "./path";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng } from "./saving";
@@ -20,7 +20,7 @@ import { COLORS, screenUniforms, VALUES } from "./screen";
 import { type DirectionPoint, DirectionWidget } from "./direction_widget";
 import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
-import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State, VIEWS } from "./state";
+import { type Changed, COMPARES, decodeState, encodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects } from "./subject";
 import { Surroundings } from "./surroundings";
 
@@ -38,6 +38,7 @@ export class Viewer {
   private readonly uniforms;
   private readonly inScene: boolean; // whether the page opens with the scene, which is radiance
   private readonly receivers: Receivers;
+  private readonly playback: Playback;
   private readonly stage: Stage;
   private readonly directions: DirectionWidget;
   private readonly panel: Panel;
@@ -49,7 +50,6 @@ export class Viewer {
   private lightsChanged = true;
   private drawNeeded = true;
   private waiting = 0;
-  private base?: { light: LightState; copy: LightState; turns: number };
   private error = "";
   private last = 0;
   private readonly paces: number[] = [];
@@ -73,7 +73,8 @@ export class Viewer {
     this.receivers = new Receivers(asset, coverage);
     this.copy = new Copy(asset.manifest.width, asset.manifest.height);
     this.inScene = model !== undefined && Surroundings.in(model);
-    this.state = this.begun();
+    this.state = this.firstState();
+    this.playback = new Playback(this.state, this.receivers.bounds);
     this.readUrl(location.hash);
     this.state.asset = facts.assets.indexOf(first.facts);
     const changed: Changed = (what = {}) => this.changed(what);
@@ -168,34 +169,14 @@ export class Viewer {
       .finally(() => this.done());
   }
 
-  private begun(): State {
-    const { asset } = this.subject;
-    return {
-      asset: 0,
-      lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
-      selected: 0,
-      exposure: asset.manifest.quantity === "radiance" || this.inScene ? 1.65 : 0,
-      tone: "linear",
-      show: "picture",
-      map: 0,
-      terms: "both",
-      errors: false,
-      spectrum: false,
-      compare: "off",
-      split: 0.5,
-      view: this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels",
-      zoom: 0,
-      middle: [asset.manifest.width / 2, asset.manifest.height / 2],
-      path: "none",
-      seconds: 8,
-      playing: false,
-      turntable: false,
-    };
+  private firstState(): State {
+    const { manifest } = this.subject.asset;
+    return firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels");
   }
 
   private readUrl(hash: string): void {
     try {
-      const plain = this.begun();
+      const plain = this.firstState();
       const state = decodeState(hash, plain);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
       state.map = Math.min(state.map, this.subject.maps - 1);
@@ -235,7 +216,7 @@ export class Viewer {
     const since = now - this.last;
     this.last = now;
     if (this.state.playing) this.play(since / 1000);
-    else this.base = undefined;
+    else this.playback.stop();
     if (!this.drawNeeded) {
       if (document.body.dataset.state === "busy" && !this.waiting) document.body.dataset.state = "idle";
       return;
@@ -266,17 +247,7 @@ export class Viewer {
       this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
       this.changed({});
     }
-    const light = this.state.lights[this.state.selected];
-    if (!light) return;
-    if (this.base?.light !== light) this.base = { light, copy: structuredClone(light), turns: 0 };
-    this.base.turns += Math.min(seconds, 0.25) / this.state.seconds;
-    Object.assign(light, this.moved(this.base.copy, this.base.turns));
-    this.changed({ lights: true });
-  }
-
-  private moved(light: LightState, turns: number): LightState {
-    const { center, radius } = this.receivers.bounds;
-    return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, center, radius);
+    if (this.playback.advance(seconds)) this.changed({ lights: true });
   }
 
   private relight(): void {
@@ -491,7 +462,7 @@ export class Viewer {
   private savePath(): void {
     const { lights, selected, seconds } = this.state;
     const count = Math.max(1, Math.round(seconds * FRAMES_PER_SECOND));
-    const frame = (i: number) => lights.map((light, j) => (j === selected ? this.moved(light, i / count) : light));
+    const frame = (i: number) => lights.map((light, j) => (j === selected ? this.playback.moved(light, i / count) : light));
     saveFrames("FRAMES.json", Array.from({ length: count }, (_, i) => frame(i)));
   }
 }
