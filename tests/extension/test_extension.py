@@ -15,7 +15,7 @@ from srbf.cli import app
 pytestmark = pytest.mark.blender
 ROOT = Path(__file__).parents[2]
 
-# In the library's place: tells what it was asked, speaks as a bake does, and ends as one does.
+# A stand-in for the library: reports its arguments, prints what a bake prints, and ends like one.
 DOUBLE = """
 import json, pathlib, sys, time
 pathlib.Path({asked!r}).write_text(json.dumps(sys.argv[1:]))

@@ -56,7 +56,7 @@ def url(asset: Asset, tmp_path: Path, serve: Callable[..., str]) -> str:
     return serve(tmp_path / "asset")
 
 
-def test_a_sun_dragged_over_the_sky_relights(chromium: Any, asset: Asset, url: str) -> None:
+def test_a_directional_light_dragged_over_the_disc_relights(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT)
     before = chromium.state()["lights"][0]["direction"]
     assert shows(chromium, asset, [DirectionalLight(tuple(before))])
@@ -181,7 +181,7 @@ def test_a_saved_path_is_a_round(chromium: Any, asset: Asset, url: str, tmp_path
 
 
 def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url: str, tmp_path: Path) -> None:
-    """In the plane of the sun's azimuth, 75 degrees to either side, from where the sun stands."""
+    """In the plane of the sun's azimuth, 75 degrees to either side, from the sun's own direction."""
     chromium("open", url=url + "#{'path':'swing','seconds':3}", width=WIDTH, height=HEIGHT)
     directions = np.array([light.direction for (light,) in lights_of(chromium, tmp_path, "Path (FRAMES.json)")])  # type: ignore[union-attr]
     start = np.array([-0.45, -0.5, 0.74]) / np.linalg.norm([-0.45, -0.5, 0.74])
@@ -193,26 +193,28 @@ def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url:
 
 @pytest.mark.parametrize("suffix", ["exr", "png", "hdr"])
 def test_an_environment_dropped_on_the_page_lights_it(chromium: Any, asset: Asset, url: str, tmp_path: Path, suffix: str) -> None:
-    sky = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)
+    environment = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)
     path = tmp_path / f"sky.{suffix}"
     if suffix == "hdr":
-        write_radiance(path, sky)
+        write_radiance(path, environment)
     else:
-        write_image(path, np.round(sky * 255).astype(np.uint8) if suffix == "png" else sky, "uint8" if suffix == "png" else "float")
+        write_image(
+            path, np.round(environment * 255).astype(np.uint8) if suffix == "png" else environment, "uint8" if suffix == "png" else "float"
+        )
     chromium("open", url=url + PICTURE + ",'exposure':-2}", width=WIDTH, height=HEIGHT)
     chromium("drop", name=path.name, bytes=base64.b64encode(path.read_bytes()).decode())
-    assert [light["on"] for light in chromium.state()["lights"]] == [False, True], "the first sky takes the sun's place"
+    assert [light["on"] for light in chromium.state()["lights"]] == [False, True], "the first environment map turns the sun off"
     assert shows(chromium, asset, [EnvironmentLight(read_image(path, 3))], exposure=-2)
     (lights,) = lights_of(chromium, tmp_path)  # beside the picture
     assert shows(chromium, asset, lights, exposure=-2)
 
 
-def write_radiance(path: Path, sky: np.ndarray) -> None:
+def write_radiance(path: Path, environment: np.ndarray) -> None:
     """Flat RGBE pixels [Ward1991]: mantissas that share an exponent."""
-    exponent = np.ceil(np.log2(sky.max(axis=2)))
-    mantissa = np.clip(np.floor(sky / 2.0 ** exponent[..., None] * 256), 0, 255)
+    exponent = np.ceil(np.log2(environment.max(axis=2)))
+    mantissa = np.clip(np.floor(environment / 2.0 ** exponent[..., None] * 256), 0, 255)
     pixels = np.concatenate([mantissa, exponent[..., None] + 128], axis=2).astype(np.uint8)
-    height, width = sky.shape[:2]
+    height, width = environment.shape[:2]
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + pixels.tobytes())
 
 
