@@ -85,17 +85,17 @@ def test_point_lights_and_suns_together_are_numpys(
     chromium("number", name="Intensity", value=0.4)
     chromium("choose", selector=".chip.add", value="point")
     for name, value in {
-        "Point light x (m)": 0.3,
-        "Point light y (m)": -0.4,
-        "Point light z (m)": 0.9,
+        "Position x (m)": 0.3,
+        "Position y (m)": -0.4,
+        "Position z (m)": 0.9,
         "a₀ (m)": 0.8,
         "Intensity": 0.7,
     }.items():
         chromium("number", name=name, value=value)
     chromium("choose", selector=".chip.add", value="spot")
     for name, value in {
-        "Point light x (m)": -0.5,
-        "Point light z (m)": 1.25,
+        "Position x (m)": -0.5,
+        "Position z (m)": 1.25,
         "Aim x (m)": 0.5,
         "Inner half-angle (°)": 12,
         "Outer half-angle (°)": 35,
@@ -110,7 +110,7 @@ def test_point_lights_and_suns_together_are_numpys(
 def test_an_address_brings_everything_back(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url + PICTURE + ",'tone':'agx','exposure':0.5}", width=WIDTH, height=HEIGHT)
     chromium("choose", selector=".chip.add", value="point")
-    chromium("number", name="Point light x (m)", value=0.31)
+    chromium("number", name="Position x (m)", value=0.31)
     chromium("press", keys=["1", "ArrowLeft", "Shift+ArrowUp"])
     there, seen = chromium("address"), chromium.texels(asset.width, asset.height, ZOOM)
     kept = chromium.state()

@@ -14,7 +14,7 @@ const KEYS: [string, string][] = [
   ["t", "the scene, the mesh alone, or texels"],
   ["a", "the next asset"],
   ["c", "next comparison with the capture"],
-  ["m", "the next map"],
+  ["m", "the next coefficient map"],
   ["r", "reset the view"],
   ["h", "hide the panel"],
   ["?", "this list"],

@@ -165,7 +165,7 @@ export class Panel {
           .onChange(this.relight);
       });
     };
-    coordinates("Point light", () => light.position, (place) => (light.position = place));
+    coordinates("Position", () => light.position, (place) => (light.position = place));
     folder.add(light, "a0", step, 4 * radius, step).name("a₀ (m)").onChange(this.relight);
     folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
     folder.add(light, "radius", 0.0001, radius, 0.0001).name("Radius (m)").onChange(this.relight);
