@@ -14,7 +14,7 @@
 #error define SRBF_K: how many maps this pass combines
 #endif
 #ifndef SRBF_POINT_LIGHTS
-#error define SRBF_POINT_LIGHTS: how many pointLights a pass takes at most
+#error define SRBF_POINT_LIGHTS: how many point lights a pass takes at most
 #endif
 
 vec3 srbfCombinePointLights(highp sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], highp sampler2D rTable,

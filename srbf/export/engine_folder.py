@@ -1,4 +1,4 @@
-"""What every engine's export starts from: its static files, and the asset's images in a folder that the engine's own importers pass by."""
+"""The common part of every engine's export: its static files, and the asset's images in a folder that the engine's own importers ignore."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def engine_root(name: str) -> Path:
 
 
 def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, container: Target = exr.write) -> Asset:
-    """The asset by a `container` below `folder`/`data`, its asset.json in `folder`; the asset as it was written is returned."""
+    """Write the asset by a `container` below `folder`/`data`, and its asset.json in `folder`; returns the asset as written."""
     files.make_folder(folder / data)
     container(asset, folder / data, settings)
     written = Asset.open(folder / data)
@@ -34,7 +34,7 @@ def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, conta
 
 
 def below(data: str, manifest: dict[str, Any]) -> dict[str, Any]:
-    """asset.json of files that lie in `data` beside it."""
+    """asset.json for files in `data` beside it."""
     moved = dict(manifest)
     method = method_named(manifest["method"])
     layers = method.layers

@@ -1,4 +1,4 @@
-"""`gltf`: a mesh that any viewer shows with a plain lightmap, and one that knows SRBF_relighting_map relights."""
+"""`gltf`: a mesh that any viewer shows with a plain lightmap, and that viewers with SRBF_relighting_map relight."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ UNLIT = "KHR_materials_unlit"
 MODEL = "model.glb"
 UV_SET = 1  # TEXCOORD_1
 LINEAR_FILTER, CLAMP = 9729, 33071
-SKY = (16, 32)  # texels of the white sky
+ENVIRONMENT_SIZE = (16, 32)  # texels of the white environment map
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill `folder` with the asset, its layers in a .ktx2 file, and `model.glb` that points to it.
 
     The mesh is `settings.mesh`, else rebuilt from the position map, for a view a picture of its size. Its materials carry the extension,
-    {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white sky, unlit.
+    {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white environment map, unlit.
     """
     notes: list[str] = []
     document, lit = _lit_document(asset, settings.mesh, notes)
     if asset.transport == "indirect":
-        notes.append("without the extension a viewer shows the indirect light alone")
+        notes.append("without the extension, viewers show the indirect light only")
     with atomic_path(folder / MODEL) as temporary:
         temporary.write_bytes(document.pack())
     written = texture_array.write(".ktx2", asset, folder, settings)
@@ -45,14 +45,14 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def model(asset: Asset, mesh: Path | None = None) -> bytes:
-    """`model.glb` alone, as `write` writes it."""
+    """Only `model.glb`, as `write` writes it."""
     return _lit_document(asset, mesh, [])[0].pack()
 
 
-def white_sky(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
-    """The asset under a sky of radiance 1/pi, irradiance 1 on an open plane, or of radiance 1, which shows a white one as 1."""
+def under_white(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
+    """The asset under a uniform environment map of radiance 1/pi (irradiance 1 on an open plane), or for radiance assets of radiance 1."""
     radiance = 1 / np.pi if asset.quantity == "irradiance" else 1.0
-    return relight(asset, [EnvironmentLight(np.full((*SKY, 3), radiance, np.float32))])
+    return relight(asset, [EnvironmentLight(np.full((*ENVIRONMENT_SIZE, 3), radiance, np.float32))])
 
 
 def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Glb, int]:
@@ -90,7 +90,7 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
         normals: np.ndarray | None = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
         uv = np.array([[0, 0], [0, 1], [1, 1], [1, 0]], np.float32)
         triangles = np.array([[0, 1, 2], [0, 2, 3]])
-        notes.append("a view is a picture: its mesh is a rectangle of its shape")
+        notes.append("a view is a picture: its mesh is a rectangle of the same proportions")
     else:
         mesh = texel_mesh(asset)
         positions, uv, triangles = _y_up(mesh.positions), mesh.uv, mesh.triangles
@@ -117,10 +117,10 @@ def _y_up(vectors: Float32[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
 
 
 def _fallback(document: Glb, asset: Asset) -> int:
-    """The asset under a white sky as a texture of the document; its index."""
+    """The asset under a white environment map as a texture of the document; its index."""
     with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
         path = Path(folder) / "lightmap.png"
-        write_png(path, white_sky(asset), alpha_of(asset))
+        write_png(path, under_white(asset), alpha_of(asset))
         view = document.add_view(path.read_bytes())
     image = document.add("images", {"name": "lightmap", "mimeType": "image/png", "bufferView": view})
     sampler = document.add("samplers", {"magFilter": LINEAR_FILTER, "minFilter": LINEAR_FILTER, "wrapS": CLAMP, "wrapT": CLAMP})

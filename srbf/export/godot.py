@@ -1,4 +1,4 @@
-"""A Godot 4 project: the asset, an addon that lights canvases and meshes by it, and an example that opens at once."""
+"""A Godot 4 project: the asset, an addon that lights canvases and meshes with it, and a ready example."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from srbf.io import files
 from srbf.methods import method_of
 from srbf.registry import all_methods
 
-DATA = "asset"  # the folder of the asset's images, which Godot's own importers are told to leave alone
-IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
-MODEL = "model.glb"  # what the example shows in place of the asset's texels
+DATA = "asset"  # the folder of the asset's images, hidden from Godot's own importers
+IMPORTED = "asset.srbf"  # the file that Godot imports: it holds the path of asset.json
+MODEL = "model.glb"  # shown by the example instead of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
@@ -31,8 +31,8 @@ _OUTSIDE = re.compile(r"\blayout\s*\(|^\s*(?:in|out)\s|\bgl_\w+|\bvoid\s+main\b"
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `project.godot`, the addon with the shaders of all methods, `asset.json` with its images below `asset/`.
 
-    Layers are EXRs (half, float), PNGs (uint8) or one DDS (bc7, bc1, and whatever has mip levels); those in memory stay as they are unless
-    `settings` say otherwise. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
+    Layers are EXRs (half, float), PNGs (uint8) or one DDS (bc7, bc1, and whatever has mip levels); the encoding in memory is kept unless
+    `settings` name another. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
     maps of other functions than Gaussians, which no shader knows.
     """
     method_of(asset).shader_parts(asset)  # refuses what no shader knows
@@ -58,14 +58,12 @@ def method_include(name: str) -> str:
     source = f'#include "methods/{name}_lights.glsl"\n#include "combine/mip_level.glsl"\n'
     text = translated(resolve_text(source, name).text)
     guard = f"SRBF_{name.upper()}_INCLUDED"
-    head = (
-        f"// SPDX-License-Identifier: MIT\n// Made of glsl/methods/{name}_lights.glsl and what it includes by srbf export --target godot.\n"
-    )
+    head = f"// SPDX-License-Identifier: MIT\n// From glsl/methods/{name}_lights.glsl and its includes, by srbf export --target godot.\n"
     return f"{head}#ifndef {guard}\n#define {guard}\n{text}#endif\n"
 
 
 def translated(text: str) -> str:
-    """GLSL functions as Godot's shading language takes them: without what only a driver reads, and without precisions of samplers.
+    """GLSL functions in Godot's shading language: without lines for drivers, and without precisions of samplers.
 
     ShaderError on what belongs to a stage (main, in, out, gl_…): Godot writes those itself.
     """
@@ -73,5 +71,5 @@ def translated(text: str) -> str:
         text = rule.sub("", text)
     code = re.sub(r"\([^()]*\)", "()", re.sub(r"/\*.*?\*/|//[^\n]*", "", text, flags=re.DOTALL))  # parameters may be in or out
     if found := _OUTSIDE.search(code):
-        raise ShaderError(f"expected functions alone for Godot, found {found[0].strip()!r}; translate an include of glsl/, not a stage")
+        raise ShaderError(f"expected only functions for Godot, found {found[0].strip()!r}; translate an include of glsl/, not a stage")
     return text

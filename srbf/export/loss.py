@@ -1,4 +1,4 @@
-"""What storing an asset another way costs its pictures."""
+"""The loss of an asset's relit pictures by another encoding."""
 
 from __future__ import annotations
 

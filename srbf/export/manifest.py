@@ -1,4 +1,4 @@
-"""The asset.json of an export: that of the asset, with layers stored another way."""
+"""The asset.json of an export: that of the asset, with layers in another encoding."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ def with_layers(
     bias: Float32[ndarray, "N C"],
     entries: list[dict[str, Any]],
 ) -> Asset:
-    """`asset` with other layers and `entries`, every key that a file needs there, whether it was read from one or made in memory.
+    """`asset` with other layers and `entries`, and every key that a file needs, whether it was loaded or made in memory.
 
-    Errors by role were measured on the layers as they were; they go, `source.export` says what was done.
+    Errors by role, which were measured on the original layers, are dropped; `source.export` records the export.
     """
     manifest: dict[str, Any] = {
         "format": "srbf-asset",
@@ -43,5 +43,5 @@ def with_layers(
 
 
 def stem(asset: Asset) -> str:
-    """What the files of its layers are called: `map` or `plane`."""
+    """The stem of its layers' files: `map` or `plane`."""
     return asset.layers_key[:-1]

@@ -1,4 +1,4 @@
-"""The shader pack as Metal: whole stages by spirv-cross, since no Metal compiler runs outside a Mac to check a text of our own."""
+"""The shader pack as Metal: whole stages by spirv-cross, since no Metal compiler outside macOS could check our own translation."""
 
 from __future__ import annotations
 
@@ -34,4 +34,4 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     written = exr.write(asset, folder, settings)
     for name, text in texts.items():
         files.write_text(folder / f"{name.replace('.', '_')}.metal", text)
-    return Written((*written.notes, "Metal by spirv-cross: not compiled by Apple's compiler here"))
+    return Written((*written.notes, "Metal by spirv-cross: not compiled with Apple's compiler"))

@@ -40,7 +40,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def unity_include(asset: Asset) -> str:
-    """`SrbfAsset.hlsl`: the asset's functions, what its quantity means in Unity's units, and Unity's own glue.
+    """`SrbfAsset.hlsl`: the asset's functions, its quantity in Unity's units, and the code for Unity.
 
     A light of intensity I gives a white Lambert surface that faces it I, where Blender's sun of strength I gives I / pi.
     """

@@ -17,7 +17,7 @@ from srbf.io import files
 
 DATA = "images"
 SCRIPT = "import_srbf.py"
-# What the Custom node is given besides textures and places; the material parameter collection holds them by these names.
+# Inputs of the Custom node besides textures and positions; the material parameter collection holds them under these names.
 LIGHTS = {
     "SunDirection": (0.0, 0.0, 1.0, 0.0),  # towards the sun, Unreal's frame
     "SunColor": (0.0, 0.0, 0.0, 0.0),  # linear, lux
@@ -29,7 +29,7 @@ LIGHTS = {
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
-    """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` by a name of its own, `node.json`, the Custom node, and the
+    """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` under a unique name, `node.json`, the Custom node, and the
     editor script that imports all of it.
 
     InputError on an asset that no shader relights.

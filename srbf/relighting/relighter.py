@@ -15,7 +15,7 @@ from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.gl.context import Limits, create_context
 from srbf.gl.depth_buffer import DepthView
-from srbf.gl.environment import Sky
+from srbf.gl.environment import EnvironmentWeights
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.lights import EnvironmentLight, Light, PointLight
@@ -85,7 +85,7 @@ class Relighter:
                 self._programs = Programs(self._context, self._resources)
                 self._sky = None
                 if environments == "gpu":
-                    self._sky = Sky(self._context, asset, self._programs, self._textures, self._resources)
+                    self._sky = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise

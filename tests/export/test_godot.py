@@ -100,7 +100,7 @@ def test_a_rule_takes_what_godot_lacks_and_no_more(glsl: str, godot: str) -> Non
     "stage", ["void main() {}\n", "in vec2 uv;\n", "layout(location = 0) out vec4 c;\n", "vec4 f() { return gl_FragCoord; }\n"]
 )
 def test_a_stage_is_refused(stage: str) -> None:
-    with pytest.raises(ShaderError, match="expected functions alone"):
+    with pytest.raises(ShaderError, match="expected only functions"):
         translated(stage)
 
 

@@ -97,7 +97,7 @@ def test_radiance_replaces_the_outgoing_light(browser: Any, make_asset: Callable
 
 @pytest.mark.parametrize("source", ["maps", "lightmap"])
 def test_lights_may_come_and_go_and_nothing_is_left_behind(browser: Any, served: dict, source: str) -> None:
-    """From frame to frame, lamps in any number; every texture and program is gone after dispose."""
+    """From frame to frame, any number of point lights; every texture and program is gone after dispose."""
     asset, url = served["eigen-map", "half"]
     job = {"material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": source, "lights": LIGHTS["several"]}
     sets = [LIGHTS["point"], LIGHTS["several"], [], LIGHTS["directional"], LIGHTS["point"] + LIGHTS["spot"]]
@@ -112,7 +112,7 @@ def test_lights_may_come_and_go_and_nothing_is_left_behind(browser: Any, served:
 
 @pytest.mark.parametrize("kind", FOLLOWED)
 def test_three_s_own_lights_are_followed(browser: Any, served: dict, kind: str) -> None:
-    """In three's units and its y-up world; the light replaces three's own diffuse light of the same lamps."""
+    """In three's units and its y-up world; the light replaces three's own diffuse light of the same lights."""
     asset, url = served["relighting-map", "half"]
     followed, lights = FOLLOWED[kind]
     job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": followed}

@@ -1,4 +1,4 @@
-/** The sky as a disc, equal areas for equal solid angles, zenith in its middle: suns are dragged on it, among the capture's lights. */
+/** The sphere of directions as a disc, equal areas for equal solid angles, zenith in the middle: directional lights are dragged on it, among the capture's. */
 import type { Triple } from "../src";
 import { directionalState, type DirectionalState, rounded } from "./light_state";
 import type { Changed, State } from "./state";
@@ -6,15 +6,15 @@ import type { Changed, State } from "./state";
 const BELOW = 18; // degrees shown below a hemisphere's horizon
 const GRAB = 14; // pixels
 
-export interface SkyPoint {
+export interface DirectionPoint {
   direction: Triple;
   role: "train" | "validation" | "holdout" | "center";
 }
 
-export class SkyWidget {
-  /** The baked light that is compared with, if any. */
+export class DirectionWidget {
+  /** Index of the baked light that is compared with; -1 without one. */
   marked = -1;
-  /** PSNR of every point, dB, to be shown in its place: worse is hotter. */
+  /** PSNR of every point, dB, shown as its color: worse is hotter. */
   errors?: readonly number[];
   private readonly context: CanvasRenderingContext2D;
   private readonly widest: number;
@@ -24,7 +24,7 @@ export class SkyWidget {
     private readonly canvas: HTMLCanvasElement,
     private readonly state: State,
     private readonly domain: "sphere" | "hemisphere",
-    private points: readonly SkyPoint[],
+    private points: readonly DirectionPoint[],
     private readonly changed: Changed,
   ) {
     this.context = canvas.getContext("2d") as CanvasRenderingContext2D;
@@ -36,12 +36,12 @@ export class SkyWidget {
     for (const end of ["pointerup", "pointercancel"] as const) canvas.addEventListener(end, () => (this.dragging = false));
   }
 
-  /** Other points: of another asset. */
-  show(points: readonly SkyPoint[]): void {
+  /** Show the points of another asset. */
+  show(points: readonly DirectionPoint[]): void {
     this.points = points;
   }
 
-  /** Whether the capture saw light from there. */
+  /** Whether a direction lies in the captured domain. */
   inside(direction: Triple): boolean {
     return this.domain === "sphere" || direction[2] > 0;
   }
@@ -121,9 +121,9 @@ export class SkyWidget {
     const c = this.context;
     const { x, y, radius } = this.disc;
     const horizon = (radius * Math.sin(Math.PI / 4)) / Math.sin(this.widest / 2);
-    const sky = c.createRadialGradient(x, y - radius * 0.2, radius * 0.1, x, y, horizon);
-    sky.addColorStop(0, "#35506e");
-    sky.addColorStop(1, "#1d2733");
+    const above = c.createRadialGradient(x, y - radius * 0.2, radius * 0.1, x, y, horizon);
+    above.addColorStop(0, "#35506e");
+    above.addColorStop(1, "#1d2733");
     const ground = this.domain === "sphere" ? "#221f1c" : "#15171a";
     circle(c, x, y, radius, ground);
     if (this.domain === "hemisphere") {
@@ -138,7 +138,7 @@ export class SkyWidget {
     }
     c.beginPath();
     c.arc(x, y, horizon, 0, 2 * Math.PI);
-    c.fillStyle = sky;
+    c.fillStyle = above;
     c.fill();
     c.strokeStyle = "#5b6673";
     c.lineWidth = 1;
@@ -160,8 +160,8 @@ export class SkyWidget {
     c.fillText("+Y", x, y - radius - 6);
   }
 
-  /** `good`: 0 of the worst, 1 of the best. */
-  private dot(point: SkyPoint, marked: boolean, good?: number): void {
+  /** `good`: 0 for the worst, 1 for the best. */
+  private dot(point: DirectionPoint, marked: boolean, good?: number): void {
     const [x, y] = this.project(point.direction);
     if (good !== undefined) {
       circle(this.context, x, y, point.role === "train" ? (this.points.length > 150 ? 3.2 : 5) : 4.4, heat(1 - good));
@@ -169,8 +169,8 @@ export class SkyWidget {
       if (marked) this.ring(x, y, 6.5, "#7fd1ff", 2);
       return;
     }
-    const tint = { train: "#9fb2c8a0", center: "#9fb2c8c0", validation: "#e0b35ac0", holdout: "#e08a5ac0" }[point.role];
-    circle(this.context, x, y, point.role === "center" ? 1.8 : this.points.length > 150 ? 1.1 : 1.5, tint);
+    const color = { train: "#9fb2c8a0", center: "#9fb2c8c0", validation: "#e0b35ac0", holdout: "#e08a5ac0" }[point.role];
+    circle(this.context, x, y, point.role === "center" ? 1.8 : this.points.length > 150 ? 1.1 : 1.5, color);
     if (marked) this.ring(x, y, 5, "#7fd1ff", 2);
   }
 
@@ -208,13 +208,13 @@ export class SkyWidget {
   }
 }
 
-/** The least and the most of `values`, apart. */
+/** The smallest and the largest of `values`, at least 0.1 apart. */
 function ends(values: readonly number[]): [number, number] {
   const [least, most] = [Math.min(...values), Math.max(...values)];
   return [least, Math.max(most, least + 0.1)];
 }
 
-/** Blue of 0 through white to red of 1. */
+/** Blue at 0, white between, red at 1. */
 function heat(x: number): string {
   const [cold, mild, hot] = [[66, 135, 245], [232, 230, 220], [235, 64, 40]];
   const [from, to, t] = x < 0.5 ? [cold, mild, 2 * x] : [mild, hot, 2 * x - 1];
