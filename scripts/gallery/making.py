@@ -22,7 +22,7 @@ from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.demo import build_scene, scene_script
 from srbf.errors import OutputExistsError
 from srbf.evaluation.errors_by_role import evaluate
-from srbf.evaluation.rate_distortion import METHODS, Score, contest
+from srbf.evaluation.rate_distortion import Score, compared_methods, contest
 from srbf.evaluation.temporal_stability import sampled_texels
 from srbf.fitting.options import encode, method_for
 from srbf.importing.photographs import LightListImport
@@ -123,9 +123,9 @@ def _evaluate(places: Places, fit: Fit) -> None:
 def _compare(places: Places) -> None:
     """Methods by bytes on a sample of the texels under all light; the peak is that of the first fit's evaluation, which all share."""
     capture = Capture.open(places.capture).combined()
-    sample = capture.kept(sampled_texels(capture.coverage() >= COVERED, places.scene.contest_texels))
+    sample = capture.load(sampled_texels(capture.coverage() >= COVERED, places.scene.contest_texels))
     peak = files.read_json(places.errors(places.scene.fits[0]))["holdout"]["peak"]
-    methods = [*METHODS, PTM] if places.scene.dome else list(METHODS)
+    methods = [*compared_methods(), PTM] if places.scene.dome else list(compared_methods())
     files.write_json(places.scores, {"scores": [asdict(score) for score in contest(sample, methods, "holdout", peak)]})
 
 

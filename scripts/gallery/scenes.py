@@ -147,7 +147,7 @@ MAPS = Fit("asset-25-maps", "25 maps of all light", "relighting-map", {"k": 25})
 SMALL = Fit("asset", "best of 16 bytes", "auto", {"budget": 16})
 MAPS_AND_RAYS = replace(MAPS, folder="asset-indirect-25-maps", label="25 maps + rays", light="indirect")
 SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, all light")
-SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"scalars": 16, "encoding": "uint8"}, light="indirect")
+SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"components": 16, "encoding": "uint8"}, light="indirect")
 
 STILL_LIFE = tuple(f"lightmap:{name}" for name in ("Table", "Tall Vase", "Egg", "Faceted Vase", "Mirrored Jar", "Sheared Bowl", "Ring"))
 

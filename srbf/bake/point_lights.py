@@ -1,4 +1,4 @@
-"""Point lights of a bake: a box filled with lamps, those inside geometry left out; Blender is asked which, before the bake."""
+"""Point lights of a bake: a box filled with them, except inside geometry; a scene query before the bake finds the free places."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Places = tuple[tuple[float, float, float], ...]
 
 @dataclass(frozen=True)
 class PointGrid:
-    """Lamps `spacing` meters apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
+    """Point lights `spacing` meters apart in a box (None: the bounds of all that renders), and random ones in the same free space.
 
-    `grid` and `random` are positions in meters, not known before `srbf.bake.survey.with_free_point_lights` has asked the scene.
+    grid, random: positions (m), unknown before `srbf.bake.scene_query.with_free_point_lights`.
     """
 
     spacing: float
@@ -57,13 +57,13 @@ class PointGrid:
         return PointGrid(meters, box)
 
     def places(self, validation: int, holdout: int) -> tuple[Float64[ndarray, "L 3"], Float64[ndarray, "V 3"], Float64[ndarray, "H 3"]]:
-        """(train, validation, holdout) positions; InputError before a survey, or where it was for fewer."""
+        """(train, validation, holdout) positions, m; InputError where they are not known yet, or too few."""
         if self.grid is None or len(self.random) < validation + holdout:
-            raise InputError("expected point lights whose free places are known, found none; survey the scene first")
+            raise InputError("expected point lights with known positions, found none; call with_free_point_lights first")
         random = np.array(self.random, np.float64).reshape(-1, 3)
         return np.array(self.grid, np.float64).reshape(-1, 3), random[:validation], random[validation : validation + holdout]
 
     def record(self) -> dict[str, Any]:
-        """For the manifest: spacing and box, and the positions by a checksum, since the lights hold them."""
+        """JSON for the manifest: spacing, box, and a checksum of the positions, which the lights hold."""
         places = json.dumps([self.grid, self.random])
         return {"spacing": self.spacing, "box": self.box, "positions": hashlib.sha256(places.encode()).hexdigest()}

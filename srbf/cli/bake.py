@@ -10,11 +10,11 @@ import typer
 
 from srbf.bake.estimate import estimate
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
-from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
+from srbf.bake.scene_query import objects_of, with_frame, with_free_point_lights, with_size
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import objects_of, with_frame, with_free_point_lights, with_size
+from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import WorkerPoolSettings
 from srbf.cli import bake_parameters as flag
 from srbf.cli.flags import flags_alone
@@ -77,7 +77,7 @@ def bake(
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
     if light_set is None and light_bounds is not None:
         raise typer.BadParameter("expected --light-set point:SPACING with --light-bounds, found none")
-    crew = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
+    pool = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
         with flags_alone():
@@ -106,11 +106,11 @@ def bake(
                 raise typer.BadParameter("expected directional lights with --sun-angle auto, found --light-set; leave one of them out")
         settings = settings.with_matched_sun() if sun_angle == "auto" else settings
         with flags_alone():
-            return Bake(scene, folder, settings, blender, crew, time_limit, keep_accumulation, dask)
+            return Bake(scene, folder, settings, blender, pool, time_limit, keep_accumulation, dask)
 
     if collection:
         known = {one.name for one in named if one.kind == "lightmap"}
-        inside = objects_of(plan(Receiver("view"), output), collection, note)
+        inside = objects_of(scene, collection, note, scene_name, blender)
         named += [Receiver("lightmap", name, uv_layer, unwrap=unwrap) for name in inside if name not in known]
     with flags_alone():
         captures = captures_of(named, separate)
@@ -139,18 +139,18 @@ def bake(
         note(f"{_done(shard)} {job.folder}" if baked else f"{job.folder} is complete already")
 
 
-def _done(shard: Part | None) -> str:
+def _done(shard: Shard | None) -> str:
     if shard is None:
         return "baked"
     return "prepared" if shard.is_preparation else f"baked shard {shard.name} of"
 
 
-def _check_spread(job: Bake, shard: Part | None, farm: Literal["openjd"] | None, anew: bool) -> None:
+def _check_spread(job: Bake, shard: Shard | None, farm: Literal["openjd"] | None, anew: bool) -> None:
     """Wrong usage where ways to spread the work exclude each other, or need to know how much there is to do."""
     given = [name for name, value in (("--dask", job.dask), ("--shard", shard), ("--farm", farm)) if value is not None]
     if len(given) > 1:
         raise typer.BadParameter(f"expected one way to spread the work, found {' and '.join(given)}; leave one")
-    if job.dask is not None and job.crew.workers > 1:
+    if job.dask is not None and job.pool.workers > 1:
         raise typer.BadParameter("expected --workers without --dask, found both; start as many dask workers instead")
     if job.is_open_ended and (shard is not None or farm is not None):
         raise typer.BadParameter(

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from srbf.bake.part import Part
+from srbf.bake.shard import Shard
 from srbf.cli.values import (
     AUTO_OR_ANGLE,
     AUTO_OR_COUNT,
@@ -190,10 +190,10 @@ DaskScheduler = Annotated[
     ),
 ]
 ShardOf = Annotated[
-    Part | None,
+    Shard | None,
     typer.Option(
         metavar="I/N",
-        parser=Parsed(Part.parse),
+        parser=Parsed(Shard.parse),
         help="Bake all passes of the I-th of N shards alone, once `prepare` has been; a bake without it then finishes.",
         show_default=False,
         rich_help_panel=FARM,

@@ -10,32 +10,23 @@ import typer
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
-from srbf.cli.fit_parameters import (
-    Basis,
-    Budget,
-    Centers,
-    Clusters,
-    Domain,
-    Encoding,
-    Maps,
-    Method,
-    Psnr,
-    Ridge,
-    Scalars,
-    Spread,
-    Weighting,
-)
+from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
-from srbf.fitting.options import method_for, method_of, settings_of
+from srbf.fitting.options import method_for
 from srbf.relighting.direct_light import Added, chosen
 
+COMMAND = FitCommand
 
+
+@with_method_flags
 def evaluate(
     asset: AssetFolder,
+    method: str | None,
+    settings: dict[str, Any],
     reference: Annotated[
         Path | None,
         typer.Argument(metavar="REFERENCE", help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
@@ -58,38 +49,21 @@ def evaluate(
     ] = None,
     samples: Annotated[int, typer.Option(metavar="COUNT", parser=COUNT, help="Samples per texel of --point-reference.")] = 64,
     seed: Annotated[int, typer.Option(metavar="NUMBER", parser=COUNT_OR_NONE, help="Random seed of the point lights' positions.")] = 0,
-    method: Method = None,
-    k: Maps = None,
-    basis: Basis = None,
-    centers: Centers = None,
-    scalars: Scalars = None,
-    clusters: Clusters = None,
-    weighting: Weighting = None,
-    domain: Domain = "auto",
-    spread: Spread = "auto",
-    ridge: Ridge = "auto",
-    encoding: Encoding = None,
-    budget: Budget = None,
-    psnr: Psnr = None,
     blender: Blender = None,
     json: Json = False,
 ) -> None:
     """Print the error by role, by distance from true point lights, or at lights left out of a fit."""
-    given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
-    given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
     if leave_one_out:
         if reference is not None or point_reference is not None or direct is not None:
             raise typer.BadParameter(
                 "expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct"
             )
-        kind = method_of(method, given)
-        settings = settings_of(kind, given, domain, spread, ridge)
         with progress_bar("leave one out") as update:
-            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, kind, settings).encode(c), update), json)
+            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
         return
     if reference is None:
         raise typer.BadParameter("expected an asset and a capture, found one path; or add --leave-one-out to fit a capture")
-    if any(value is not None for value in given.values()) or (method, domain, spread, ridge) != (None, "auto", "auto", "auto"):
+    if method is not None or settings:
         raise typer.BadParameter("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
     opened = Asset.open(asset)
     if point_reference is not None:

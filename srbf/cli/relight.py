@@ -19,7 +19,7 @@ from srbf.cli.values import POSITIVE, Number
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
 from srbf.lights import Light
-from srbf.methods.receivers import outside_domain
+from srbf.methods import outside_domain
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter

@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture
+from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.cli.parameters import AssetFolder, CaptureFolder, Force
 from srbf.cli.relight import check_image_output
 from srbf.cli.terminal import note, progress_bar

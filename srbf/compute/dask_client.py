@@ -40,7 +40,7 @@ class Cluster:
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line
         try:
-            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False)
+            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TypeError) as error:
             raise ClusterError(f"expected a dask scheduler at {self._address}, found none; start one by: dask scheduler") from error
         return self

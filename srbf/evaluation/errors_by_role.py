@@ -12,12 +12,14 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
 from srbf.io.float16 import finite_to_float32
+from srbf.light_domain import domain_of_capture
 from srbf.lights import PointLight
-from srbf.methods import directional_responses, linear_response
+from srbf.methods import linear_response, responses
 from srbf.relighting.direct_light import Added, Direct
 
 PEAK_QUANTILE = 0.999
@@ -129,12 +131,12 @@ class TrainWatch:
     def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
         """Sums of squared differences and of squared references, a light, over `texels`, both clamped at `floor`."""
         picked = asset.at(self.texels)
-        directions = capture.directions(self.lights)
+        coordinates = domain_of_capture(capture).captured(capture, self.lights)
         sums = np.empty((2, len(self.lights)))
 
         def compare(task: int) -> None:
             rows = range(task * LIGHT_BATCH, min((task + 1) * LIGHT_BATCH, len(self.lights)))
-            relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            relit = responses(picked, coordinates[rows.start : rows.stop])[:, 0]  # (b, n, 3)
             for row, response in zip(rows, relit, strict=True):
                 reference = self._responses[row]
                 if reference.dtype == np.float16:
@@ -210,9 +212,9 @@ def evaluate(
 
 
 def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) -> Iterator[Float32[ndarray, "P 3"]]:
-    """The asset's answer to each of a capture's lights, before the clamp, with what direct light is to be added.
+    """The asset's response to each of a capture's lights, before the clamp, with what direct light is to be added.
 
-    A point light is relit as such, inverse-square and of unit irradiance at 1 m, as it was captured.
+    Lights outside the asset's light domain are relit as they were captured: a point light is inverse-square, of unit irradiance at 1 m.
     """
     if capture.kind == "point":
         for position in capture.positions(lights):
@@ -220,10 +222,11 @@ def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) 
             response, direct = linear_response(asset, point_light), added.response(point_light)
             yield (response if direct is None else response + direct).reshape(-1, 3)
         return
-    directions = capture.directions(lights)
-    for direction, response in zip(directions, directional_responses(asset, directions), strict=True):
-        lit = added.directional(direction[None])
-        yield (response if isinstance(lit, float) else response + lit[0]).reshape(-1, 3)
+    domain = domain_of_capture(capture)
+    coordinates = domain.captured(capture, lights)
+    for own, response in zip(coordinates, responses(asset, coordinates), strict=True):
+        direct = added.response([domain.light(own)])
+        yield (response if direct is None else response + direct).reshape(-1, 3)
 
 
 def _covered(capture: Capture) -> Bool[ndarray, " P"]:

@@ -1,4 +1,4 @@
-"""`png`: one linear PNG a layer, value = byte / 255 * scale + bias."""
+"""`png`: one linear PNG per layer, value = byte / 255 * scale + bias."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from srbf.export.settings import PLAIN, Settings, Written, no_levels
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
-    """Fill `folder` with the asset as PNGs of bytes; overlapping Gaussians are rounded together, bytes that are there already stay."""
+    """Fill `folder` with the asset as PNGs of bytes; overlapping Gaussians are rounded together, stored bytes stay unchanged."""
     if settings.encoding not in (None, "uint8"):
         raise InputError(f"expected `encoding` uint8 for PNG files, found {settings.encoding}")
     no_levels(settings, "PNG files")

@@ -11,12 +11,12 @@ from srbf.arrays import Bool, Float32, Int
 from srbf.asset import Asset
 from srbf.errors import InputError
 
-LONGEST = 8.0  # of the median distance of neighbors: longer ones leap from one chart, or one side of an edge, to another
+LONGEST = 8.0  # of the median distance of neighbors: longer ones cross to another chart, or over an edge
 
 
 @dataclass(frozen=True, eq=False)
 class TexelMesh:
-    """V vertices in the asset's z-up frame with the lightmap's UV, v from the top down as glTF has it, and triangles by index."""
+    """V vertices in the asset's z-up frame with the lightmap's UV, v downwards as in glTF, and triangles by index."""
 
     positions: Float32[ndarray, "V 3"]
     normals: Float32[ndarray, "V 3"] | None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path, PureWindowsPath
 
-from srbf.capture import LightKind
+from srbf.captured_light import LightKind
 from srbf.errors import ImageError
 from srbf.importing.light_list import LightListEntry, read_light_list
 from srbf.importing.pictures import RAW_SUFFIXES

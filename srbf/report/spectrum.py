@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.evaluation.rate_distortion import components_of
+from srbf.methods import method_of
 from srbf.report.findings import Findings, Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
@@ -17,19 +17,19 @@ ABOVE = 15.0  # dB over the asset's own: beyond, planes hold the noise
 
 def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> str:
     """Singular values, and what the best planes leave, side by side."""
-    scalars = components_of(subject.asset)
+    components = method_of(subject.asset).numbers_per_texel(subject.asset)
     ranks = np.arange(1, len(spectrum.values) + 1)
     relative = spectrum.values / max(float(spectrum.values[0]), 1e-30)
     kept = (relative > FLOOR) & (ranks <= SHOWN * len(ranks))
     kept[:2] = True
     ranks, relative = ranks[kept], np.maximum(relative[kept], FLOOR)
-    last = float(max(len(ranks), scalars, 10))
+    last = float(max(len(ranks), components, 10))
     rank_axis = Axis(1, last, "scalar planes (log scale)", log=True)
     left = Plot(450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value, of the first", log=True), (24, 20, 42, 58))
     left.line(ranks, relative, "blue")
-    left.rule(x=scalars, style="line red thin dash")
-    left.label(scalars, 1.0, f"{scalars} numbers", "strong red halo", dx=6, dy=12)
-    left.label(scalars, 1.0, "a texel here", "red halo", dx=6, dy=27)
+    left.rule(x=components, style="line red thin dash")
+    left.label(components, 1.0, f"{components} numbers", "strong red halo", dx=6, dy=12)
+    left.label(components, 1.0, "a texel here", "red halo", dx=6, dy=27)
     bound = spectrum.bound[: len(ranks)]
     near = np.flatnonzero(bound <= spectrum.own + ABOVE)[1:]  # planes 1, 2, …
     high = max(float(bound[near].max(initial=0)), spectrum.own) + 1
@@ -39,12 +39,13 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     if len(near):
         middle = near[len(near) // 4]
         right.label(float(middle), float(bound[middle]), "the best planes", "strong blue", dx=-10, dy=-6, anchor="end")
-    right.dots(np.array([scalars]), np.array([spectrum.own]), "red", 5)
-    right.label(scalars, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
+    right.dots(np.array([components]), np.array([spectrum.own]), "red", 5)
+    right.label(components, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
     enough = bound >= spectrum.own
     reach = f", which the best {planes_words(int(np.argmax(enough)))} would reach too" if enough.any() else ""
     caption = (
-        f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular values "
+        f"On the train lights the asset's {components} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. "
+        "Singular values "
         f"are of the answers of {findings.texels} texels to all train lights and colors, less their mean texel; every light weighs "
         "alike. The curve on the right bounds any one linear model of so many planes on these very answers, not on unseen light; clusters "
         "of texels with planes of their own may pass it."

@@ -48,7 +48,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 def shown_mesh(asset: Asset, mesh: Path | None, notes: list[str]) -> bytes | None:
     """The model of a lightmap; None for a view, and, with a note, where the asset has none and none is given."""
-    if mesh is None and page_manifest.receiver_kind(asset) == "view":
+    if mesh is None and asset.receiver_kind == "view":
         return None
     try:
         return model(asset, mesh)

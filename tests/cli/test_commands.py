@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -44,15 +45,23 @@ def misused(*arguments: object) -> str:
     return refused(*arguments, status=2)
 
 
-@pytest.fixture
-def capture(make_capture, plane_positions) -> Capture:
-    return make_capture(lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray) -> Path:
+    """A folder of a capture and of an asset fitted to it, to be copied."""
+    folder = tmp_path_factory.mktemp("made")
+    write_capture(folder / "capture", lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+    ok("fit", folder / "capture", "-o", folder / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
+    return folder
 
 
 @pytest.fixture
-def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
-    return tmp_path / "asset"
+def capture(made: Path, tmp_path: Path) -> Capture:
+    return Capture.open(shutil.copytree(made / "capture", tmp_path / "capture"))
+
+
+@pytest.fixture
+def asset(made: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
 def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
@@ -65,7 +74,9 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert result["holdout"] == opened.manifest["error"]["holdout"]
     assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
-    assert "holdout" in ok("evaluate", asset, capture.folder) and "k" in ok("info", asset)
+    assert "holdout" in ok("evaluate", asset, capture.folder)
+    shown = dict(line.split(maxsplit=1) for line in ok("info", asset).splitlines())
+    assert (shown["method"], shown["k"], shown["width"], shown["height"]) == ("relighting-map", "9", "14", "10")
 
 
 def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,6 +130,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
     assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
@@ -182,8 +194,9 @@ def test_import_to_relight(tmp_path: Path) -> None:
     assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
 
 
+@pytest.mark.slow
 def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.report.METHODS", ())
+    monkeypatch.setattr("srbf.report.compared_methods", lambda: ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
     page = tmp_path / "page.html"
@@ -262,6 +275,7 @@ def test_a_full_or_read_only_target(asset: Path) -> None:
     assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr", "--ambient-only")
 
 
+@pytest.mark.slow
 def test_gl_missing(asset: Path, tmp_path: Path) -> None:
     code = "import sys; sys.modules['moderngl'] = None; from srbf.cli import app; app()"
     done = subprocess.run(
@@ -282,6 +296,7 @@ def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
     assert not (tmp_path / "y").exists()
 
 
+@pytest.mark.slow
 def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-m", "srbf", *map(str, arguments)], capture_output=True, text=True)
@@ -293,6 +308,7 @@ def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     assert json.loads(run("info", tmp_path / "asset", "--json").stdout)["k"] == 5
 
 
+@pytest.mark.slow
 def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "relighting_map.py"
     done = subprocess.run([sys.executable, str(example), str(capture.folder), str(tmp_path / "x.png")], capture_output=True, text=True)
@@ -300,10 +316,12 @@ def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     assert read_image(tmp_path / "x.png").max() > 0.3
 
 
+@pytest.mark.slow
 def test_the_library_needs_numpy_and_scipy_alone() -> None:
     code = (
         "import sys, pkgutil, importlib\n"
-        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL'):\n"
+        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL',\n"
+        "             'pygltflib'):\n"
         "    sys.modules[name] = None\n"
         "import srbf\n"
         "names = [m.name for m in pkgutil.walk_packages(srbf.__path__, 'srbf.') if '.cli' not in m.name and '__main__' not in m.name]\n"
@@ -339,6 +357,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
     assert set(json.loads(ok("evaluate", tmp_path / "asset", capture.folder, "--json"))) == {"train", "holdout", "lights"}
 
 
+@pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
     assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
@@ -376,6 +395,6 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
         (["-k", 0], "-k 0"),
     ],
 )
-def test_flags_that_do_not_go_together(capture: Capture, tmp_path: Path, flags: list, words: str) -> None:
-    assert words in refused("fit", capture.folder, "-o", tmp_path / "asset", *flags)
+def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
+    assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

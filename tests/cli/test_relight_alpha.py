@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 from typer.testing import CliRunner
 
 from srbf.asset import Asset
@@ -41,15 +42,17 @@ def described(capture: Capture, **facts: object) -> Capture:
     return Capture.open(capture.folder)
 
 
-@pytest.fixture
-def view(make_capture, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def view(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A disc of one color, its pixels unpremultiplied and spread outside, as a bake writes it; fitted."""
     share = disc()
     assert ((share > 0) & (share < 1)).sum() > 20 and (share == 0).mean() > 0.5
     response = lambda d: np.full((SIZE, SIZE, 3), max(0, d[2]), np.float32) * COLOR  # noqa: E731
-    capture = described(make_capture(response, coverage=share), receiver={"kind": "view", "camera": "Camera"}, quantity="radiance")
-    run("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9)
-    return tmp_path / "asset"
+    folder = tmp_path_factory.mktemp("view")
+    capture = write_capture(folder / "capture", response, coverage=share)
+    capture = described(capture, receiver={"kind": "view", "camera": "Camera"}, quantity="radiance")
+    run("fit", capture.folder, "-o", folder / "asset", "-k", 9)
+    return folder / "asset"
 
 
 @pytest.mark.parametrize("renderer", ["numpy", "gl"])

@@ -120,7 +120,7 @@ def test_bad_input_is_one_line(make_asset: Callable[..., Asset], make_planes: Ca
         export(asset, "dds", out, Settings(levels=5))
     with pytest.raises(InputError, match="clustered"):
         export(make_planes(clusters=4), "dds", out, Settings(levels=2))
-    with pytest.raises(InputError, match="bc7 for scalar planes"):
+    with pytest.raises(InputError, match="bc7 for scalar coefficient maps"):
         export(make_planes(), "dds", out, Settings("bc1"))
     asset.stored[1, 2, 3, 0] = np.nan
     for target in ("exr", "png", "dds"):
