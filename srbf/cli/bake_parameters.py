@@ -22,7 +22,7 @@ from srbf.cli.values import (
 
 SCENE, LIGHTS, QUALITY, FARM, SAFETY = "Scene", "Lights", "Quality", "Farm", "Safety"
 
-Scene = Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)]
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="The .blend; it is not changed, and nothing in it runs.", show_default=False)]
 SceneName = Annotated[
     str | None,
     typer.Option(

@@ -29,7 +29,7 @@ def evaluate(
     settings: dict[str, Any],
     reference: Annotated[
         Path | None,
-        typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
+        typer.Argument(metavar="REFERENCE", help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
     ] = None,
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="ASSET is a CAPTURE: fit it to all lights but one, for each, by the flags of srbf fit.")
