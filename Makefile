@@ -61,6 +61,7 @@ check: setup-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/check_words.py
 
 torture: setup-test
 	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)
