@@ -30,7 +30,7 @@ from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
 from srbf.errors import InputError
-from srbf.evaluation.errors_by_role import TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.fitting.options import encode, method_for, method_of, more_maps_than_lights, settings_of
 from srbf.io.files import check_replaceable
 
@@ -77,7 +77,7 @@ def fit(
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
             asset = encode(chosen, opened, update, stitched=stitch, tiles=partial(_tiles, cluster))
     else:
-        watch = TrainWatch(opened)
+        watch = TrainErrorAccumulator(opened)
         with progress_bar("fit") as update:
             asset = encode(chosen, opened, update, watch.look, stitch)
     fitted = time.perf_counter()
