@@ -48,8 +48,8 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     caption = (
         f"On the train lights the asset's {components} numbers per texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular "
         f"values are those of the responses of {findings.texels} texels to all train lights and colors, minus the mean texel; all "
-        "lights have equal weight. The curve on the right bounds any linear model of so many components on these responses, not on held-out "
-        "lights; clusters with separate components may exceed it."
+        "lights have equal weight. The curve on the right bounds any linear model of so many components on these responses, not on "
+        "held-out lights; clusters with separate components may exceed it."
     )
     plots = left.svg("Singular values by rank"), right.svg("PSNR of the best planes, by their number")
     return figure('<div class="plots row">' + "".join(f'<div style="flex: 1 1 20rem">{p}</div>' for p in plots) + "</div>", caption)
