@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.importing.pictures.color import ALIKE, by_profile, character, from_lab, model_of, name_of, to_rec709
+from srbf.importing.pictures.color import SRGB_TOLERANCE, by_profile, character, from_lab, model_of, name_of, to_rec709
 from srbf.importing.pictures.found import Found, Tags
 from srbf.io.image import decode_srgb
 
@@ -70,7 +70,7 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
             matrix = to_rec709(tags.chromaticities)
         except ValueError:
             notes.append("could not use the chromaticities of {}; took them as Rec.709")
-    if matrix is not None and np.abs(matrix - np.eye(3)).max() <= ALIKE:
+    if matrix is not None and np.abs(matrix - np.eye(3)).max() <= SRGB_TOLERANCE:
         matrix = None
     if matrix is None and not own_curve:
         return _decoded(pixels, transfer), notes
