@@ -25,8 +25,8 @@ from srbf.methods.relighting_map import RelightingMap
 
 METHODS = {
     "25 maps": RelightingMap(k=25),
-    "28 scalars": EigenMap(scalars=28),
-    "64 clusters of 12": ClusteredEigenMap(clusters=64, scalars=12),
+    "28 scalars": EigenMap(components=28),
+    "64 clusters of 12": ClusteredEigenMap(clusters=64, components=12),
 }
 BAKES = {
     "32 samples": ["--samples", "32", "--validation", "0", "--holdout", "0"],

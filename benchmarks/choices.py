@@ -22,10 +22,11 @@ from srbf.encode.light_function_fit import dense_centers, functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.weighted_rows import LightSpace
 from srbf.importing.photographs import LightListImport
+from srbf.light_domain import Directions
 from srbf.methods.relighting_map import RelightingMap
 from srbf.solve.pca import principal_axes
 from srbf.solve.ridge import RidgePath
-from srbf.sphere import domain_of, mean_spacing, normalize, point_set
+from srbf.sphere import domain_of, mean_spacing, normalize
 
 DOMES = {  # lights and elevation (degrees) of each ring
     "3 rings": ((20, 16, 12, 1), (20, 45, 68, 90)),
@@ -121,9 +122,9 @@ def given(path: Path) -> Iterator[Case]:
 def light_functions(case: Case) -> tuple[float, float]:
     """(`auto`, the best of the grid) of an eigen map's light functions."""
     lights, asked = case.directions[: case.fitted], case.directions[case.fitted :]
-    domain = domain_of(lights)
+    domain = Directions(domain_of(lights))
     sample = TexelSample(
-        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted
+        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted, domain
     )
     space = LightSpace.of(sample, "plain")
     axes, _ = principal_axes(space.centered, min(COMPONENTS, 3 * case.fitted))
@@ -148,7 +149,8 @@ def light_functions(case: Case) -> tuple[float, float]:
 def maps(case: Case, k: int) -> tuple[float, float]:
     """(`auto`, the best of the grid, a ridge of 0 included) of k relighting maps."""
     lights, asked = case.directions[: case.fitted], case.directions[case.fitted :]
-    centers = point_set("fibonacci", k, domain_of(lights))
+    domain = Directions(domain_of(lights))
+    centers = domain.centers(k, "fibonacci")
     flat = case.images[: case.fitted].reshape(case.fitted, -1).astype(np.float64)
 
     def reached(spread: float, ridge: float) -> float:
@@ -156,9 +158,9 @@ def maps(case: Case, k: int) -> tuple[float, float]:
         return case.psnr(weight(asked @ centers.T, spread) @ (operator @ flat))
 
     sample = TexelSample(
-        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted
+        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted, domain
     )
-    basis, ridge, _ = RelightingMap(k, encoding="float").model(lambda: sample, domain_of(lights))
+    basis, ridge, _ = RelightingMap(k, encoding="float").model(lambda: sample, domain)
     mean = spread_of(centers, "mean")
     best = max(reached(min(1.0, float(factor * mean)), r) for factor in (0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 2) for r in (0.0, *RIDGES))
     return reached(basis.spread, ridge), best

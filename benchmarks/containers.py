@@ -33,7 +33,7 @@ from srbf.export.rounding import blocks_alone, blocks_together
 from srbf.fitting.options import encode as fit
 from srbf.io.containers import read_texture_array
 from srbf.io.containers.blocks import decode, encode
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -43,9 +43,9 @@ SIDE = 1024
 MIPS = 4 / 3
 METHODS = {
     "25 maps": RelightingMap(k=25, encoding="float"),
-    "eigen map, 28 scalars": EigenMap(scalars=28, encoding="float"),
+    "eigen map, 28 scalars": EigenMap(components=28, encoding="float"),
     "64 clusters of 8 scalars": ClusteredEigenMap(encoding="float"),
-    "256 clusters of 12 scalars": ClusteredEigenMap(clusters=256, scalars=12, encoding="float"),
+    "256 clusters of 12 scalars": ClusteredEigenMap(clusters=256, components=12, encoding="float"),
 }
 CONTAINERS = (("exr", "half"), ("uint8", "uint8"), ("dds", "bc7"), ("dds", "bc1"))
 EDGE_LEVELS = 4
@@ -113,7 +113,7 @@ def components_per_layer(asset: Asset) -> dict[str, float]:
     height, width = values.shape[1:3]
     stored, scale, bias = quantize(values, "uint8")
     scale[asset.scale == 0], bias[asset.scale == 0] = 0, 0
-    planes = stored.transpose(0, 3, 1, 2).reshape(-1, height, width)[: asset.scalars]
+    planes = stored.transpose(0, 3, 1, 2).reshape(-1, height, width)[: asset.components]
     found = {}
     for channels in (4, 3):
         layers = np.zeros((-(-len(planes) // channels), height, width, channels), np.uint8)
@@ -146,7 +146,7 @@ def at_the_edges(path: Path, folder: Path) -> None:
             continue
         coverage = coverage_of(asset)
         print(f"{path}, {name}: {chart_gap(coverage)} texels between charts, {levels_without_bleeding(asset)} levels by auto")
-        full = directional_responses(asset, directions)
+        full = responses(asset, directions)
         peak = float(np.quantile(np.maximum(full[:, asset.covered], 0), PEAK_QUANTILE))
         encodings: tuple[LayerEncoding, ...] = ("half", "uint8", "bc7")
         for encoding in encodings:
@@ -157,7 +157,7 @@ def at_the_edges(path: Path, folder: Path) -> None:
             for level in range(EDGE_LEVELS):
                 texels = texture.pixels(level)[..., : exported.scale.shape[1]].astype(np.float32) / (1 if encoding == "half" else 255)
                 layers = texels * exported.scale[:, None, None] + exported.bias[:, None, None]
-                relit = directional_responses(as_level(exported, layers), directions)
+                relit = responses(as_level(exported, layers), directions)
                 rows, columns = (shares(size, smaller).toarray() for size, smaller in zip(coverage.shape, layers.shape[1:3], strict=True))
                 area = rows @ coverage @ columns.T
                 true = np.einsum("ih,bhwc,jw->bijc", rows, full * coverage[..., None], columns, optimize=True)
@@ -170,8 +170,8 @@ def at_the_edges(path: Path, folder: Path) -> None:
                 seen.append(" / ".join(f"{psnr(peak, error):.1f}" for error in errors))
             seam = ""
             if stitch is not None:
-                mean = np.abs(directional_responses(asset.at(np.flatnonzero(asset.covered)), directions)).mean()
-                stitched = directional_responses(exported.at(stitch.texels), directions)[:, 0].transpose(1, 0, 2)
+                mean = np.abs(responses(asset.at(np.flatnonzero(asset.covered)), directions)).mean()
+                stitched = responses(exported.at(stitch.texels), directions)[:, 0].transpose(1, 0, 2)
                 gap = stitch.difference(stitched.reshape(len(stitched), -1)) / mean
                 seam = f"seams {gap:.4f}, unstitched {asset.manifest['seams']['before']:.4f}; "
             print(f"  {encoding}: {seam}edge / inside by level, dB: {', '.join(seen)}", flush=True)

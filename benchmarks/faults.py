@@ -230,4 +230,4 @@ def _command(arguments: list[str], said: Path, strike: Strike | None, environmen
 
 
 FORKS = multiprocessing.get_context("forkserver")
-FORKS.set_forkserver_preload(["srbf.cli", "filelock", "faults"])
+FORKS.set_forkserver_preload(["srbf.cli.bake", "filelock", "faults"])

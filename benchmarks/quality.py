@@ -21,7 +21,8 @@ from typing import get_args
 import numpy as np
 
 from srbf.asset import Asset, layer_entries
-from srbf.capture import COVERED, MANIFEST, Capture, Quantity, Role
+from srbf.capture import COVERED, MANIFEST, Capture, Quantity
+from srbf.captured_light import Role
 from srbf.encode.quantization import quantize
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram
 from srbf.evaluation.leave_one_out import leave_one_out
@@ -122,7 +123,7 @@ def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, r
 
 def components_of(method: Method) -> int:
     """Numbers a texel."""
-    return 3 * method.k if isinstance(method, RelightingMap) else method.scalars
+    return 3 * method.k if isinstance(method, RelightingMap) else method.components
 
 
 def row(*cells: object) -> None:
@@ -144,9 +145,9 @@ def in_memory(capture: Capture, most: int | None = None) -> tuple[Capture, str]:
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     most = min(most or len(covered), max(1, KEPT_BYTES // (12 * len(capture.lights))))
     if len(covered) <= most:
-        return capture.kept(covered), f"{len(covered)} texels"
+        return capture.load(covered), f"{len(covered)} texels"
     chosen = np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
-    return capture.kept(chosen), f"{most} of {len(covered)} texels"
+    return capture.load(chosen), f"{most} of {len(covered)} texels"
 
 
 def peak_of(capture: Capture) -> float:

@@ -27,6 +27,7 @@ from srbf.gl.includes import resolve, resolve_text
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_point_lights, padded
+from srbf.light_domain import Directions
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import projected_weights
 from srbf.relighting.relighter import PASSES
@@ -37,9 +38,9 @@ SPREADS = (0.2, 0.4)  # rad
 MAPS = "relighting map, k = 25"
 METHODS: dict[str, dict[str, int]] = {
     MAPS: {"k": 25},
-    "eigen map, 28 scalars": {"scalars": 28},
-    "eigen map, 16 scalars": {"scalars": 16},
-    "clustered, 64 x 8 scalars": {"clusters": 64, "scalars": 8},
+    "eigen map, 28 scalars": {"components": 28},
+    "eigen map, 16 scalars": {"components": 16},
+    "clustered, 64 x 8 scalars": {"clusters": 64, "components": 8},
 }
 BARE = "bare sum of 25 layers"
 SUN: list[Light] = [DirectionalLight((0.3, 0.2, 0.9), (1.0, 0.9, 0.7))]
@@ -63,10 +64,10 @@ void main() {
 """
 
 
-def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> Asset:
+def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0) -> Asset:
     """Random layers over a plane, in half floats."""
     rng = np.random.default_rng(0)
-    layers, channels = (k, 3) if k else (-(-scalars // 4), 4)
+    layers, channels = (k, 3) if k else (-(-components // 4), 4)
     layer = rng.standard_normal((side, side, channels), np.float32).astype(np.float16)
     stored = np.stack([np.roll(layer, i, axis=0) for i in range(layers)])
     scale, bias = np.ones((layers, channels), np.float32), np.zeros((layers, channels), np.float32)
@@ -80,12 +81,12 @@ def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> As
         manifest |= {"method": "relighting-map", "maps": entries}
         manifest["basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spread": spread}
         return Asset(manifest, stored, scale, bias, {"r_table": r_table(spread)}, images)
-    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), "hemisphere")
-    count = max(clusters, 1) * (scalars + 1)
+    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), Directions("hemisphere"))
+    count = max(clusters, 1) * (components + 1)
     coefficients = rng.normal(size=(count, len(centers), 3)).astype(np.float32)
     functions = LightFunctions(centers, rng.choice(SPREADS, count), coefficients)
     table = octahedral_table(functions, "hemisphere")
-    manifest |= {"method": "clustered-eigen-map" if clusters else "eigen-map", "scalars": scalars, "planes": entries}
+    manifest |= {"method": "clustered-eigen-map" if clusters else "eigen-map", "scalars": components, "planes": entries}
     manifest["light_basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spreads": functions.spreads.tolist()}
     manifest["w_table"] = {"size": table.size, "columns": table.columns}
     tables = {"light_coefficients": coefficients, "w_table": table.atlas}
@@ -251,7 +252,7 @@ def _surface(context: Any, asset: Asset, textures: AssetTextures, corners: Any, 
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
     places = max(count, 1)
     defines = {"SRBF_POINT_LIGHTS": places, "SRBF_PLAIN": 1} | (
-        {"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars}
+        {"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.components}
     )
     program = compile_program(context, resolve("stages/lightmap.vert"), resolve(f"stages/{stage}", defines=defines))
     drawn = context.vertex_array(program, [(corners, "3f 2f", "position", "lightmapUv")])

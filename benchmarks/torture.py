@@ -30,7 +30,7 @@ HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "data" / "scenes"
 WORKER_TIMEOUT = "2"  # seconds; an answer of the fake takes a thousandth
 Trials = Iterator[Callable[[], object]]
-KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-sums"), ("--samples", "auto"))
+KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-accumulation"), ("--samples", "auto"))
 DAMAGES = ("cut", "emptied", "flipped", "zeroed", "removed")
 LIES = ("nan", "short", "small", "wrong", "error")
 
@@ -177,7 +177,7 @@ def interrupted(labs: Labs, rng: np.random.Generator) -> Trials:
             raise LostError(f"Ctrl-C after {after:.2f} s ended as {ended.status}: {ended.said.strip()[-400:]!r}")
         if ended.status != 0 and (folder / "capture.json").is_file():
             told = {Path(light["file"]).stem for light in json.loads((folder / "capture.json").read_text())["lights"]}
-            if not {path.stem for path in (folder / "sums").glob("[0-9]*")} <= told:  # of a finished bake they are being removed
+            if not {path.stem for path in (folder / "accumulation").glob("[0-9]*")} <= told:  # of a finished bake they are being removed
                 raise LostError(f"Ctrl-C after {after:.2f} s left lights that the manifest does not tell of")
         folder.mkdir(exist_ok=True)
         lab.go_on(folder)
@@ -383,7 +383,7 @@ def stale_leavings(labs: Labs, rng: np.random.Generator) -> Trials:
         (folder / ".holder.json").write_text(json.dumps({"host": "elsewhere", "pid": 1, "since": "2001-01-01 00:00:00"}))
         (folder / ".scratch" / "worker0").mkdir(parents=True, exist_ok=True)
         (folder / ".scratch" / "worker0" / "light_1.npy").write_bytes(b"half an array")
-        for place in ("lights", "sums", "direct"):
+        for place in ("lights", "accumulation", "direct"):
             if (folder / "bake.json").is_file() and (folder / place).is_dir():  # none is written there before that
                 (folder / place / ".0001.4711-dead.partial.exr").write_bytes(b"half an image")
         lab.go_on(folder)

@@ -7,7 +7,8 @@ from srbf.capture import Capture
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.io.image import write_picture
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.methods import relight
+from srbf.methods.relighting_map import RelightingMap
 
 
 def main(capture_folder: str, picture: str) -> None:

@@ -60,8 +60,8 @@ def build(work: Path, output: Path, platform: str, python: str, oldest: str, new
     shutil.copytree(ROOT / "blender_extension", staged, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "LICENSES" / "GPL-3.0-or-later.txt", staged / "LICENSE")
     wheels = staged / "wheels"
-    _pip("wheel", "--no-deps", "--wheel-dir", wheels, ROOT)
-    (own,) = wheels.glob("*.whl")
+    _pip("wheel", "--no-deps", "--wheel-dir", wheels, ROOT, ROOT / "blender_bake")
+    (own,) = wheels.glob("srbf-*.whl")
     tags = [word for tag in PLATFORMS[platform] for word in ("--platform", tag)]
     requirements = [*_requirements(python), NUMPY[python]]
     _pip("download", "--only-binary=:all:", "--python-version", python, *tags, "--dest", wheels, *requirements)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import time
@@ -10,15 +11,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import srbf
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture, Quantity
-from srbf.errors import BakeError, InputError, OutputExistsError
+from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExistsError
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
 from srbf.io import files
+from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 
@@ -54,9 +55,15 @@ SCENES = {
 
 
 def scene_script(name: str) -> Path:
-    """The bpy script of a demo scene: in the checkout's data/scenes, or beside the installed package."""
-    package = Path(srbf.__file__).parent
-    for folder in (package.parent / "data" / "scenes", package / "data" / "scenes"):
+    """The bpy script of a scene: in the installed package blender_bake, or in the data/scenes of its checkout.
+
+    MissingLibraryError without that package, which the distribution srbf-blender holds; InputError where it has no such scene.
+    """
+    package = importlib.util.find_spec("blender_bake")
+    if package is None or package.origin is None:
+        raise MissingLibraryError("expected the demo's scenes, which are in srbf-blender, found it missing; pip install srbf[blender]")
+    root = Path(package.origin).parent
+    for folder in (root / "scenes", root.parent / "data" / "scenes"):
         if (folder / f"{name}.py").is_file():
             return folder / f"{name}.py"
     raise InputError(f"expected a demo scene of {', '.join(SCENES)} with its script installed, found none named {name!r}")
@@ -104,7 +111,7 @@ def run_demo(
         baked = Bake(blend, capture_folder, settings).run(reporter)
     except OutputExistsError as error:
         raise OutputExistsError(
-            f"expected this demo's own capture at {capture_folder}, found another; choose another -o, or delete it"
+            f"expected this demo's own capture at {capture_folder}, found another; choose another folder, or delete it"
         ) from error
     if baked:
         timings["bake"] = clock() - started
@@ -112,7 +119,7 @@ def run_demo(
     started = clock()
     method = within_budget(capture, say=reporter.say)
     watch = TrainErrorAccumulator(capture)
-    asset = method.encode(capture, lambda done, total: progress(done, total, "fit"), watch.look)
+    asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
     timings["fit"] = clock() - started
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)

@@ -8,9 +8,11 @@ from typing import Any
 from srbf import asset as assets
 from srbf import capture as captures
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture
+from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.errors import ManifestError
 from srbf.io.image import size_of
+from srbf.methods import method_of
 
 UNFINISHED = "bake.json"  # beside the manifest of a bake that can still be gone on with
 
@@ -72,7 +74,7 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "transport": asset.transport,
         "width": asset.width,
         "height": asset.height,
-        **_model(asset),
+        **method_of(asset).describe(asset),
         "domain": asset.domain,
         "encoding": asset.encoding,
         **({"levels": asset.levels} if asset.levels > 1 else {}),
@@ -80,20 +82,6 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "resident_bytes": asset.resident_bytes(),
         "disk_bytes": folder_bytes(folder),
         "error": asset.manifest.get("error", {}),
-    }
-
-
-def _model(asset: Asset) -> dict[str, Any]:
-    """What tells one asset of a method from another."""
-    if asset.method == "relighting-map":
-        basis = asset.manifest["basis"]
-        return {"k": asset.k, "basis": basis["kind"], **({"spread": basis["spread"]} if "spread" in basis else {})}
-    functions = asset.manifest["light_basis"]
-    return {
-        "scalars": asset.scalars,
-        "clusters": asset.clusters,
-        "light_basis": len(functions["centers"]),
-        "table": asset.manifest["w_table"]["size"],
     }
 
 

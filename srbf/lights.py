@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -75,10 +75,14 @@ class SpotLight(PointLight):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
-    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z; `image` is (H, W, 3) float32."""
+    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z; `image` is (H, W, 3) float32.
+
+    `rotation` (3, 3) turns the map's directions, as `moved` does.
+    """
 
     image: Float32[ndarray, "H W 3"]
     color: Triple = WHITE
+    rotation: Float64[ndarray, "3 3"] = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         image = np.asarray(self.image, np.float32)
@@ -108,13 +112,12 @@ def spot_cone(cos_angle: Float[ndarray, "*shape"], cos_inner: float, cos_outer: 
 
 
 def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
-    """A directional, point or spot light carried by a 4x4 rigid motion and uniform scale (a0 and radius scale along).
-
-    An environment is not carried: `environment_samples` turns its directions instead.
-    """
+    """A light carried by a 4 x 4 rigid motion and uniform scale: a0 and radius scale along, an environment map turns."""
     linear = matrix[:3, :3]
-    if isinstance(light, EnvironmentLight) or np.array_equal(matrix, np.eye(4)):
+    if np.array_equal(matrix, np.eye(4)):
         return light
+    if isinstance(light, EnvironmentLight):
+        return replace(light, rotation=linear / np.cbrt(np.linalg.det(linear)) @ light.rotation)
     if isinstance(light, DirectionalLight):
         return replace(light, direction=_unit(linear @ light.direction))
     scale = float(np.cbrt(abs(np.linalg.det(linear))))
@@ -123,6 +126,18 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     if isinstance(light, SpotLight):
         return replace(light, direction=_unit(linear @ light.direction), **changes)
     return replace(light, **changes)
+
+
+def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:
+    """Unit direction to the light and its strength, attenuation times a spot's cone, at `positions` of its frame [Wong2005, fig. 8-10]."""
+    vectors = np.array(light.position) - positions  # L = S - P, eq. 3
+    distance = np.linalg.norm(vectors, axis=-1)
+    unit = vectors / np.maximum(distance, 1e-30)[..., None]
+    strength = attenuation(distance, light)
+    if isinstance(light, SpotLight):
+        cos_angle = -(unit @ np.array(light.direction))
+        strength = strength * spot_cone(cos_angle, np.cos(light.inner), np.cos(light.outer))
+    return unit, strength
 
 
 def environment_samples(

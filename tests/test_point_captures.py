@@ -91,6 +91,7 @@ def test_mixed_and_half_said_lights_are_refused(point_lights) -> None:
         assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_approximation_is_measured_by_role(suns: Capture, point_lights) -> None:
     """Without occluders a directional asset foretells lamps exactly but for its fit; lamps twice as strong are missed by half."""
     asset = RelightingMap(k=40).encode(suns)
@@ -110,6 +111,7 @@ def test_an_asset_without_positions_cannot_be_compared(make_capture, point_light
         evaluate(asset, point_lights())
 
 
+@pytest.mark.slow
 def test_commands_say_which_captures_they_take(suns: Capture, point_lights, tmp_path: Path) -> None:
     def run(*arguments: object) -> tuple[int, str, str]:
         done = CliRunner().invoke(app, list(map(str, arguments)))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// Direct light of one sun at points of the receivers' mesh: N.L times visibility by a shadow map, times the tint of the walls above. Irradiance.
+// Direct light of one sun at points of the receivers' mesh: N.L times visibility by a shadow map, times the transmittance of the walls
+// above. Irradiance.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -24,7 +25,7 @@ uniform float weight;
 
 layout(location = 0) out vec4 response;
 
-const float STEEPEST = 64.0;   // meters a meter: beyond it a receiver's plane tells nothing
+const float STEEPEST = 64.0;   // meters per meter: a steeper receiver's plane is ignored
 const float BIAS = 0.5;        // map texels
 const float TERMINATOR = 0.1;  // cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021]
 

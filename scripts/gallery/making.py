@@ -22,7 +22,7 @@ from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.demo import build_scene, scene_script
 from srbf.errors import OutputExistsError
 from srbf.evaluation.errors_by_role import evaluate
-from srbf.evaluation.rate_distortion import METHODS, Score, contest
+from srbf.evaluation.rate_distortion import Score, compared_methods, contest
 from srbf.evaluation.temporal_stability import sampled_texels
 from srbf.fitting.options import encode, method_for
 from srbf.importing.photographs import LightListImport
@@ -112,9 +112,9 @@ def _evaluate(paths: ScenePaths, fit: Fit) -> None:
 def _compare(paths: ScenePaths) -> None:
     """Write the scores of methods on a sample of texels under combined light, with the peak of the first fit's evaluation."""
     capture = Capture.open(paths.capture).combined()
-    sample = capture.kept(sampled_texels(capture.coverage() >= COVERED, paths.scene.contest_texels))
+    sample = capture.load(sampled_texels(capture.coverage() >= COVERED, paths.scene.contest_texels))
     peak = files.read_json(paths.errors(paths.scene.fits[0]))["holdout"]["peak"]
-    methods = [*METHODS, PTM] if paths.scene.dome else list(METHODS)
+    methods = [*compared_methods(), PTM] if paths.scene.dome else list(compared_methods())
     files.write_json(paths.scores, {"scores": [asdict(score) for score in contest(sample, methods, "holdout", peak)]})
 
 

@@ -147,7 +147,7 @@ MAPS = Fit("asset-25-maps", "25 maps of combined light", "relighting-map", {"k":
 SMALL = Fit("asset", "best of 16 bytes", "auto", {"budget": 16})
 MAPS_AND_RAYS = replace(MAPS, folder="asset-indirect-25-maps", label="25 maps + rays", light="indirect")
 SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, combined light")
-COMPONENTS_AND_RAYS = Fit("asset", "16 components + rays", "eigen-map", {"scalars": 16, "encoding": "uint8"}, light="indirect")
+COMPONENTS_AND_RAYS = Fit("asset", "16 components + rays", "eigen-map", {"components": 16, "encoding": "uint8"}, light="indirect")
 
 STILL_LIFE = tuple(f"lightmap:{name}" for name in ("Table", "Tall Vase", "Egg", "Faceted Vase", "Mirrored Jar", "Sheared Bowl", "Ring"))
 

@@ -16,7 +16,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.evaluation.errors_by_role import psnr
 from srbf.io import files
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 from srbf.relighting.direct_light import Added
 from srbf.sphere import normalize
 
@@ -83,7 +83,7 @@ def relit(paths: ScenePaths, fit_index: int, capture: Capture, chosen: Sequence[
     directions = capture.directions(chosen)
     with Added(asset, fit.direct) as added:
         direct = added.directional(directions)
-        return list(np.maximum(directional_responses(asset, directions) + direct, 0))
+        return list(np.maximum(asset_responses(asset, directions) + direct, 0))
 
 
 def sheet(headings: Sequence[str], rows: Sequence[Row]) -> Image.Image:

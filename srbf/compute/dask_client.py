@@ -36,11 +36,11 @@ class Cluster:
         try:
             from distributed import Client
         except ImportError as error:
-            raise MissingLibraryError("--dask needs dask.distributed: pip install srbf[farm]") from error
+            raise MissingLibraryError("`dask` needs dask.distributed: pip install srbf[farm]") from error
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line
         try:
-            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False)
+            self._client = Client(self._address, timeout=CONNECTING, set_as_default=False)  # type: ignore[no-untyped-call]
         except (OSError, ValueError, TypeError) as error:
             raise ClusterError(f"expected a dask scheduler at {self._address}, found none; start one by: dask scheduler") from error
         return self
@@ -117,7 +117,7 @@ def checked(address: str) -> str:
     """An address as dask knows them; InputError on anything else."""
     scheme, _, rest = address.partition("://")
     if scheme not in ("tcp", "tls", "ucx", "ws", "wss", "inproc") or not rest:
-        raise InputError(f"expected --dask tcp://SCHEDULER:8786, found {address!r}")
+        raise InputError(f"expected `dask` tcp://SCHEDULER:8786, found {address!r}")
     return address
 
 

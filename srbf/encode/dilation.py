@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage
 
 from srbf.arrays import Float32, Int
 
 
 def nearest_covered(coverage: Float32[ndarray, "H W"]) -> Int[ndarray, "H W"] | None:
     """Flat index of the nearest texel with any coverage; None where all or none are covered and nothing is to fill."""
+    from scipy import ndimage
+
     covered = coverage > 0
     if covered.all() or not covered.any():
         return None

@@ -14,6 +14,7 @@ from srbf.capture import COVERED, STRIP, Capture
 from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.cross_validation import HeldOut
 from srbf.errors import InputError
+from srbf.light_domain import LightDomain, domain_of_capture
 from srbf.solve.kernel_ridge import KernelPath
 
 Rule = Literal["validation", "leave-one-light-out"]
@@ -42,13 +43,14 @@ class Choice:
 class TexelSample:
     """Rows of T for some covered texels, the train lights first: what every choice is made on.
 
-    answers (n, L + V, 3) float32, of L train and V validation lights at `directions` (L + V, 3).
+    `responses` (n, L + V, 3) float32 to L train and V validation lights at `coordinates` (L + V, d) of the light `domain`.
     """
 
     texels: Int[ndarray, " n"]
     responses: Float32[ndarray, "n M 3"]
-    directions: Float64[ndarray, "M 3"]
+    coordinates: Float64[ndarray, "M d"]
     train: int
+    domain: LightDomain
 
     @staticmethod
     def of(capture: Capture, count: int = SAMPLE_TEXELS, share: float = 0.25, seed: int = 0) -> TexelSample:
@@ -62,18 +64,23 @@ class TexelSample:
             runs = np.arange(count + 1) * len(texels) // count
             texels = texels[(runs[:-1] + np.random.default_rng(seed).random(count) * np.diff(runs)).astype(np.int64)]
         lights = [*train, *validation]
-        return TexelSample(texels, capture.sample(lights, texels), capture.directions(lights), len(train))
+        domain = domain_of_capture(capture)
+        return TexelSample(texels, capture.sample(lights, texels), domain.captured(capture, lights), len(train), domain)
 
     @property
     def validated(self) -> bool:
         """Whether there are validation lights to choose by."""
-        return len(self.directions) > self.train
+        return len(self.coordinates) > self.train
 
     @property
     def gram(self) -> Float64[ndarray, "M M"]:
         """Inner products of the lights' images, mean over texels and colors: all that a linear fit's error depends on."""
         images = self.responses.transpose(1, 0, 2).reshape(self.responses.shape[1], -1)
         return (images @ images.T).astype(np.float64) / images.shape[1]
+
+    def held_out(self) -> HeldOut:
+        """Errors at lights left out, singly and in the groups of the light domain, and at validation lights."""
+        return HeldOut.of(self.gram, self.domain.left_out_groups(self.coordinates[: self.train]), self.train)
 
 
 def choose(
@@ -90,7 +97,7 @@ def choose(
     Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation.HeldOut.score`).
     `noise(operator, weights)` adds a variance a light: what the maps' encoding loses.
     """
-    held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
+    held_out = sample.held_out()
     middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
     train = sample.train
     rule: Rule = "validation" if held_out.validated else "leave-one-light-out"

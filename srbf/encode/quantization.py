@@ -40,7 +40,7 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
             scale[too_large] = (largest[too_large] / (HALF_MAX * 0.999)).astype(np.float32)
             warnings.warn(
                 f"coefficients reach {largest.max():.3g}, past half float's {HALF_MAX:.0f}: scaled, but such maps cancel each other "
-                "and lose the picture in any half or 8-bit file; add --ridge, or match --domain to the lights",
+                "and lose the picture in any half or 8-bit file; add a `ridge`, or match the `domain` to the lights",
                 stacklevel=2,
             )
 

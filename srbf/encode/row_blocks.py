@@ -22,6 +22,9 @@ RESULT_BYTES = 128 << 20  # of a tile's maps, which travel
 # Has work(*items[i]) done somewhere, in any order: (i, its answer, or the error that stands for it).
 Distribute = Callable[[Callable[..., Any], Sequence[tuple]], Iterator[tuple[int, Any]]]
 
+# (capture, train lights, matrix (L, K), ridge, progress) -> (maps (K, 3 P), report): `fit_tiles` with machines to do it
+SolveRows = Callable[[Capture, list[int], ndarray, float, Callable[[int, int], None]], tuple[ndarray, LeastSquaresReport]]
+
 
 @dataclass(frozen=True)
 class TileFit:

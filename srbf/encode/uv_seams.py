@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy import ndarray
-from scipy.sparse import csr_array, diags_array
-from scipy.sparse.linalg import splu
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.capture import Capture
@@ -38,7 +36,7 @@ class Stitch:
 
     texels: Int[ndarray, " n"]
     sources: Int[ndarray, " n"]  # the covered texels that dilation fills them from
-    differences: csr_array  # D, (S, n)
+    differences: Any  # D, a csr_array of (S, n)
     factor: Any  # SuperLU of D^T D + diag(h)
     edges: int
 
@@ -56,6 +54,9 @@ class Stitch:
     @staticmethod
     def along(edges: Float32[ndarray, "E 8"], covered: Bool[ndarray, "H W"], hold: float = HOLD) -> Stitch:
         """The stitch of given edges (u0 v0 u1 v1, v up, of one side, then of the other), one sample about every texel."""
+        from scipy.sparse import csr_array, diags_array
+        from scipy.sparse.linalg import splu
+
         height, width = covered.shape
         left, right = edge_points(edges, width, height)
         places, weights = zip(bilinear(left, width, height), bilinear(right, width, height), strict=True)

@@ -10,7 +10,6 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.encode.model_selection import TexelSample
-from srbf.sphere import mean_spacing
 
 Weighting = Literal["plain", "relative"]
 
@@ -21,11 +20,11 @@ DARK = 0.02  # of the mean answer: what `relative` adds to a texel's own, so tha
 class LightSpace:
     """A texel sample seen as n vectors of 3 L numbers, sqrt(solid angle) (T - mean), and the way back.
 
-    solid_angles (L,), 1 in the mean; mean (L, 3); centered (n, 3 L); row_weights (n,), 1 in the rms.
+    quadrature (L,), 1 in the mean; mean (L, 3); centered (n, 3 L); row_weights (n,), 1 in the rms.
     """
 
     sample: TexelSample
-    solid_angles: Float64[ndarray, " L"]
+    quadrature: Float64[ndarray, " L"]
     mean: Float64[ndarray, "L 3"]
     centered: Float32[ndarray, "n M"]
     row_weights: Float32[ndarray, " n"]
@@ -34,7 +33,7 @@ class LightSpace:
     def of(sample: TexelSample, weighting: Weighting) -> LightSpace:
         """Weights and mean of a sample's train lights."""
         responses = sample.responses[:, : sample.train]
-        angles = solid_angles(sample.directions[: sample.train])
+        angles = sample.domain.quadrature(sample.coordinates[: sample.train])
         rows = np.ones(len(responses), np.float32)
         if weighting == "relative":
             own = np.abs(responses).mean(axis=(1, 2))
@@ -52,7 +51,7 @@ class LightSpace:
     def weights(self, axes: Float32[ndarray, "S M"]) -> Float64[ndarray, "S L 3"]:
         """Weights of T's own values in the projection on `axes`."""
         shaped = axes.reshape(len(axes), -1, 3).astype(np.float64)
-        return shaped * np.sqrt(self.solid_angles)[:, None] / self.scale
+        return shaped * np.sqrt(self.quadrature)[:, None] / self.scale
 
     def offsets(self, axes: Float32[ndarray, "S M"], mean: Float32[ndarray, " M"] | None = None) -> Float32[ndarray, " S"]:
         """What the mean, and a cluster's `mean` of the centered rows, project to: taken off the projection of T."""
@@ -63,7 +62,7 @@ class LightSpace:
 
     def functions(self, axes: Float32[ndarray, "S M"], mean: Float32[ndarray, " M"] | None = None) -> Float64[ndarray, "L F 3"]:
         """Values at the train lights of the function of the mean (and a cluster's own), and of those that planes on `axes` weigh."""
-        weighed = np.sqrt(self.solid_angles)[:, None]
+        weighed = np.sqrt(self.quadrature)[:, None]
         shaped = axes.reshape(len(axes), -1, 3).astype(np.float64) * self.scale / weighed
         first = self.mean if mean is None else self.mean + mean.reshape(-1, 3) / weighed
         return np.concatenate([first[None], shaped]).transpose(1, 0, 2)
@@ -72,15 +71,3 @@ class LightSpace:
         """Share of the weighted sample's squared distance from its mean that axes of these singular values hold."""
         rows = self.centered * self.row_weights[:, None]
         return float((values**2).sum() / max(float(np.einsum("nm,nm->", rows, rows, dtype=np.float64)), 1e-30))
-
-
-def solid_angles(directions: Float64[ndarray, "L 3"]) -> Float64[ndarray, " L"]:
-    """Share of the sky that each light stands for, 1 in the mean: one over the density of lights about it.
-
-    The density counts lights nearer than half the spacing of the set, the less the farther: equal on a lattice, twice for two in one.
-    A light at the edge of a dome stands for no more than its like, not for the part of the sky that was never lit.
-    """
-    angles = np.arccos(np.clip(directions @ directions.T, -1, 1))
-    density = np.maximum(0, 1 - angles / (0.5 * mean_spacing(directions))).sum(axis=1)
-    shares = 1 / density
-    return shares / shares.mean()

@@ -9,9 +9,11 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
-from srbf.methods import directional_responses
+from srbf.light_domain import domain_of_capture
+from srbf.methods import responses
 
 
 @dataclass(frozen=True)
@@ -57,9 +59,10 @@ def cluster_borders(asset: Asset, capture: Capture, role: Role = "holdout", inde
         raise InputError(f"expected {role} lights in {capture.folder}, found none")
     covered = capture.coverage() >= COVERED
     pairs = [_masks(clusters, covered, axis) for axis in (0, 1)]
+    coordinates = domain_of_capture(capture).captured(capture, lights)
     sums = np.zeros(5)
     for first, block in capture.blocks(lights):
-        relit = np.maximum(directional_responses(asset, capture.directions(lights[first : first + len(block)])), 0)
+        relit = np.maximum(responses(asset, coordinates[first : first + len(block)]), 0)
         true = np.maximum(block.reshape(relit.shape), 0)
         for error, reference in zip(relit - true, true, strict=True):
             for axis, (border, beside) in enumerate(pairs):

@@ -12,12 +12,14 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
 from srbf.io.float16 import finite_to_float32
+from srbf.light_domain import domain_of_capture
 from srbf.lights import PointLight
-from srbf.methods import directional_responses, linear_response
+from srbf.methods import linear_response, responses
 from srbf.relighting.direct_light import Added, Direct
 
 PEAK_QUANTILE = 0.999
@@ -129,12 +131,12 @@ class TrainErrorAccumulator:
     def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
         """Sums of squared differences and of squared references, per light, over `texels`, both clamped at `floor`."""
         picked = asset.at(self.texels)
-        directions = capture.directions(self.lights)
+        coordinates = domain_of_capture(capture).captured(capture, self.lights)
         sums = np.empty((2, len(self.lights)))
 
         def compare(task: int) -> None:
             rows = range(task * LIGHT_BATCH, min((task + 1) * LIGHT_BATCH, len(self.lights)))
-            relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            relit = responses(picked, coordinates[rows.start : rows.stop])[:, 0]  # (b, n, 3)
             for row, response in zip(rows, relit, strict=True):
                 reference = self._responses[row]
                 if reference.dtype == np.float16:
@@ -220,10 +222,11 @@ def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) 
             response, direct = linear_response(asset, point_light), added.response(point_light)
             yield (response if direct is None else response + direct).reshape(-1, 3)
         return
-    directions = capture.directions(lights)
-    for direction, response in zip(directions, directional_responses(asset, directions), strict=True):
-        lit = added.directional(direction[None])
-        yield (response if isinstance(lit, float) else response + lit[0]).reshape(-1, 3)
+    domain = domain_of_capture(capture)
+    coordinates = domain.captured(capture, lights)
+    for own, response in zip(coordinates, responses(asset, coordinates), strict=True):
+        direct = added.response([domain.light(own)])
+        yield (response if direct is None else response + direct).reshape(-1, 3)
 
 
 def _covered(capture: Capture) -> Bool[ndarray, " P"]:
@@ -250,9 +253,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
     """(the capture to compare with, the capture that defines the peak)."""
     if asset.transport == "combined":
         if direct != "none":
-            raise InputError(
-                f"expected an indirect asset for direct light by {direct}, found a combined one: it holds the direct light already"
-            )
+            raise InputError(f"expected an indirect asset for `direct={direct}`, found a combined one: it holds the direct light already")
         combined = capture.combined()
         return combined, combined
     whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
@@ -260,7 +261,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
         if capture.transport == "combined":
             raise InputError(
                 f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
-                "add its direct light (direct: ray or shadow-map)"
+                "add its direct light: `direct=ray` or shadow-map"
             )
         return capture, whole
     return capture.combined(), whole

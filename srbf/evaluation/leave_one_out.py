@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, role_error, squared_errors
-from srbf.methods import directional_responses
+from srbf.light_domain import domain_of_capture
+from srbf.methods import responses
 
 MEMORY_BYTES = 2 << 30  # of responses; larger captures use a sample of texels
 
@@ -34,13 +36,14 @@ def leave_one_out(
     most = max(1, MEMORY_BYTES // (12 * len(capture.lights)))
     texels = covered if len(covered) <= most else np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
     roles: list[Role | None] = [role if (role := light.role) == "train" else None for light in capture.lights]
-    kept = capture.kept(texels).with_roles(roles)
+    kept = capture.load(texels).with_roles(roles)
+    domain = domain_of_capture(kept)
     peaks = PeakHistogram()
     squares, powers = np.empty(len(lights)), np.empty(len(lights))
     for left in range(len(lights)):
         rest = kept.with_roles([None if i == left else "train" for i in range(len(lights))])
         asset = encode(rest)
-        response = directional_responses(asset, kept.directions([left]))[0].reshape(-1, 3)
+        response = responses(asset, domain.captured(kept, [left]))[0].reshape(-1, 3)
         reference = kept.image(left).reshape(-1, 3)
         peaks.add(reference)
         squares[left], powers[left] = squared_errors(response, reference)

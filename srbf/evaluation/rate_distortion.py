@@ -6,40 +6,28 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import Capture, Role
+from srbf.capture import Capture
+from srbf.captured_light import Role
 from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.temporal_stability import Reference, dense_reference
-from srbf.methods import directional_responses
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap
-from srbf.methods.eigen_map import EigenMap
-from srbf.methods.relighting_map import RelightingMap
+from srbf.light_domain import domain_of_capture
+from srbf.methods import Method, method_of
+from srbf.methods import responses as asset_responses
+from srbf.registry import all_methods
 
 IMAGE_BYTES = 8  # per RGBA half texel of one uncompressed image
 ALL, NEAREST = "all images interpolated", "nearest image"
 
 
-@runtime_checkable
-class Method(Protocol):
-    """A fit with its settings."""
-
-    def encode(self, capture: Capture) -> Asset:
-        """The asset of a capture."""
-        ...
-
-
-METHODS: tuple[Method, ...] = (  # compared in a report
-    *(RelightingMap(k=k) for k in (9, 25, 49)),
-    *(RelightingMap(k=k, basis="spherical-harmonics") for k in (4, 9, 16)),
-    *(EigenMap(scalars=s, encoding="uint8") for s in (8, 16, 32)),
-    *(ClusteredEigenMap(clusters=64, scalars=s, encoding="uint8") for s in (4, 8, 16)),
-)
+def compared_methods() -> tuple[Method, ...]:
+    """The methods that a report compares: a few settings of each."""
+    return tuple(fit for method in all_methods() for fit in method.compared())
 
 
 @dataclass(frozen=True)
@@ -79,7 +67,7 @@ def contest(
 
 def score_asset(asset: Asset, capture: Capture, role: Role, peak: float, seconds: float | None = None) -> Score:
     """The score of an asset on a capture of its texels."""
-    error = error_of(lambda directions: directional_responses(asset, directions).reshape(len(directions), -1, 3), capture, role, peak)
+    error = error_of(lambda coordinates: asset_responses(asset, coordinates).reshape(len(coordinates), -1, 3), capture, role, peak)
     return Score(family_of(asset), name_of(asset), float(texel_bytes(asset)), *error, seconds)
 
 
@@ -95,8 +83,9 @@ def nearest_image(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
     """The response of each direction is that of the nearest train image. Memory: (L, n, 3) float32."""
     train = capture.indices("train")
     responses = capture.sample(train, texels)
-    towards = capture.directions(train).T
-    return lambda directions: responses[:, (directions @ towards).argmax(axis=1)].transpose(1, 0, 2)
+    domain = domain_of_capture(capture)
+    among = domain.captured(capture, train)
+    return lambda coordinates: responses[:, domain.nearest(coordinates, among)].transpose(1, 0, 2)
 
 
 def error_of(responses: Reference, capture: Capture, role: Role, peak: float) -> tuple[float, float]:
@@ -106,10 +95,11 @@ def error_of(responses: Reference, capture: Capture, role: Role, peak: float) ->
     """
     floor = -np.inf if capture.transport == "indirect" else 0.0
     indices = capture.indices(role)
+    coordinates = domain_of_capture(capture).captured(capture, indices)
     squares: list[float] = []
     power = 0.0
     for first, block in capture.blocks(indices):
-        relit = np.maximum(responses(capture.directions(indices[first : first + len(block)])), floor)
+        relit = np.maximum(responses(coordinates[first : first + len(block)]), floor)
         for response, reference in zip(relit, np.maximum(block, floor), strict=True):
             squares.append(float(((response - reference) ** 2).mean(dtype=np.float64)))
             power += float((reference**2).mean(dtype=np.float64))
@@ -141,11 +131,6 @@ def planes_bound(values: Float64[ndarray, " r"], responses: int, peak: float) ->
     return np.array([psnr(peak, float(np.sqrt(energy / responses))) for energy in left])
 
 
-def components_of(asset: Asset) -> int:
-    """Numbers per texel of an asset."""
-    return 3 * asset.k if asset.method == "relighting-map" else asset.scalars
-
-
 def texel_bytes(asset: Asset) -> int | float:
     """Bytes per texel that a shader reads under a directional light."""
     return asset.bytes_per_texel()["directional"]
@@ -153,14 +138,10 @@ def texel_bytes(asset: Asset) -> int | float:
 
 def family_of(asset: Asset) -> str:
     """The name of an asset's curve: its method, or its basis if that is not Gaussian."""
-    kind = asset.manifest.get("basis", {}).get("kind", "gaussian")
-    method = asset.method.replace("-", " ")
-    return method if kind == "gaussian" else kind.replace("-", " ")
+    return method_of(asset).family(asset)
 
 
 def name_of(asset: Asset) -> str:
-    """The label of an asset on its curve: its maps or components per texel, clusters, and its encoding unless half."""
+    """The label of an asset on its curve: its numbers per texel, and its encoding unless half."""
     encoding = {"half": "", "float": ", float", "uint8": ", bytes", "bc7": ", BC7", "bc1": ", BC1"}[asset.encoding]
-    if asset.method == "relighting-map":
-        return f"{asset.k} maps{encoding}"
-    return f"{asset.scalars} components" + (f", {asset.clusters} clusters" if asset.clusters > 1 else "") + encoding
+    return method_of(asset).label(asset) + encoding

@@ -18,20 +18,18 @@ from srbf.capture import BLOCK_BYTES, COVERED, MANIFEST, Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods import directional_responses
+from srbf.light_domain import Directions, domain_of_capture
+from srbf.methods import responses
 from srbf.solve.least_squares import StreamedLeastSquares
-from srbf.sphere import Domain, domain_of, point_set
+from srbf.sphere import Domain
 
 Reference = Callable[[np.ndarray], np.ndarray]  # (b, 3) unit directions -> (b, P, 3) true responses of the swept texels
 
 FRAMES = 240
-CIRCLES: dict[str, int] = {"hemisphere": 3, "sphere": 2}
-MIN_ELEVATION = np.radians(15)  # of a sweep over a hemisphere
 TEXELS = 4096  # in a sweep; its curves differ by about 1 % from those of all texels
 BRIGHT_SHARE = 0.25  # of the reference's largest mean brightness; dimmer frames are left out of the relative brightness error
 EDGE_RATE = 2.0  # of the fastest change of an unshadowed Lambert surface; a faster change is a passing shadow edge
 DENSE_SPREAD, DENSE_RIDGE = 0.9, 0.1  # of a dense reference: spread over light spacing, ridge
-CENTERS_BELOW = 3.0  # light spacings that the centers of a dense reference extend below the horizon
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,28 +81,8 @@ class Motion:
 
 
 def great_circles(domain: Domain, frames: int = FRAMES, circles: int | None = None) -> Float64[ndarray, "C F 3"]:
-    """`frames` unit directions in total along great circles, at even speed.
-
-    On the hemisphere: arcs over the zenith at evenly spaced azimuths, between MIN_ELEVATION on both sides. On the sphere: whole
-    circles, whose last frame equals the first. InputError if a circle has fewer than 3 frames.
-    """
-    count = CIRCLES[domain] if circles is None else circles
-    each = frames // max(count, 1)
-    if count < 1 or each < 3:
-        raise InputError(f"expected at least one great circle of at least 3 frames, found {frames} frames for {count} circles")
-    i = np.arange(count)
-    if domain == "hemisphere":
-        azimuth = np.pi * (i + 0.3) / count  # away from the axes, where point sets are symmetric
-        start = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros(count)], axis=1)
-        over = np.broadcast_to([0.0, 0.0, 1.0], (count, 3))
-        angle = np.linspace(MIN_ELEVATION, np.pi - MIN_ELEVATION, each)
-    else:
-        normals = point_set("fibonacci", count, "sphere")
-        start = np.cross(normals, [0.6, 0.0, 0.8])
-        start /= np.linalg.norm(start, axis=1, keepdims=True)
-        over = np.cross(normals, start)
-        angle = np.linspace(0, 2 * np.pi, each)
-    return start[:, None] * np.cos(angle)[:, None] + over[:, None] * np.sin(angle)[:, None]
+    """`frames` directions in total along great circles, at even speed: `Directions.paths`."""
+    return np.stack([path for _, path in Directions(domain).paths(frames, circles)])
 
 
 def sampled_texels(covered: Bool[ndarray, "H W"], count: int = TEXELS, seed: int = 0) -> Int[ndarray, " n"]:
@@ -129,16 +107,11 @@ def dense_reference(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
     train = capture.indices("train")
     if not train:
         raise InputError(f"expected train lights in {capture.folder}, found none")
-    directions = capture.directions(train)
-    if domain_of(directions) == "hemisphere":
-        spacing = float(np.sqrt(2 * np.pi / len(train)))
-        centers = point_set("fibonacci", 2 * len(train), "sphere")
-        centers = centers[centers[:, 2] > -np.sin(min(CENTERS_BELOW * spacing, np.pi / 2))]
-    else:
-        spacing = float(np.sqrt(4 * np.pi / len(train)))
-        centers = point_set("fibonacci", len(train), "sphere")
-    basis = GaussianBasis(centers, DENSE_SPREAD * spacing)
-    solve = StreamedLeastSquares(basis.evaluate(directions), DENSE_RIDGE)
+    domain = domain_of_capture(capture)
+    coordinates = domain.captured(capture, train)
+    spacing = float(np.sqrt((2 if domain.manifest()["domain"] == "hemisphere" else 4) * np.pi / len(train)))
+    basis = GaussianBasis(domain.dense_centers(coordinates), DENSE_SPREAD * spacing)
+    solve = StreamedLeastSquares(basis.evaluate(coordinates), DENSE_RIDGE)
     for first, block in capture.blocks(train):
         solve.add(first, np.ascontiguousarray(block[:, texels]).reshape(len(block), -1))
     coefficients = solve.solve()  # (K, 3 n)
@@ -239,7 +212,7 @@ def frames(asset: Asset, directions: Float64[ndarray, "C F 3"] | None = None) ->
 def _responses(asset: Asset, directions: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     at_a_time = max(1, BLOCK_BYTES // (asset.width * asset.height * 12))
     for start in range(0, len(directions), at_a_time):
-        yield start, directional_responses(asset, directions[start : start + at_a_time])
+        yield start, responses(asset, directions[start : start + at_a_time])
 
 
 def _cosines(directions: np.ndarray, texels: int) -> Float32[ndarray, "b n 3"]:

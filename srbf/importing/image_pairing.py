@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path, PureWindowsPath
 
-from srbf.capture import LightKind
+from srbf.captured_light import LightKind
 from srbf.errors import ImageError
 from srbf.importing.light_list import LightListEntry, read_light_list
 from srbf.importing.pictures import RAW_SUFFIXES
@@ -40,7 +40,7 @@ def paired(
     """
     entries = read_light_list(light_list, kind, say)
     if images is not None and not images.is_dir():
-        raise ImageError(f"expected a folder of images at {images}, found none; give --images an existing folder")
+        raise ImageError(f"expected a folder of images at {images}, found none; give `images` an existing folder")
     search = _Search(light_list, (light_list.parent,) if images is None else (images, light_list.parent))
     pairs: list[tuple[Path, LightListEntry]] = []
     taken: dict[Path, str] = {}
@@ -181,9 +181,9 @@ class _Search:
         if outside and os.path.isfile(asked):  # noqa: PTH113 - Path.is_file raises where a name is too long
             return ImageError(
                 f"expected the image {name!r} of {self.light_list.name} below {where}, found it outside: paths outside the list's folder "
-                f"are followed only below --images FOLDER; add --images {asked.parent}"
+                f"are followed only below `images`; add `images={asked.parent}`"
             )
-        elsewhere = "; if it is in another folder, add --images FOLDER" if len(self.roots) == 1 else ""
+        elsewhere = "; if it is in another folder, add `images`, that folder" if len(self.roots) == 1 else ""
         near = get_close_matches(last, self._folder(self.roots[0]).names, 1)
         nearest = f" (the nearest name is {near[0]!r})" if near else ""
         return ImageError(f"expected the image {last!r} of {self.light_list.name} in {where}, found none{nearest}{elsewhere}")

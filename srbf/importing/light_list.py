@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.capture import LightKind
+from srbf.captured_light import LightKind
 from srbf.errors import ManifestError
 from srbf.importing.light_list_faults import fault_of, spherical_fault
 from srbf.importing.light_list_text import Row, as_number, rows_of

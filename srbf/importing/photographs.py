@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 import srbf
-from srbf.capture import MANIFEST, LightKind, Quantity, Role
+from srbf.capture import MANIFEST, Quantity
+from srbf.captured_light import LightKind, Role
 from srbf.errors import ImageError, InputError
 from srbf.importing.image_pairing import paired
 from srbf.importing.light_list import LightListEntry, below_the_horizon

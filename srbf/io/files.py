@@ -144,12 +144,12 @@ def check_replaceable(path: Path, force: bool, marker: str) -> None:
     if not path.exists():
         return
     if not force:
-        raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
+        raise OutputExistsError(f"expected no {path} yet, found one; choose another, or `force=True`")
     if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
-        raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")
+        raise OutputExistsError(f"`force=True` replaces only a folder with {marker}, and {path} is not one; choose another")
     folders = [p for p in path.iterdir() if p.is_dir() and p.name not in ("lights", "direct")]
     if others := [p.name for p in folders if not _listed(p, path / marker)]:
-        raise OutputExistsError(f"--force would delete the folder {others[0]!r} inside {path}; move it, or choose another -o")
+        raise OutputExistsError(f"`force=True` would delete the folder {others[0]!r} inside {path}; move it, or choose another")
 
 
 def _listed(folder: Path, manifest: Path) -> bool:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,12 +10,10 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.errors import ManifestError
+from srbf.io.glb import DAMAGE, Glb
 
-MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942
-TRIANGLES = 4
+TRIANGLES = 4  # glTF's mode of a primitive
 KNOTS = 8
-DTYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 Z_UP_FROM_Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
 
 
@@ -56,29 +52,16 @@ class Triangles:
 def read_triangles(data: bytes, name: str = "scene.glb") -> Triangles:
     """The triangles of a .glb; ManifestError, in one line, where it is none or of a kind that no bake writes (sparse, compressed)."""
     try:
-        return _Reader(data).triangles()
-    except (struct.error, ValueError, KeyError, IndexError, TypeError, UnicodeDecodeError, RecursionError) as error:
+        return _Reader(Glb.parse(data)).triangles()
+    except DAMAGE as error:
         raise ManifestError(
             f"expected triangles as binary glTF 2.0 in {name}, found {type(error).__name__}: {error}; bake again"
         ) from error
 
 
 class _Reader:
-    def __init__(self, data: bytes) -> None:
-        magic, version, length = struct.unpack_from("<III", data)
-        if magic != MAGIC or version != 2 or length > len(data):
-            raise ValueError("no glTF 2.0 header, or a file cut short")
-        self._body = memoryview(b"")
-        self._document: dict[str, Any] = {}
-        at = 12
-        while at + 8 <= length:
-            size, kind = struct.unpack_from("<II", data, at)
-            chunk = memoryview(data)[at + 8 : at + 8 + size]
-            if kind == JSON_CHUNK:
-                self._document = json.loads(bytes(chunk))
-            elif kind == BINARY_CHUNK:
-                self._body = chunk
-            at += 8 + size
+    def __init__(self, glb: Glb) -> None:
+        self._glb, self._document = glb, glb.json
 
     def triangles(self) -> Triangles:
         document = self._document
@@ -109,10 +92,10 @@ class _Reader:
             self._visit(child, matrix, found)
 
     def _primitive(self, primitive: dict[str, Any], matrix: np.ndarray, casts: bool) -> tuple[np.ndarray, ...]:
-        points = self._accessor(primitive["attributes"]["POSITION"]).astype(np.float64)
+        points = self._glb.values(primitive["attributes"]["POSITION"]).astype(np.float64)
         corners = (points @ matrix[:3, :3].T + matrix[:3, 3])[self._indices(primitive, len(points))]
         if "NORMAL" in primitive["attributes"]:
-            normals = self._accessor(primitive["attributes"]["NORMAL"]).astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
+            normals = self._glb.values(primitive["attributes"]["NORMAL"]).astype(np.float64) @ np.linalg.inv(matrix[:3, :3])
             normals = normals[self._indices(primitive, len(points))]
         else:
             flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -121,23 +104,13 @@ class _Reader:
         count = len(corners)
         places = np.full((count, 3, 2), np.nan)
         if "_LIGHTMAP" in primitive["attributes"]:
-            places = self._accessor(primitive["attributes"]["_LIGHTMAP"]).astype(np.float64)[self._indices(primitive, len(points))]
+            places = self._glb.values(primitive["attributes"]["_LIGHTMAP"]).astype(np.float64)[self._indices(primitive, len(points))]
         return corners, normals, np.full(count, primitive.get("material", -1) + 1), np.full(count, casts), places
 
     def _indices(self, primitive: dict[str, Any], count: int) -> np.ndarray:
         if "indices" not in primitive:
             return np.arange(count).reshape(-1, 3)
-        return self._accessor(primitive["indices"]).reshape(-1, 3)
-
-    def _accessor(self, index: int) -> np.ndarray:
-        accessor = self._document["accessors"][index]
-        view = self._document["bufferViews"][accessor["bufferView"]]
-        dtype, width = DTYPES[accessor["componentType"]], WIDTHS[accessor["type"]]
-        if view.get("byteStride", 0) not in (0, width * np.dtype(dtype).itemsize):
-            raise ValueError("interleaved vertices")
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        array = np.frombuffer(self._body, dtype, accessor["count"] * width, start)
-        return array.reshape(-1, width) if width > 1 else array
+        return self._glb.values(primitive["indices"]).reshape(-1, 3)
 
 
 def _tint(material: dict[str, Any]) -> Float64[ndarray, "KNOTS 3"]:

@@ -41,7 +41,7 @@ def chosen(asset: Asset, asked: Direct | None) -> Direct:
     """
     if asset.transport == "combined":
         if asked not in (None, "none"):
-            raise InputError(f"expected an indirect asset for --direct {asked}, found a combined one: it holds the direct light already")
+            raise InputError(f"expected an indirect asset for `direct={asked}`, found a combined one: it holds the direct light already")
         return "none"
     if asked is not None:
         return asked

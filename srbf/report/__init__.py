@@ -9,9 +9,10 @@ from typing import Any
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
-from srbf.evaluation.rate_distortion import METHODS, Method
+from srbf.evaluation.rate_distortion import compared_methods
 from srbf.io import files
 from srbf.lights import Light
+from srbf.methods import Method
 from srbf.report.abrdf_mosaic import abrdf_tiles
 from srbf.report.contact_sheet import contact_sheet
 from srbf.report.findings import measure
@@ -79,7 +80,7 @@ def write_report(
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
     steps = 4 + len(FIGURES)
-    findings = measure(subject, METHODS if methods is None else methods, lambda done, total: progress(done, steps))
+    findings = measure(subject, compared_methods() if methods is None else methods, lambda done, total: progress(done, steps))
     pictures = []
     for entry in FIGURES:
         pictures.append(_draw(subject, folder, *entry))

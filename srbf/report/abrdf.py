@@ -18,7 +18,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.errors import InputError
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 
 Projection = Literal["equal-area", "orthographic", "latitude-longitude"]
 CHUNK = 1 << 16  # receivers; a block has at most 16 times as many responses
@@ -129,7 +129,7 @@ def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h
     responses = np.full((len(asked), tile_count(tiles), 3), np.nan, np.float32)
     block = max(1, 16 * CHUNK // max(1, len(receivers)))
     for start in range(0, len(asked) if len(receivers) else 0, block):
-        images = directional_responses(picked, asked[start : start + block])[:, 0]  # (b, n, 3)
+        images = asset_responses(picked, asked[start : start + block])[:, 0]  # (b, n, 3)
         means = columns @ images.transpose(1, 0, 2).reshape(len(receivers), -1)
         responses[start : start + block] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
     responses[:, _empty(tiles)] = np.nan

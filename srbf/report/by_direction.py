@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.report.inline import figure, ramp
 from srbf.report.plot import Axis, Plot, disc, on_disc, svg
 from srbf.report.sphere import on_half

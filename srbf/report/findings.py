@@ -17,9 +17,11 @@ from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.flip import Flip
 from srbf.evaluation.held_out import LIGHTS, HeldOutError, Negative, held_out_error, negative
 from srbf.evaluation.light_spacing import ShadowSampling, shadow_sampling
-from srbf.evaluation.rate_distortion import Method, Score, contest, planes_bound, score_asset, spectrum
+from srbf.evaluation.rate_distortion import Score, contest, planes_bound, score_asset, spectrum
 from srbf.evaluation.temporal_stability import TEXELS, Motion, dense_reference, sampled_texels, sweep
-from srbf.methods import directional_responses
+from srbf.light_domain import domain_of_capture
+from srbf.methods import Method
+from srbf.methods import responses as asset_responses
 from srbf.report.subject import Subject
 from srbf.sphere import farthest_points
 
@@ -75,7 +77,7 @@ def measure(subject: Subject, methods: Sequence[Method], progress: Callable[[int
     held_out = measure_held_out(subject)
     progress(1, STEPS)
     picked = sampled_texels(subject.covered, TEXELS)
-    sample, asset = subject.capture.kept(picked), subject.asset.at(picked)
+    sample, asset = subject.capture.load(picked), subject.asset.at(picked)
     peak = subject.evaluation[subject.role]["peak"]
     texels = np.arange(len(picked))
     own = score_asset(asset, sample, subject.role, peak)
@@ -86,7 +88,7 @@ def measure(subject: Subject, methods: Sequence[Method], progress: Callable[[int
     missing = ""
     try:
         sampling = shadow_sampling(sample, texels)
-        able = [m for m in methods if getattr(m, "k", getattr(m, "scalars", 0)) <= len(sample.indices("train"))]
+        able = [m for m in methods if getattr(m, "k", getattr(m, "components", 0)) <= len(sample.indices("train"))]
         scores = tuple(contest(sample, able, subject.role, peak))
         progress(2, STEPS)
         found = spectrum_of(sample, asset, peak)
@@ -104,9 +106,10 @@ def spectrum_of(sample: Capture, asset: Asset, peak: float) -> Spectrum:
     train = sample.indices("train")
     values = spectrum(sample)
     responses = sample.width * sample.height * 3 * len(train)
+    coordinates = domain_of_capture(sample).captured(sample, train)
     squares = 0.0
     for first, block in sample.blocks(train):
-        relit = directional_responses(asset, sample.directions(train[first : first + len(block)])).reshape(block.shape)
+        relit = asset_responses(asset, coordinates[first : first + len(block)]).reshape(block.shape)
         squares += float(((relit - block) ** 2).sum(dtype=np.float64))
     return Spectrum(values, planes_bound(values, responses, peak), psnr(peak, float(np.sqrt(squares / responses))))
 
@@ -117,11 +120,11 @@ def measure_held_out(subject: Subject) -> HeldOut:
     indices = sorted(capture.indices(subject.role), key=subject.psnr_of)
     most = max(MIN_LIGHTS, MEMORY_BYTES // (asset.width * asset.height * 12))
     if len(indices) > most:
-        spread = [indices[i] for i in farthest_points(capture.directions(indices), most - WORST_LIGHTS)]
+        spread = [indices[i] for i in farthest_points(domain_of_capture(capture).captured(capture, indices), most - WORST_LIGHTS)]
         indices = indices[:WORST_LIGHTS] + [i for i in spread if i not in indices[:WORST_LIGHTS]]
     indices.sort()
     references = np.stack([capture.image(i) for i in indices])
-    relit = directional_responses(asset, capture.directions(indices))
+    relit = asset_responses(asset, domain_of_capture(capture).captured(capture, indices))
     metric = Flip(float(np.log2(subject.gain)))
     peak = subject.evaluation[subject.role]["peak"]
     floor = -np.inf if capture.transport == "indirect" else 0.0  # as in the evaluation

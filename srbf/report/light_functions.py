@@ -24,8 +24,8 @@ def light_functions(subject: Subject) -> str:
         counts = np.bincount(asset.tables["cluster_index"][subject.covered], minlength=asset.clusters)
         cluster = int(np.argmax(counts))
         words = f" of cluster {cluster}, the largest of {asset.clusters} with {counts[cluster] / max(1, counts.sum()):.1%} of the texels"
-    first = cluster * (asset.scalars + 1)
-    values = asset.light_functions.evaluate(directions[inside])[:, first : first + min(MAX_FUNCTIONS, asset.scalars + 1)]  # (N, f, 3)
+    first = cluster * (asset.components + 1)
+    values = asset.light_functions.evaluate(directions[inside])[:, first : first + min(MAX_FUNCTIONS, asset.components + 1)]  # (N, f, 3)
     cells = []
     for j in range(values.shape[1]):
         own = values[:, j]

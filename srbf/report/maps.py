@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.methods import directional_responses
-from srbf.methods.relighting_map import directional_weights
+from srbf.methods import responses
+from srbf.methods.relighting_map import basis_weights
 from srbf.report.canvas import MARGIN, SOFT, Sheet, box_for, gain_text, shown, shown_signed
 from srbf.report.subject import Picture, Subject
 
@@ -22,7 +22,7 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
     row = int(np.argmin([abs(subject.direction(i)[2] - np.sin(np.radians(45))) for i in range(len(subject.shown))]))
     world = subject.direction(row)
     direction = asset.asset_from_world[:3, :3] @ world
-    weights = directional_weights(asset, direction / np.linalg.norm(direction))
+    weights = basis_weights(asset, direction[None] / np.linalg.norm(direction))[0]
     terms = [int(i) for i in np.argsort(-weights, kind="stable")[:TERMS]]
     maps = np.stack([decoded(subject, i) for i in terms])
     scale = signed_scale(maps[:, covered])
@@ -91,7 +91,7 @@ def decoded(subject: Subject, i: int) -> np.ndarray:
 
 def unclamped(subject: Subject, direction: np.ndarray) -> np.ndarray:
     """The signed sum of all maps under one white light, (H, W, 3)."""
-    return directional_responses(subject.asset, direction[None])[0]
+    return responses(subject.asset, direction[None])[0]
 
 
 def signed_scale(values: np.ndarray) -> float:

@@ -10,12 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.evaluation.cluster_borders import ClusterBorders
-from srbf.evaluation.rate_distortion import components_of, family_of, name_of, texel_bytes
+from srbf.evaluation.rate_distortion import family_of, name_of, texel_bytes
 from srbf.info import folder_bytes
 from srbf.io.files import write_text
 from srbf.io.image import size_of
+from srbf.methods import method_of
 from srbf.report.by_bytes import by_bytes
 from srbf.report.by_bytes import table as table_of_bytes
 from srbf.report.by_direction import by_direction
@@ -186,7 +187,7 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
         ("capture on disk", f"{bytes_text(folder_bytes(capture.folder))}, {len(capture.lights)} lights"),
         *([("asset on disk", bytes_text(folder_bytes(asset_folder)))] if asset_folder else []),
         ("data of the texels, uncompressed", f"{bytes_text(raw)}, {name_of(asset)}, {asset.encoding}"),
-        ("train responses per stored number", f"{3 * len(capture.indices('train')) / components_of(asset):.1f}"),
+        ("train responses per stored number", f"{3 * len(capture.indices('train')) / method_of(asset).numbers_per_texel(asset):.1f}"),
         ("read by a shader", f"{texel_bytes(asset)} bytes per texel"),
         ("resident on a GPU, with tables", bytes_text(asset.resident_bytes())),
     )

@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from srbf.lights import PointLight, moved
 from srbf.methods import relight
-from srbf.methods.receivers import CHUNK
+from srbf.methods.over_lights import CHUNK
 from srbf.methods.relighting_map import receiver_weights
 from srbf.report.canvas import MARGIN, Sheet, box_for, gain_text, place_text, shown, shown_signed
 from srbf.report.maps import decoded, signed_scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from srbf.evaluation.rate_distortion import components_of
+from srbf.methods import method_of
 from srbf.report.findings import Findings, Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
@@ -17,7 +17,7 @@ HEADROOM = 15.0  # dB shown above the asset's PSNR; beyond, planes fit noise
 
 def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> str:
     """Singular values, and the PSNR of the best planes, side by side."""
-    components = components_of(subject.asset)
+    components = method_of(subject.asset).numbers_per_texel(subject.asset)
     ranks = np.arange(1, len(spectrum.values) + 1)
     relative = spectrum.values / max(float(spectrum.values[0]), 1e-30)
     kept = (relative > FLOOR) & (ranks <= SHOWN_SHARE * len(ranks))

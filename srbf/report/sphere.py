@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.basis.gaussian import TABLE_TOLERANCE, lookup, weight
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.report.abrdf import disc_points
 from srbf.report.canvas import INK, MARGIN, ROLE_COLOR, ROLE_MARKER, RULE, SOFT, Sheet, draw_disc
 from srbf.report.subject import Picture, Subject

@@ -11,10 +11,11 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture, Role
-from srbf.evaluation.errors_by_role import COVERED, psnr
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
+from srbf.evaluation.errors_by_role import psnr
 from srbf.lights import Light, PointLight, SpotLight
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.report.point_lights import demonstration_point_lights
 from srbf.sphere import farthest_points
 
@@ -78,7 +79,7 @@ def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_ligh
     chosen.sort(key=lambda i: -capture.lights[i].direction[2])
     covered = capture.coverage() >= COVERED
     references = np.stack([capture.image(i) for i in chosen])
-    relit = np.maximum(directional_responses(asset, capture.directions(chosen)), 0)
+    relit = np.maximum(responses(asset, capture.directions(chosen)), 0)
     level = float(np.quantile(references[:, covered], EXPOSURE_QUANTILE)) if covered.any() else 0.0
     gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
     points, spots = demonstration_point_lights(asset, covered, demo_lights)

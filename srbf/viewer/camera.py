@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy import ndarray
-from scipy.linalg import rq
 
 from srbf.arrays import Float, Float64
 from srbf.asset import Asset
@@ -77,6 +76,8 @@ def _error(
 
 
 def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, " 3"], size: float, rms: float) -> FittedCamera | None:
+    from scipy.linalg import rq
+
     turn = matrix[:, :3]
     if abs(np.linalg.det(turn)) < 1e-9:  # an orthographic camera: it is nowhere
         return None

@@ -72,7 +72,7 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
 
 def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
     def kind(asset: Asset) -> str:
-        return f"{asset.width} x {asset.height} {page_manifest.receiver_kind(asset)} of {asset.quantity}"
+        return f"{asset.width} x {asset.height} {asset.receiver_kind} of {asset.quantity}"
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):

@@ -43,7 +43,7 @@ class ViewerServer(ThreadingHTTPServer):
         try:
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
-            raise InputError(f"expected a free port, found that {port} cannot be had ({error}); choose another --port, or none") from error
+            raise InputError(f"expected a free port, found that {port} cannot be had ({error}); choose another `port`, or 0") from error
         self.contents = contents
 
     @property

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.encode.dilation import dilate, nearest_covered
@@ -123,6 +122,8 @@ class RayTracer:
     def _steps(self, mean: np.ndarray) -> Float64[ndarray, " P"]:
         """How far each texel and its neighbors differ."""
         image = mean.max(axis=1).reshape(self._receivers.height, self._receivers.width)
+        from scipy import ndimage
+
         return (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
 
     def _first(self, start: int) -> Samples:

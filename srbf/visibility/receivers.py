@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy import ndarray
-from scipy.stats import qmc
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
@@ -100,6 +99,8 @@ class Receivers:
 
 def spread_points(count: int) -> Float64[ndarray, "S 4"]:
     """`count` points that fill the unit hypercube evenly, and best in powers of two of them [Sobol1967]."""
+    from scipy.stats import qmc
+
     return qmc.Sobol(4, scramble=False).random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
 
 

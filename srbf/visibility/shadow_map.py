@@ -67,7 +67,7 @@ class ShadowMapper:
             if isinstance(light, EnvironmentLight):
                 continue
             if not isinstance(light, DirectionalLight):
-                raise InputError("expected directional lights for --direct shadow-map, found a point or spot light; use --direct ray")
+                raise InputError("expected directional lights for `direct='shadow-map'`, found a point or spot light; use `direct='ray'`")
             total += self._irradiance(np.array(light.direction)) * np.array(light.color, np.float32)
         return total * self._receivers.reflectance()
 

@@ -19,9 +19,9 @@ from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 from srbf.cli import app
 from srbf.errors import BakeError
-from srbf.export.glb import Document
 from srbf.export.gltf import EXTENSION, model
 from srbf.export.scene_mesh import SceneMesh, write_scene_mesh
+from srbf.io.glb import Glb
 from srbf.io.image import decode_srgb, read_image
 from srbf.methods.relighting_map import RelightingMap
 
@@ -37,23 +37,16 @@ class Scene:
 
     def __init__(self, path: Path, made: SceneMesh | None = None) -> None:
         self.made = made
-        self.document = Document.read(path)
+        self.document = Glb.parse(path.read_bytes())
         self.json = self.document.json
         self.nodes = {node["name"]: node for node in self.json["nodes"]}
-
-    def accessor(self, index: int) -> np.ndarray:
-        told = self.json["accessors"][index]
-        view = self.json["bufferViews"][told["bufferView"]]
-        dtype, width = {5126: np.float32, 5125: np.uint32}[told["componentType"]], {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[told["type"]]
-        values = np.frombuffer(bytes(self.document.body), dtype, told["count"] * width, view["byteOffset"])
-        return values.reshape(-1, width) if width > 1 else values
 
     def primitives(self, name: str) -> list[dict[str, Any]]:
         """Of an object: its attributes at the corners of triangles (T, 3, C), and its `material`."""
         found = []
         for primitive in self.json["meshes"][self.nodes[name]["mesh"]]["primitives"]:
-            order = self.accessor(primitive["indices"]).reshape(-1, 3)
-            corners: dict[str, Any] = {key: self.accessor(index)[order] for key, index in primitive["attributes"].items()}
+            order = self.document.values(primitive["indices"]).reshape(-1, 3)
+            corners: dict[str, Any] = {key: self.document.values(index)[order] for key, index in primitive["attributes"].items()}
             found.append({**corners, "material": self.json["materials"][primitive["material"]]})
         return found
 
@@ -86,7 +79,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def surroundings(folder: Path) -> Scene:
-    """With the capture of its ground, by the command; its materials have node groups, which a bake must bear too."""
+    """With the capture of its ground, by the command; its materials have node groups, which a bake must keep."""
     build = built("surroundings.py", folder)
     baked(build("surroundings"), folder / "capture", Receiver("lightmap", "Ground", "lightmap"))
     line = ["mesh", build("surroundings"), "-o", folder / "scene.glb", "--capture", folder / "capture", "--json"]

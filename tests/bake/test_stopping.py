@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from srbf.bake.accumulation import NOTHING, Sum
 from srbf.bake.stopping import Measure, is_enough, measure
-from srbf.bake.sums import NOTHING, Sum
 from srbf.capture import Capture
 
-NOISE = 0.5  # of one sample, on answers between 0 and 1
+NOISE = 0.5  # of one sample, on responses between 0 and 1
 PASSES = (1, 3, 4)
 
 
@@ -39,6 +39,7 @@ def noisy(make_capture: Callable[..., Capture], samples: int) -> tuple[Capture, 
     return make_capture(response, lights=200, validation=12, holdout=0, name=f"capture{samples}"), sums
 
 
+@pytest.mark.slow
 def test_validation_noise_is_not_taken_for_error(make_capture: Callable[..., Capture]) -> None:
     """Of a smooth floor: its cosines are fitted to within 2 %, while the validation images hold noise of a quarter of their rms."""
     capture, sums = noisy(make_capture, 256)
@@ -49,6 +50,7 @@ def test_validation_noise_is_not_taken_for_error(make_capture: Callable[..., Cap
     assert found.relative_rmse < 0.05
 
 
+@pytest.mark.slow
 def test_the_error_falls_with_the_samples(make_capture: Callable[..., Capture]) -> None:
     errors = [measure(*_arguments(make_capture, samples)).relative_rmse for samples in (1, 16)]
     assert errors[1] < 0.6 * errors[0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torture
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks for workers in /proc")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="looks for workers in /proc")]
 TRIALS = 2
 
 

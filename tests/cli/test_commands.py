@@ -1,8 +1,9 @@
-"""The command line as a user has it: every verb, what it prints, and bad input as one line and exit 1."""
+"""The command line as a user has it: every verb, what it prints, and bad input as one line: wrong usage exits 2, failed work 1."""
 
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -31,23 +32,36 @@ def ok(*arguments: object) -> str:
     return done.stdout
 
 
-def refused(*arguments: object) -> str:
+def refused(*arguments: object, status: int = 1) -> str:
     """One line on stderr that starts with srbf:, nothing on stdout, exit 1."""
     done = srbf(*arguments)
     lines = done.stderr.strip().splitlines()
-    assert done.exit_code == 1 and done.stdout == "" and len(lines) == 1 and lines[0].startswith("srbf: "), done
+    assert done.exit_code == status and done.stdout == "" and len(lines) == 1 and lines[0].startswith("srbf: "), (done, done.stderr)
     return lines[0]
 
 
-@pytest.fixture
-def capture(make_capture, plane_positions) -> Capture:
-    return make_capture(lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+def misused(*arguments: object) -> str:
+    """The same of wrong usage, exit 2."""
+    return refused(*arguments, status=2)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray) -> Path:
+    """A folder of a capture and of an asset fitted to it, to be copied."""
+    folder = tmp_path_factory.mktemp("made")
+    write_capture(folder / "capture", lambda d: np.full((10, 14, 3), max(0, d[2])) * [1, 0.5, 0.25], position=plane_positions)
+    ok("fit", folder / "capture", "-o", folder / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
+    return folder
 
 
 @pytest.fixture
-def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 9, "--spread", "mean", "--ridge", 0)
-    return tmp_path / "asset"
+def capture(made: Path, tmp_path: Path) -> Capture:
+    return Capture.open(shutil.copytree(made / "capture", tmp_path / "capture"))
+
+
+@pytest.fixture
+def asset(made: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
 def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
@@ -60,7 +74,16 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert result["holdout"] == opened.manifest["error"]["holdout"]
     assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
-    assert "holdout" in ok("evaluate", asset, capture.folder) and "k" in ok("info", asset)
+    assert "holdout" in ok("evaluate", asset, capture.folder)
+    shown = dict(line.split(maxsplit=1) for line in ok("info", asset).splitlines())
+    assert (shown["method"], shown["k"], shown["width"], shown["height"]) == ("relighting-map", "9", "14", "10")
+
+
+def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {"point_lights": [[0, 0, 1]], "by_distance": []}
+    monkeypatch.setattr("srbf.cli.evaluate.compare_with_point_lights", lambda *_: found)
+    result = json.loads(ok("evaluate", asset, tmp_path / "scene.blend", "--point-reference", 1, "--json"))
+    assert result == {**found, "lamps": [[0, 0, 1]]}  # for one version
 
 
 @pytest.mark.parametrize(
@@ -91,7 +114,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         "--environment",
         tmp_path / "sky.exr",
     ]
-    flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--a0", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
+    flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--reference-distance", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
     ok("relight", asset, "-o", tmp_path / "out.exr", *flags)
     lights = [
         DirectionalLight((-1, 0, 1), (1, 0.5, 0.2)),
@@ -107,6 +130,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
     assert np.abs(np.round(read_image(tmp_path / "out.png") * 255) - picture).max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
@@ -170,8 +194,9 @@ def test_import_to_relight(tmp_path: Path) -> None:
     assert "position" in refused("relight", tmp_path / "asset", "-o", tmp_path / "x.exr", "--point", "0,0,1")
 
 
+@pytest.mark.slow
 def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.report.METHODS", ())
+    monkeypatch.setattr("srbf.report.compared_methods", lambda: ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
     page = tmp_path / "page.html"
@@ -186,9 +211,9 @@ def test_outputs_that_exist_are_refused_unless_forced(asset: Path, capture: Capt
     assert (asset / "asset.json").read_bytes() == before
     ok("fit", capture.folder, "-o", asset, "-k", 4, "--force")
     assert Asset.open(asset).k == 4 and not list(asset.glob("map_05*"))
-    ok("relight", asset, "-o", tmp_path / "a.exr")
-    assert "--force" in refused("relight", asset, "-o", tmp_path / "a.exr")
-    ok("relight", asset, "-o", tmp_path / "a.exr", "--force")
+    ok("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only")
+    assert "--force" in refused("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only")
+    ok("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only", "--force")
 
 
 def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tmp_path: Path) -> None:
@@ -219,28 +244,42 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     ("arguments", "words"),
     [
         (["--directional", "0,0,0"], "direction"),
-        (["--directional", "0,0"], "X,Y,Z"),
-        (["--directional", "a,b,c"], "X,Y,Z"),
-        (["--point", "0,0,1", "--a0", "0"], "a0"),
+        (["--directional", "0,0"], "expected --directional X,Y,Z[,R,G,B], found '0,0'"),
+        (["--directional", "a,b,c"], "--directional X,Y,Z"),
+        (["--point", "0,0,1", "--reference-distance", "0"], "--reference-distance: expected a number above 0, found '0'"),
         (["--spot", "0,0,1,0,0,-1,0.5,0.2"], "inner"),
-        (["--environment", "nowhere.exr"], "nowhere.exr"),
+        (["--exposure", "bright"], "--exposure: expected a number from -100 to 100, found 'bright'"),
+        ([], "expected a light, found none; add --directional, --point, --spot, --environment or --ambient-only"),
+        (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
+        (["--lights", "frames.json", "--point", "0,0,1"], "put all lights into the file"),
     ],
 )
-def test_bad_lights(asset: Path, tmp_path: Path, arguments: list[str], words: str) -> None:
-    assert words in refused("relight", asset, "-o", tmp_path / "x.exr", *arguments)
+def test_bad_lights(tmp_path: Path, arguments: list[str], words: str) -> None:
+    """Wrong usage: no asset is looked at."""
+    assert words in misused("relight", tmp_path / "none", "-o", tmp_path / "x.exr", *arguments)
     assert not (tmp_path / "x.exr").exists()
 
 
+def test_an_environment_map_that_is_not_there(asset: Path, tmp_path: Path) -> None:
+    assert "nowhere.exr" in refused("relight", asset, "-o", tmp_path / "x.exr", "--environment", "nowhere.exr")
+
+
+def test_the_ambient_light_alone_is_asked_for(asset: Path, tmp_path: Path) -> None:
+    ok("relight", asset, "-o", tmp_path / "x.exr", "--ambient-only")
+    np.testing.assert_array_equal(read_image(tmp_path / "x.exr"), methods.relight(Asset.open(asset), []))
+
+
 def test_a_full_or_read_only_target(asset: Path) -> None:
-    assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr")
-    assert "no folder" in refused("relight", asset, "-o", asset / "none" / "x.exr")
-    assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr")
+    assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr", "--ambient-only")
+    assert "no folder" in refused("relight", asset, "-o", asset / "none" / "x.exr", "--ambient-only")
+    assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr", "--ambient-only")
 
 
+@pytest.mark.slow
 def test_gl_missing(asset: Path, tmp_path: Path) -> None:
     code = "import sys; sys.modules['moderngl'] = None; from srbf.cli import app; app()"
     done = subprocess.run(
-        [sys.executable, "-c", code, "relight", str(asset), "-o", str(tmp_path / "x.exr"), "--renderer", "gl"],
+        [sys.executable, "-c", code, "relight", str(asset), "-o", str(tmp_path / "x.exr"), "--renderer", "gl", "--ambient-only"],
         capture_output=True,
         text=True,
     )
@@ -249,14 +288,15 @@ def test_gl_missing(asset: Path, tmp_path: Path) -> None:
 
 def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
     assert ok("--version").startswith("srbf 0.")
-    for arguments in (["fit"], ["nonsense"], ["relight", "x"], ["fit", "x", "-o", "y", "--encoding", "jpeg"]):
-        assert srbf(*arguments).exit_code == 2
-    assert "--size" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "view", "--size", "large")
-    assert "receiver" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "mirror")
+    for arguments in (["fit"], ["nonsense"], ["--nonsense"], ["relight", "x"], ["fit", "x", "-o", "y", "--encoding", "jpeg"]):
+        misused(*arguments)
+    assert "Did you mean 'info'" in misused("inof") and "--output" in misused("fit", "x", "--outptu", "y")
+    assert "expected CAPTURE, found none; see " in misused("fit")
     assert "x.blend" in refused("bake", tmp_path / "x.blend", "-o", tmp_path / "y", "--receiver", "view")
     assert not (tmp_path / "y").exists()
 
 
+@pytest.mark.slow
 def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run([sys.executable, "-m", "srbf", *map(str, arguments)], capture_output=True, text=True)
@@ -268,6 +308,7 @@ def test_a_real_process(capture: Capture, tmp_path: Path) -> None:
     assert json.loads(run("info", tmp_path / "asset", "--json").stdout)["k"] == 5
 
 
+@pytest.mark.slow
 def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     example = Path(__file__).parents[2] / "examples" / "relighting_map.py"
     done = subprocess.run([sys.executable, str(example), str(capture.folder), str(tmp_path / "x.png")], capture_output=True, text=True)
@@ -275,10 +316,12 @@ def test_the_example_runs(capture: Capture, tmp_path: Path) -> None:
     assert read_image(tmp_path / "x.png").max() > 0.3
 
 
+@pytest.mark.slow
 def test_the_library_needs_numpy_and_scipy_alone() -> None:
     code = (
         "import sys, pkgutil, importlib\n"
-        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL'):\n"
+        "for name in ('OpenImageIO', 'moderngl', 'bpy', 'typer', 'rich', 'jsonschema', 'jaxtyping', 'matplotlib', 'filelock', 'PIL',\n"
+        "             'pygltflib'):\n"
         "    sys.modules[name] = None\n"
         "import srbf\n"
         "names = [m.name for m in pkgutil.walk_packages(srbf.__path__, 'srbf.') if '.cli' not in m.name and '__main__' not in m.name]\n"
@@ -314,6 +357,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
     assert set(json.loads(ok("evaluate", tmp_path / "asset", capture.folder, "--json"))) == {"train", "holdout", "lights"}
 
 
+@pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
     assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
@@ -343,7 +387,7 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
         (["--method", "auto", "--budget", 3], "at least 4"),
         (["--method", "auto", "--budget", 8, "--psnr", 30], "found both"),
         (["--method", "auto", "--psnr", "nan"], "psnr"),
-        (["--basis", "ptm", "-k", 7], "-k 6"),
+        (["--basis", "ptm", "-k", 7], "-k of 6"),
         (["--basis", "spherical-harmonics", "-k", 10], "found 10"),
         (["--ridge", "some"], "--ridge"),
         (["--ridge", "-1"], "ridge"),
@@ -351,6 +395,6 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
         (["-k", 0], "-k 0"),
     ],
 )
-def test_flags_that_do_not_go_together(capture: Capture, tmp_path: Path, flags: list, words: str) -> None:
-    assert words in refused("fit", capture.folder, "-o", tmp_path / "asset", *flags)
+def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
+    assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

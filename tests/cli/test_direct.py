@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from closed_forms import glb, quad
+from made_captures import write_capture
 from test_commands import ok, refused, srbf
 
 from srbf.asset import Asset
@@ -16,31 +18,40 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.lights import DirectionalLight
-from srbf.methods.relighting_map import relight
+from srbf.methods import relight
 
 BOUNCE = np.array([0.2, 0.1, 0.05])
 
 
-@pytest.fixture
-def capture(make_capture, plane_positions: np.ndarray) -> Capture:
-    """An indirect capture: what bounces in `lights/`, the cosine in `direct/`, and the plane in scene.glb."""
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray) -> Path:
+    """A folder of an indirect capture and of an asset fitted to it, to be copied.
+
+    What bounces is in `lights/`, the cosine in `direct/`, and the plane in scene.glb.
+    """
+    folder = tmp_path_factory.mktemp("made")
     up = np.zeros_like(plane_positions)
     up[..., 2] = 1
-    made = make_capture(lambda d: np.full((10, 14, 3), d[2]) * BOUNCE, position=plane_positions, normal=up)
-    (made.folder / "direct").mkdir()
-    for light in made.manifest["lights"]:
+    capture = write_capture(folder / "capture", lambda d: np.full((10, 14, 3), d[2]) * BOUNCE, position=plane_positions, normal=up)
+    (capture.folder / "direct").mkdir()
+    for light in capture.manifest["lights"]:
         light["direct"] = light["file"].replace("lights", "direct")
-        write_image(made.folder / light["direct"], np.full((10, 14, 3), light["direction"][2], np.float32), "float")
-    (made.folder / "scene.glb").write_bytes(glb(quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])))
-    made.manifest.update(transport="indirect", scene="scene.glb", direct={"sun_angle": 0.0, "footprint": 0.5})
-    files.write_json(made.folder / "capture.json", made.manifest)
-    return Capture.open(made.folder)
+        write_image(capture.folder / light["direct"], np.full((10, 14, 3), light["direction"][2], np.float32), "float")
+    (capture.folder / "scene.glb").write_bytes(glb(quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])))
+    capture.manifest.update(transport="indirect", scene="scene.glb", direct={"sun_angle": 0.0, "footprint": 0.5})
+    files.write_json(capture.folder / "capture.json", capture.manifest)
+    ok("fit", capture.folder, "-o", folder / "asset", "-k", 16, "--spread", "mean", "--ridge", 0)
+    return folder
 
 
 @pytest.fixture
-def asset(capture: Capture, tmp_path: Path) -> Path:
-    ok("fit", capture.folder, "-o", tmp_path / "asset", "-k", 16, "--spread", "mean", "--ridge", 0)
-    return tmp_path / "asset"
+def capture(made: Path, tmp_path: Path) -> Capture:
+    return Capture.open(shutil.copytree(made / "capture", tmp_path / "capture"))
+
+
+@pytest.fixture
+def asset(made: Path, tmp_path: Path) -> Path:
+    return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
 def test_an_indirect_asset_carries_its_scene(capture: Capture, asset: Path) -> None:
@@ -53,6 +64,7 @@ def test_an_indirect_asset_carries_its_scene(capture: Capture, asset: Path) -> N
     assert "damaged" in refused("relight", asset, "-o", asset.parent / "x.exr", "--directional", "0,0,1")
 
 
+@pytest.mark.slow
 def test_a_budget_is_found_for_indirect_light(capture: Capture, tmp_path: Path) -> None:
     pytest.importorskip("sklearn")
     ok("fit", capture.folder, "-o", tmp_path / "small", "--method", "auto", "--budget", 8)
@@ -92,6 +104,7 @@ def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
     assert done.exit_code == 0 and "environment's direct light is not added" in done.stderr
 
 
+@pytest.mark.slow
 def test_evaluate_compares_with_what_was_asked_for(asset: Path, capture: Capture, make_capture, plane_positions: np.ndarray) -> None:
     alone = json.loads(ok("evaluate", asset, capture.folder, "--json"))["holdout"]
     highest = capture.directions(capture.indices("train"))[:, 2].max()
@@ -109,7 +122,7 @@ def test_a_combined_asset_takes_no_direct_light(capture: Capture, make_capture, 
     whole = make_capture(lambda d: np.full((10, 14, 3), d[2]), name="combined")
     ok("fit", whole.folder, "-o", tmp_path / "combined asset", "-k", 9)
     combined = tmp_path / "combined asset"
-    for command in (("relight", combined, "-o", tmp_path / "x.exr"), ("evaluate", combined, whole.folder)):
+    for command in (("relight", combined, "-o", tmp_path / "x.exr", "--ambient-only"), ("evaluate", combined, whole.folder)):
         assert "holds the direct light already" in refused(*command, "--direct", "ray")
 
 

@@ -49,6 +49,7 @@ ELSEWHERE = {
     "dask worker *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
     "srbf bake --dask *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
     "srbf fit --dask *": f"{FARM}::test_dask_workers_fit_tiles",
+    "mkdocs build *": "tests/packaging/test_docs_site.py::test_the_site_builds_without_a_warning",
     "openjd run *": f"{FARM}::test_an_openjd_job_bakes_the_same_bits_and_fits",
     "python -m blender_bake *": "tests/bake/test_end_to_end.py::test_scene_to_image",  # as every bake does
     "python -m scripts.gallery *": "tests/test_gallery.py::test_it_goes_on_after_a_kill",

@@ -7,10 +7,10 @@ import pytest
 
 from srbf.basis.gaussian import weight
 from srbf.capture import STRIP, Capture
-from srbf.encode.cross_validation import HeldOut, bands
 from srbf.encode.model_selection import TexelSample, choose
 from srbf.encode.weighted_rows import LightSpace, solid_angles
 from srbf.errors import InputError
+from srbf.light_domain import Directions
 from srbf.sphere import normalize, point_set, random_directions
 
 TRAIN, VALIDATION = 40, 15
@@ -27,11 +27,11 @@ def sample(noise: float, validated: bool, spread: float = 0.5, seed: int = 0) ->
     directions = directions if validated else directions[:TRAIN]
     responses = np.einsum("lk,nkc->nlc", weight(directions @ centers.T, spread), rng.normal(size=(30, 12, 3)))
     responses += noise * rng.normal(size=responses.shape)
-    return TexelSample(np.arange(30), responses.astype(np.float32), directions, TRAIN), centers
+    return TexelSample(np.arange(30), responses.astype(np.float32), directions, TRAIN, Directions("hemisphere")), centers
 
 
 def candidates(of: TexelSample, centers: np.ndarray) -> list[tuple[float, np.ndarray]]:
-    return [(s, weight(of.directions @ centers.T, s)) for s in SPREADS]
+    return [(s, weight(of.coordinates @ centers.T, s)) for s in SPREADS]
 
 
 def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
@@ -42,9 +42,9 @@ def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
 @pytest.mark.parametrize("noise", [0.0, 0.3, 2.0])
 def test_choice_equals_the_slow_twin(validated: bool, noise: float) -> None:
     given, centers = sample(noise, validated)
-    values = given.responses.transpose(1, 0, 2).reshape(len(given.directions), -1).astype(np.float64)
-    groups = [group for array in bands(given.directions[:TRAIN]) for group in array]
-    held_out = HeldOut.of(given.gram, given.directions, TRAIN)
+    values = given.responses.transpose(1, 0, 2).reshape(len(given.coordinates), -1).astype(np.float64)
+    groups = [group for array in Directions.left_out_groups(given.coordinates[:TRAIN]) for group in array]
+    held_out = given.held_out()
     scores: dict[tuple[float, float], tuple[float, float]] = {}
     for spread, weights in candidates(given, centers):
         for ridge in RIDGES:

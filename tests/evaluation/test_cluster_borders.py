@@ -29,7 +29,7 @@ def relit_as(monkeypatch: pytest.MonkeyPatch, image: np.ndarray) -> None:
     """Let every asset give one image (H, W) under every light."""
     gray = np.repeat(image[..., None], 3, axis=2).astype(np.float32)
     monkeypatch.setattr(
-        "srbf.evaluation.cluster_borders.directional_responses", lambda asset, directions: np.repeat(gray[None], len(directions), axis=0)
+        "srbf.evaluation.cluster_borders.responses", lambda asset, coordinates: np.repeat(gray[None], len(coordinates), axis=0)
     )
 
 
@@ -68,7 +68,7 @@ def test_a_clustered_asset_is_measured_at_its_own_borders(make_capture) -> None:
     """Two materials: an exact fit of each has neither error nor jump, though the picture changes at the border."""
     albedo = np.where(HALVES[..., None] == 0, [0.8, 0.2, 0.1], [0.1, 0.3, 0.9])
     capture = make_capture(lambda direction: albedo * max(direction[2], 0), lights=60, holdout=6)
-    found = cluster_borders(ClusteredEigenMap(clusters=CLUSTERS, scalars=4, encoding="float").encode(capture), capture)
+    found = cluster_borders(ClusteredEigenMap(clusters=CLUSTERS, components=4, encoding="float").encode(capture), capture)
     assert found.contrast_at_border > 0.1
     assert max(found.error_at_border, found.jump_at_border) < 0.1 * found.contrast_at_border
 

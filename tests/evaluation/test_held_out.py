@@ -9,13 +9,14 @@ from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.flip import Flip
 from srbf.evaluation.held_out import EDGE_SHARE, MIN_COLOR, SUMS, held_out_error, negative, shadow_edges, sums_of_lights
 
-RNG = np.random.default_rng(3)
 COVERED = np.ones((12, 16), bool)
 
 
 def stacks(noise: float, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
-    true = RNG.uniform(0.2, 1, (count, 12, 16, 3)).astype(np.float32)
-    return true, true + RNG.normal(0, noise, true.shape).astype(np.float32)
+    """Pictures, and the same with noise."""
+    rng = np.random.default_rng(3)
+    true = rng.uniform(0.2, 1, (count, 12, 16, 3)).astype(np.float32)
+    return true, true + rng.normal(0, noise, true.shape).astype(np.float32)
 
 
 def test_one_light_is_the_pictures_themselves() -> None:

@@ -20,6 +20,7 @@ def behind_walls(sun_angle: float, directions: np.ndarray, texels: int = 400) ->
     return np.maximum(0, directions @ normals.T) * visible
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("domain", "lights"), [("hemisphere", 150), ("sphere", 400)])
 def test_hard_suns_are_jumped_and_soft_ones_not(make_capture, domain: str, lights: int) -> None:
     directions = point_set("hammersley", lights, domain)

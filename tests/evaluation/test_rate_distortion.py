@@ -13,7 +13,6 @@ from srbf.evaluation.rate_distortion import (
     ALL,
     IMAGE_BYTES,
     NEAREST,
-    components_of,
     contest,
     error_of,
     nearest_image,
@@ -21,7 +20,8 @@ from srbf.evaluation.rate_distortion import (
     score_asset,
     spectrum,
 )
-from srbf.methods import directional_responses
+from srbf.methods import method_of
+from srbf.methods import responses as asset_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -50,22 +50,23 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
     asset = method.encode(capture)
     whole = evaluate(asset, capture)["holdout"]
     texels = np.arange(WIDTH, HEIGHT * WIDTH)  # the first row is not covered
-    sample = capture.kept(texels)
+    sample = capture.load(texels)
     kept = score_asset(asset.at(texels), sample, "holdout", whole["peak"])
     (fitted, *_) = contest(sample, [method], "holdout", whole["peak"])
     for score in (kept, fitted):
         assert score.psnr == pytest.approx(whole["psnr"], abs=0.01)  # sums in another order, float32
         assert score.relative_rmse == pytest.approx(whole["relative_rmse"], rel=1e-3)
         assert (score.family, score.name, score.bytes_per_texel) == ("relighting map", "12 maps, float", 12 * 16)
-    assert components_of(asset) == 36
+    assert method_of(asset).numbers_per_texel(asset) == 36
 
 
+@pytest.mark.slow
 def test_every_family_is_told_apart(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     methods = [
         RelightingMap(k=9, basis="spherical-harmonics"),
-        EigenMap(scalars=8),
-        ClusteredEigenMap(clusters=3, scalars=4, encoding="uint8"),
+        EigenMap(components=8),
+        ClusteredEigenMap(clusters=3, components=4, encoding="uint8"),
     ]
     harmonics, eigen, clustered, *_ = contest(sample, methods, "holdout", 1.0)
     assert (harmonics.family, harmonics.name, harmonics.bytes_per_texel) == ("spherical harmonics", "9 maps", 72)
@@ -76,7 +77,7 @@ def test_every_family_is_told_apart(capture: Capture) -> None:
 
 
 def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     nearest, every = contest(sample, [], "holdout", 1.0)
     found = nearest_image(sample, np.arange(sample.width))
     train = sample.indices("train")
@@ -89,7 +90,7 @@ def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
 
 
 def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     train = sample.indices("train")
     responses = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)
     values = spectrum(sample)
@@ -99,9 +100,9 @@ def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Captu
     bound = planes_bound(values, responses.size, 1.0)
     assert (np.diff(bound) >= 0).all()
     assert bound[0] == pytest.approx(-10 * np.log10(((responses - responses.mean(axis=0)) ** 2).mean()), abs=0.01)
-    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(scalars=3, encoding="float")):
+    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(components=3, encoding="float")):
         asset = method.encode(sample)
-        fitted = np.concatenate(list(directional_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
+        fitted = np.concatenate(list(asset_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
         reached = -10 * np.log10(((fitted - responses) ** 2).mean())
-        assert reached <= bound[components_of(asset)] + 0.01
+        assert reached <= bound[method_of(asset).numbers_per_texel(asset)] + 0.01
     assert reached > bound[1]  # the eigen map comes near it

@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 
 from srbf.errors import InputError
-from srbf.evaluation.temporal_stability import (
-    MIN_ELEVATION,
-    compare,
-    dense_reference,
-    frames,
-    great_circles,
-    lambert_sweep,
-    sampled_texels,
-    sweep,
-)
+from srbf.evaluation.temporal_stability import compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
+from srbf.light_domain.directions import MIN_ELEVATION
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap
@@ -132,6 +124,7 @@ def test_a_black_reference_is_refused() -> None:
         compare(PATH, curve(1 + PATH[..., 2]), curve(np.zeros(100)))
 
 
+@pytest.mark.slow
 def test_twenty_five_gaussians_of_the_hemisphere_pulse_and_those_of_the_sphere_hold_the_cosine() -> None:
     lights = point_set("hammersley", 400, "hemisphere")
     paper = lambert_sweep(RelightingMap(k=25, spread="mean", ridge=0).encode, lights)

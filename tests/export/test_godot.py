@@ -13,11 +13,13 @@ import pytest
 
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
-from srbf.export.godot import METHODS, method_include, translated, write
+from srbf.export.godot import method_include, translated, write
 from srbf.export.settings import Settings
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods import relight
+from srbf.registry import all_methods
 
+METHODS = {method.name: method.stem() for method in all_methods()}
 LIGHTS = (DirectionalLight((0.3, -0.4, 0.8), (1.0, 0.5, 0.2)), PointLight((0.3, 0.2, 1.1), (0.4, 0.9, 0.7)))
 Made = Callable[..., Asset]
 
@@ -98,7 +100,7 @@ def test_a_rule_takes_what_godot_lacks_and_no_more(glsl: str, godot: str) -> Non
     "stage", ["void main() {}\n", "in vec2 uv;\n", "layout(location = 0) out vec4 c;\n", "vec4 f() { return gl_FragCoord; }\n"]
 )
 def test_a_stage_is_refused(stage: str) -> None:
-    with pytest.raises(ShaderError, match="expected functions alone"):
+    with pytest.raises(ShaderError, match="expected only functions"):
         translated(stage)
 
 

@@ -135,6 +135,7 @@ def test_a_stop_reaches_the_host_where_blender_ignores_ctrl_c(tmp_path, monkeypa
     assert job.reader.words[-1] == "srbf: stopped"
 
 
+@pytest.mark.slow
 def test_a_job_that_fails_says_why(tmp_path) -> None:
     job = ended(process.Job("Fit", process.host_command(["fit", str(tmp_path / "none"), "-o", str(tmp_path / "asset")]), tmp_path / "log"))
     assert job.status == 1

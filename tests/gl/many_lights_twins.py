@@ -14,10 +14,10 @@ from srbf.basis import gaussian, octahedral_table
 from srbf.gl.coefficient_maps import projected_rows
 from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import packed_point_lights, padded, point_light_uniforms
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples, light_vectors
 from srbf.methods import coefficient_maps as coefficient_maps
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import basis_weights, linear_response, projected_weights
+from srbf.methods import linear_response, projected_weights
+from srbf.methods.relighting_map import basis_weights
 from srbf.sphere import octahedral_encode
 
 SUNS: list[Light] = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
@@ -333,14 +333,14 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
         images={"gaussians": np.pad(gaussians, ((0, 0), (0, 1)))[None], "coefficients": rows},
     )[:, :3]
     sizes = np.abs(functions.coefficients).sum(axis=1) * gaussians.max()
-    assert (np.abs(found - coefficient_maps.projected_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
+    assert (np.abs(found - projected_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
 
 
 def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
     """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `lamps`."""
-    weights = coefficient_maps.projected_weights(asset, SUNS)
-    bias = coefficient_maps.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
-    planes = np.abs(coefficient_maps.planes_of(asset.coefficients(), asset.scalars)[:, 0]) + 2 * bias
+    weights = projected_weights(asset, SUNS)
+    bias = coefficient_maps.components_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.components)[:, 0]
+    planes = np.abs(coefficient_maps.components_of(asset.coefficients(), asset.components)[:, 0]) + 2 * bias
     terms = np.concatenate([np.ones((1, M)), planes])  # (S + 1, M)
     function = coefficient_maps.first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
     bound = np.einsum("fn,nfc->nc", terms, np.abs(weights[function]))
@@ -360,7 +360,7 @@ def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any
             "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias, "pointLights": packed_point_lights(point_lights, PLACES)},
-        "defines": {"SRBF_COMPONENTS": asset.scalars, "SRBF_POINT_LIGHTS": PLACES},
+        "defines": {"SRBF_COMPONENTS": asset.components, "SRBF_POINT_LIGHTS": PLACES},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS]; uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS]; "
         "uniform int pointLightCount;",
         "uniforms": COUNT,
@@ -369,7 +369,7 @@ def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any
 
 
 def _equals_planes(found: np.ndarray, asset: Asset, lights: list[Any], bound: np.ndarray) -> None:
-    assert (np.abs(found[:, :3] - coefficient_maps.linear_response(asset, lights)[0]) <= bound).all()
+    assert (np.abs(found[:, :3] - linear_response(asset, lights)[0]) <= bound).all()
     assert (np.abs(found[:, :3]) > bound).any()
 
 
@@ -408,7 +408,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, None, "uint8", 1, M)
     uploads, bound = _planes(asset, [])
-    rows = projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS))[0]
+    rows = projected_rows(asset, projected_weights(asset, SUNS))[0]
     offset = ", ".join(map(repr, rows[0, :3].tolist()))
     found = evaluate(
         "combine/components_projected.glsl",
@@ -432,7 +432,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
         vec4(asset.tables["cluster_index"][0]),
         images={
             "planes": uploads["images"]["planes"],
-            "weights": projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS)),
+            "weights": projected_rows(asset, projected_weights(asset, SUNS)),
         },
         defines={"SRBF_COMPONENTS": K},
     )

@@ -88,7 +88,7 @@ def draw(context: Any, asset: Asset, corners: np.ndarray = CORNERS) -> tuple[np.
     point_lights = [light for light in inside if isinstance(light, PointLight)]
     weights = projected_weights(asset, LIGHTS)
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
-    defines = {"SRBF_POINT_LIGHTS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars})
+    defines = {"SRBF_POINT_LIGHTS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.components})
     with context, ExitStack() as resources:
         textures = AssetTextures(context, asset, Limits.of(context), resources)
         program = compile_program(context, resolve("stages/lightmap.vert"), telling(resolve(f"stages/{stage}", defines=defines)))

@@ -13,9 +13,9 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import projected_weights, receiver_weights
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
+from srbf.methods import projected_weights
+from srbf.methods.relighting_map import receiver_weights
 from srbf.relighting.relighter import Relighter, relight
 
 FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times color and attenuation)
@@ -298,7 +298,7 @@ def test_harmonics_relight_far_lights_and_refuse_point_lights(context: Any, make
 
 
 @pytest.mark.parametrize(
-    ("limit", "text"), [({"array_layers": 5}, "at most 5 maps .* found 7"), ({"texture_size": 8}, "at most 8 texels a side")]
+    ("limit", "text"), [({"array_layers": 5}, "at most 5 layers .* found 7"), ({"texture_size": 8}, "at most 8 texels a side")]
 )
 def test_an_asset_too_large_for_the_gpu_is_refused(
     context: Any, make_asset: Callable[..., Asset], monkeypatch: Any, limit: dict[str, int], text: str
@@ -316,7 +316,7 @@ def test_wrong_settings_are_refused(context: Any, make_asset: Callable[..., Asse
     with Relighter(asset, context=context) as relighter, pytest.raises(InputError, match="1 to 8 texture units"):
         relighter.relight([], multipass=True, units=9)
     asset.manifest["method"] = "hologram"
-    with pytest.raises(InputError, match="relighting-map.*found hologram"):
+    with pytest.raises(InputError, match="relighting-map.*found 'hologram'"):
         Relighter(asset, context=context)
 
 

@@ -78,6 +78,7 @@ def vertex_of(fragment: str) -> str:
     return "shadow.vert" if "shadow" in fragment else "lightmap.vert" if "lightmap" in fragment else "fullscreen.vert"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)")
 @pytest.mark.parametrize("version", VALIDATOR)
 @pytest.mark.parametrize("name", STAGES)

@@ -138,6 +138,7 @@ WORDS = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @given(
     data=st.one_of(
         st.binary(max_size=80), st.text(max_size=60).map(str.encode), st.lists(WORDS, max_size=30).map(lambda w: " ".join(w).encode())

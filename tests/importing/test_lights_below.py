@@ -51,6 +51,7 @@ def imported(folder: Path, facing: str, directions: np.ndarray) -> Result:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("facing", ["down", "around"])
 @pytest.mark.parametrize("flags", [["-k", 25], ["--method", "eigen-map"]])
 def test_all_below_relight_as_they_were_lit(tmp_path: Path, facing: str, flags: list) -> None:
@@ -71,6 +72,7 @@ def test_all_below_relight_as_they_were_lit(tmp_path: Path, facing: str, flags: 
     assert above.exit_code == 0 and above.stderr.count("light 0 is at 90 degrees of elevation, far from all captured lights") == 1
 
 
+@pytest.mark.slow
 def test_some_below_are_counted_and_kept(tmp_path: Path) -> None:
     directions = fibonacci(120)
     directions = directions[directions[:, 2] > -0.3]

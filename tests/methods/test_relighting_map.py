@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 
 from srbf.asset import Asset
 from srbf.basis.gaussian import GaussianBasis, lookup
@@ -14,8 +15,8 @@ from srbf.encode.quantization import quantize
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
-from srbf.methods.receivers import outside_domain
-from srbf.methods.relighting_map import RelightingMap, linear_response, projected_weights, relight
+from srbf.methods import linear_response, outside_domain, projected_weights, relight
+from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
@@ -53,16 +54,11 @@ def test_fit_equals_the_slow_twin(make_capture) -> None:
             np.testing.assert_allclose(asset.coefficients()[:, row, column], expected, atol=1e-4)
 
 
-PLANES: list[Asset] = []  # the fit is the same for all tests that read it
-
-
-@pytest.fixture
-def plane(make_capture, plane_positions) -> Asset:
-    if PLANES:
-        return PLANES[0]
-    capture = make_capture(lambda d: np.broadcast_to(max(0.0, d[2]), (10, 14, 3)), lights=400, position=plane_positions)
-    PLANES.append(RelightingMap(k=60, encoding="float").encode(capture))
-    return PLANES[0]
+@pytest.fixture(scope="module")
+def plane(tmp_path_factory: pytest.TempPathFactory, plane_positions: np.ndarray) -> Asset:
+    response = lambda d: np.broadcast_to(max(0.0, d[2]), (10, 14, 3))  # noqa: E731
+    capture = write_capture(tmp_path_factory.mktemp("plane") / "capture", response, lights=200, position=plane_positions)
+    return RelightingMap(k=60, encoding="float").encode(capture)
 
 
 FIT = 0.02  # of a Lambert cosine by 60 Gaussians away from the horizon
@@ -148,16 +144,29 @@ def test_past_half_range_is_scaled_and_said() -> None:
 
 
 def test_weights_read_the_assets_own_table(plane: Asset) -> None:
-    direction = np.array([0.6, 0, 0.8])
-    expected = np.einsum("khwc,k->hwc", plane.coefficients(), lookup(plane.table, plane.basis.centers @ direction))
-    got = linear_response(plane, [DirectionalLight(tuple(direction))])
-    np.testing.assert_allclose(got, expected, atol=1e-5)
-    np.testing.assert_allclose(lookup(plane.table, plane.basis.centers @ direction), plane.basis.evaluate(direction[None])[0], atol=TABLE)
+    """With a table of (1 + cos) / 2, opposite lights give the sum of all maps together, and their difference is linear in the direction."""
+    ramp = replace(plane, tables={**plane.tables, "r_table": np.linspace(0, 1, 65, dtype=np.float32)})
+    ahead, behind = (
+        np.stack([linear_response(ramp, [DirectionalLight(tuple(sign * axis))]) for axis in (*np.eye(3), np.array([0.48, 0.36, 0.8]))])
+        for sign in (1.0, -1.0)
+    )
+    coefficients = plane.coefficients()
+    atol = 60 * FLOAT32 * np.abs(coefficients).max()
+    np.testing.assert_allclose(ahead + behind, np.broadcast_to(coefficients.sum(axis=0), ahead.shape), atol=atol)
+    x, y, z, slanted = ahead - behind
+    np.testing.assert_allclose(slanted, 0.48 * x + 0.36 * y + 0.8 * z, atol=atol)
+    assert np.abs(slanted).max() > 100 * atol
+
+
+def test_the_table_is_the_gaussian(plane: Asset) -> None:
+    cosine = np.linspace(-1, 1, 999)
+    expected = np.exp(-(np.arccos(cosine) ** 2) / (2 * plane.basis.spread**2))
+    np.testing.assert_allclose(lookup(plane.table, cosine), expected, atol=TABLE)
 
 
 def test_too_few_lights(make_capture) -> None:
     capture = make_capture(lambert((3, 3)), lights=10)
-    with pytest.raises(InputError, match="10 lights for -k 25"):
+    with pytest.raises(InputError, match="10 lights for `k=25`"):
         RelightingMap(k=25, ridge=0).encode(capture)
     assert RelightingMap(k=25).encode(capture).k == 25
 

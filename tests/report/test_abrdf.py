@@ -13,7 +13,7 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report.abrdf import (
     block_means,
@@ -138,6 +138,7 @@ def test_blocks_average_their_covered_receivers(grid: tuple[int, int]) -> None:
             assert np.allclose(means[i, j], expected, atol=SINGLE)
 
 
+@pytest.mark.slow
 def test_a_tile_without_receivers_is_nan_before_and_after(lambert: Capture) -> None:
     coverage = np.ones((HEIGHT, WIDTH), np.float32)
     coverage[:3, :3] = 0
@@ -155,13 +156,14 @@ def test_rebinning_does_not_depend_on_the_blocks_it_is_read_in(lambert: Capture,
     assert np.array_equal(rebin(lambert, range(LIGHTS), tiles), whole)
 
 
+@pytest.mark.slow
 def test_fitted_tiles_are_what_relighting_gives(lambert: Capture) -> None:
     asset = RelightingMap(k=16).encode(lambert)
     directions = tile_directions(7, "equal-area")
     chosen = [0, 20, HEIGHT * WIDTH - 1]
     tiles = fitted_tiles(asset, single_receivers(chosen, HEIGHT * WIDTH), directions)
     inside = np.isfinite(directions[..., 0])
-    relit = directional_responses(asset, directions[inside]).reshape(inside.sum(), -1, 3)[:, chosen]
+    relit = asset_responses(asset, directions[inside]).reshape(inside.sum(), -1, 3)[:, chosen]
     magnitude = np.abs(asset.coefficients()).sum(axis=0).max()  # bounds sum |c R|, since R <= 1
     assert np.abs(tiles[:, inside] - relit.transpose(1, 0, 2)).max() < SINGLE * magnitude
     assert np.isnan(tiles[:, ~inside]).all()

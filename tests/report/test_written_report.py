@@ -32,7 +32,7 @@ POINT_LIGHTS = {"point_light.png", "point_strip.png", "spot_strip.png"}
 MakeCapture = Callable[..., Capture]
 PAGES = {"report.md", "index.html"}
 BYTE = 1 / 255
-COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(scalars=4))
+COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(components=4))
 MAX_ANIMATION_BYTES = 2 << 20
 
 
@@ -77,6 +77,7 @@ def assert_shows_something(path: Path) -> None:
     assert pixels.std() > 0.02, f"{path.name} is nearly constant"
 
 
+@pytest.mark.slow
 def test_a_report_leaves_every_file(report: Path) -> None:
     found = {path.name for path in report.iterdir()}
     assert found >= ALWAYS | POINT_LIGHTS | PAGES
@@ -85,6 +86,7 @@ def test_a_report_leaves_every_file(report: Path) -> None:
         assert_shows_something(report / name)
 
 
+@pytest.mark.slow
 def test_the_animation_moves_and_is_small(report: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     path = next(report.glob("animation.*"))
@@ -117,12 +119,14 @@ def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report:
             assert fact in text
 
 
+@pytest.mark.slow
 def test_equal_inputs_give_equal_files(full: Case, report: Path, tmp_path: Path) -> None:
     full.write(tmp_path, timings={"fit": 1.25})
     for path in sorted(report.iterdir()):
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
 
+@pytest.mark.slow
 def test_holes_are_gray_and_a_sphere_has_two_discs(holed: Case, tmp_path: Path) -> None:
     holed.write(tmp_path)
     for name in ALWAYS | POINT_LIGHTS:
@@ -134,6 +138,7 @@ def test_holes_are_gray_and_a_sphere_has_two_discs(holed: Case, tmp_path: Path) 
     assert height > width  # two rows of discs
 
 
+@pytest.mark.slow
 def test_without_holdout_lights_the_report_says_what_it_compares(make_capture: MakeCapture, tmp_path: Path) -> None:
     bare = fitted(make_capture(size=(12, 16), train=30, validation=0, holdout=0, geometry=False), k=4)
     (tmp_path / "point_strip.png").write_bytes(b"of an earlier report")
@@ -214,6 +219,7 @@ def test_display_values() -> None:
     assert difference_gain(np.full(9, 0.2), 1.0) == 4 and difference_gain(np.zeros(9), 1.0) == 64
 
 
+@pytest.mark.slow
 def test_the_pages_numbers_are_the_evaluations(full: Case, report: Path) -> None:
     html = (report / "index.html").read_text()
     for role in ("train", "validation", "holdout"):
@@ -225,6 +231,7 @@ def test_the_pages_numbers_are_the_evaluations(full: Case, report: Path) -> None
     assert f">{full.evaluation['holdout']['psnr']:.2f} dB<" in one  # every held-out light alone: the same mean by another way
 
 
+@pytest.mark.slow
 def test_the_curve_of_the_samples_is_shown_where_the_bake_chose_them(full: Case, tmp_path: Path) -> None:
     curve = [{"samples": n, "relative_rmse": e, "noise": 0.1} for n, e in ((1, 0.31), (2, 0.25), (4, 0.248))]
     manifest = {**full.capture.manifest, "source": {"validation_curve": curve}}

@@ -10,7 +10,7 @@ from closed_forms import TURN, flat_normals
 from web_assets import complete
 
 from srbf.asset import Asset
-from srbf.export.glb import Document
+from srbf.io.glb import Glb
 
 EYE = np.array([0.3, -4.0, 1.2])
 FORWARD = np.array([-0.05, 1.0, -0.15]) / np.linalg.norm([-0.05, 1.0, -0.15])
@@ -41,14 +41,14 @@ def project(place: np.ndarray) -> np.ndarray:
 
 def scene_glb(*things: tuple[str, np.ndarray, dict[str, Any]], uv: tuple[str, np.ndarray] | None = None) -> bytes:
     """A .glb of things (name, triangles (T, 3, 3) in Blender's world, glTF material), a node each; `uv`: of one thing, a corner each."""
-    document = Document()
+    document = Glb({"asset": {"version": "2.0"}})
     nodes = []
     for name, corners, material in things:
         points = np.ascontiguousarray(corners.reshape(-1, 3), np.float32)
-        attributes = {"POSITION": document.accessor(points, bounds=True)}
-        attributes["NORMAL"] = document.accessor(np.ascontiguousarray(flat_normals(corners).reshape(-1, 3)))
+        attributes = {"POSITION": document.add_accessor(points, bounds=True)}
+        attributes["NORMAL"] = document.add_accessor(np.ascontiguousarray(flat_normals(corners).reshape(-1, 3)))
         if uv and uv[0] == name:
-            attributes["TEXCOORD_0"] = document.accessor(np.ascontiguousarray(uv[1], np.float32))
+            attributes["TEXCOORD_0"] = document.add_accessor(np.ascontiguousarray(uv[1], np.float32))
         mesh = document.add("meshes", {"primitives": [{"attributes": attributes, "material": document.add("materials", material)}]})
         nodes.append(document.add("nodes", {"name": name, "mesh": mesh}))
     root = document.add("nodes", {"rotation": TURN, "children": nodes})

@@ -23,7 +23,7 @@ def covered(mapped: Lightmap) -> np.ndarray:
 
 @pytest.mark.parametrize("mapped", [True, False], ids=["with coordinates", "without"])
 @pytest.mark.parametrize("faces", [(12, 6), (24, 12), (64, 32)])
-@pytest.mark.parametrize("size", [48, 96])
+@pytest.mark.parametrize("size", [48, pytest.param(96, marks=pytest.mark.slow)])
 def test_a_flat_ball_alone_has_the_cosine_of_its_faces(faces: tuple[int, int], size: int, mapped: bool) -> None:
     made = lightmap(sphere, *faces, size, smooth=False, mapped=mapped)
     for sun, found in zip(SUNS, RayTracer(made.receivers).directional(SUNS), strict=True):
@@ -32,7 +32,7 @@ def test_a_flat_ball_alone_has_the_cosine_of_its_faces(faces: tuple[int, int], s
 
 
 @pytest.mark.parametrize("faces", [(24, 12), (64, 32)])
-@pytest.mark.parametrize("size", [48, 96])
+@pytest.mark.parametrize("size", [48, pytest.param(96, marks=pytest.mark.slow)])
 def test_a_smooth_ball_alone_has_the_cosine_of_its_normals(faces: tuple[int, int], size: int) -> None:
     made = lightmap(sphere, *faces, size, smooth=True, footprint=1e-4)
     for sun, found in zip(SUNS, RayTracer(made.receivers).directional(SUNS), strict=True):
@@ -40,6 +40,7 @@ def test_a_smooth_ball_alone_has_the_cosine_of_its_normals(faces: tuple[int, int
         np.testing.assert_allclose(found[..., 0][covered(made)], expected[covered(made)], atol=BEND)
 
 
+@pytest.mark.slow
 def test_a_torus_is_shaded_by_itself_where_a_ray_from_its_center_says() -> None:
     """Its own shadow is that of its triangles: texels whose footprint no edge crosses are lit or not as their center is."""
     mapped = lightmap(torus, 48, 20, 128, smooth=False)

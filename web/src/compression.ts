@@ -2,7 +2,7 @@
 import type { Asset } from "./asset";
 import { SrbfError } from "./errors";
 
-/** @throws SrbfError where the layers are compressed and `reads`, told the format, says that the GPU cannot. */
+/** @throws SrbfError where the layers are compressed and `reads` of their format is false. */
 export function checkCompression(asset: Asset, reads: (encoding: "bc7" | "bc1") => boolean): void {
   const { encoding } = asset.layers;
   if ((encoding === "bc7" || encoding === "bc1") && !reads(encoding)) {

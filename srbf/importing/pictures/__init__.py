@@ -4,6 +4,7 @@
 """
 
 from srbf.importing.pictures.found import RAW_SUFFIXES
-from srbf.importing.pictures.reading import Picture, Transfer, read_picture, said_once
+from srbf.importing.pictures.meaning import Transfer
+from srbf.importing.pictures.reading import Picture, read_picture, said_once
 
 __all__ = ["RAW_SUFFIXES", "Picture", "Transfer", "read_picture", "said_once"]

@@ -108,7 +108,7 @@ def chosen(path: Path, layers: list[Layer], wanted: str | None) -> Layer:
         ]
         if len(fits) != 1:
             found = f"several ({', '.join(layer.name for layer in fits)})" if fits else f"only {listed}"
-            raise ImageError(f"expected one layer {wanted!r} in {path}, found {found}; name one of them by --layer")
+            raise ImageError(f"expected one layer {wanted!r} in {path}, found {found}; name one of them by `layer`")
         return fits[0]
     if len(layers) == 1 and not layers[0].prefix and (not layers[0].is_data or layers[0].part.index == 0):
         return layers[0]
@@ -118,7 +118,7 @@ def chosen(path: Path, layers: list[Layer], wanted: str | None) -> Layer:
     for group in (plain, [layer for layer in plain if not layer.is_data], [layer for layer in plain if layer.is_picture], whole, light):
         if len(group) == 1 and not group[0].is_data:
             return group[0]
-    raise ImageError(f"expected one layer of {path} to be the picture, found {listed}; name one by --layer")
+    raise ImageError(f"expected one layer of {path} to be the picture, found {listed}; name one by `layer`")
 
 
 def read_exr(path: Path, layer: str | None) -> Found:

@@ -46,17 +46,17 @@ def _by_profile(found: Found, profile: bytes, transfer: Transfer) -> tuple[Float
     if found.model == "gray" and model == "rgb":
         pixels = np.repeat(pixels, 3, axis=2)
     elif found.model != model:
-        return None, [f"could not use the color profile of {{}}, which is for other values; took them by --transfer {transfer}"]
+        return None, [f"could not use the color profile of {{}}, which is for other values; took them by `transfer={transfer}`"]
     name = name_of(profile)
     try:
         is_srgb, is_linear = (False, False) if model == "cmyk" else character(profile)
         if is_srgb:
             return None, []
         if transfer == "linear" and not is_linear and model != "cmyk":
-            return None, [f"took the values of {{}} as linear by --transfer linear, and left their profile ({name}) aside"]
+            return None, [f"took the values of {{}} as linear by `transfer=linear`, and left their profile ({name}) aside"]
         return by_profile(pixels, profile, found.levels), [f"converted {{}} from {name} to linear Rec.709 by their profile"]
     except ValueError:
-        return None, [f"could not read the color profile of {{}}; took their values by --transfer {transfer}"]
+        return None, [f"could not read the color profile of {{}}; took their values by `transfer={transfer}`"]
 
 
 def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) -> tuple[Float32[ndarray, "H W 3"], list[str]]:
@@ -76,7 +76,7 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
         return _decoded(pixels, transfer), notes
     space = tags.space or ("linear values" if own_linear else "a curve of their own" if own_curve else "primaries of their own")
     if transfer == "linear" and not own_linear and (own_curve or tags.space):
-        return pixels, [*notes, f"took the values of {{}} as linear by --transfer linear, and left their tags ({space}) aside"]
+        return pixels, [*notes, f"took the values of {{}} as linear by `transfer=linear`, and left their tags ({space}) aside"]
     if transfer == "srgb" and tags.curve is not None:
         levels = np.linspace(0, 1, len(tags.curve))
         pixels = np.stack([np.interp(pixels[:, :, c], levels, tags.curve[:, c]) for c in range(3)], axis=2).astype(np.float32)

@@ -74,7 +74,7 @@ def _found(path: Path, layer: str | None) -> Found:
     if read is None:
         return read_exr(path, layer)
     if layer is not None:
-        raise ImageError(f"expected an EXR with the layer {layer!r}, found {path}; leave --layer out")
+        raise ImageError(f"expected an EXR with the layer {layer!r}, found {path}; leave `layer` out")
     return read(path)
 
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srbf.io.containers.texture_array import TexelFormat, TextureArray, level_bytes, level_size
+from srbf.io.containers.dds_header import TexelFormat
+from srbf.io.containers.texture_array import TextureArray, level_bytes, level_size
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 HEADER, LEVEL = 80, 24
