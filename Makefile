@@ -61,6 +61,7 @@ check: setup-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/check_words.py
 
 # The pages and the reference of the library as a site, build/site; fails on a broken link.
 docs: export NO_MKDOCS_2_WARNING = 1

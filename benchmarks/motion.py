@@ -115,7 +115,7 @@ def baselines(capture: Capture, response: Response | None, texels: np.ndarray, r
 
 def row(name: str, motion: Motion, bar: str = "") -> None:
     print(
-        f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_ripple:>9.1%}"
+        f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_flicker:>9.1%}"
         f"{motion.ghosting:>10.2f}{motion.edge_kept:>7.2f}  {bar}"
     )
 
@@ -143,7 +143,7 @@ def main() -> int:
                 )
         for number, (title, capture, response) in enumerate(scenes):
             print(f"\n{title}: {shadow_sampling(capture).sentence()}")
-            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}{'kept':>7}")
+            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'flicker':>9}{'ghosting':>10}{'kept':>7}")
             texels = sampled_texels(capture.coverage() >= COVERED)
             reference = dense_reference(capture, texels) if response is None else truth(response, texels)
             for baseline, motion in baselines(capture, response, texels, reference):

@@ -15,7 +15,7 @@ from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture, Quantity
 from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExistsError
-from srbf.evaluation.errors_by_role import TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
 from srbf.io import files
@@ -118,7 +118,7 @@ def run_demo(
     capture = Capture.open(capture_folder)
     started = clock()
     method = within_budget(capture, say=reporter.say)
-    watch = TrainWatch(capture)
+    watch = TrainErrorAccumulator(capture)
     asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
     timings["fit"] = clock() - started
     started = clock()

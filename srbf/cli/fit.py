@@ -15,7 +15,7 @@ from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
-from srbf.evaluation.errors_by_role import TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
 from srbf.methods import FitRun, method_of
@@ -52,7 +52,7 @@ def fit(
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
             asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster)), stitch)
     else:
-        watch = TrainWatch(opened)
+        watch = TrainErrorAccumulator(opened)
         with progress_bar("fit") as update:
             asset = encode(chosen, opened, FitRun(update, watch.look), stitch)
     fitted = time.perf_counter()

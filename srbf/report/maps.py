@@ -1,4 +1,4 @@
-"""How relighting maps, weighed by R_i(L0), add up to a relit image."""
+"""The sum of relighting maps, weighted by R_i(L0), that is a relit image."""
 
 from __future__ import annotations
 
@@ -77,13 +77,13 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
     caption = (
         f"The {len(terms)} maps of largest weight for one {subject.role} light, times their weights, and the running sum "
         "(after the article's figure 6). Coefficients are signed, so maps and shares are shown offset: mid gray is 0. "
-        "The disc beside a weight shows where that map's center looks."
+        "The disc beside a weight shows that map's center."
     )
     return Picture(FILE, "A sum of maps", caption)
 
 
 def decoded(subject: Subject, i: int) -> np.ndarray:
-    """Map c_i, (H, W, 3), alone."""
+    """Map c_i decoded, (H, W, 3)."""
     asset = subject.asset
     stored = asset.stored[i].astype(np.float32)
     return (stored / 255 if asset.held == "uint8" else stored) * asset.scale[i] + asset.bias[i]
@@ -95,5 +95,5 @@ def unclamped(subject: Subject, direction: np.ndarray) -> np.ndarray:
 
 
 def signed_scale(values: np.ndarray) -> float:
-    """The magnitude that white and black stand for: a high quantile of |values|, never 0."""
+    """The magnitude shown as white and black: a high quantile of |values|, never 0."""
     return max(float(np.quantile(np.abs(values), SIGNED_QUANTILE)), 1e-6) if values.size else 1.0

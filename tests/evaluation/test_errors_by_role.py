@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from srbf.capture import Capture
-from srbf.evaluation.errors_by_role import PeakHistogram, TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import PeakHistogram, TrainErrorAccumulator, evaluate
 from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 
@@ -28,7 +28,7 @@ def capture(make_capture, request: pytest.FixtureRequest) -> Capture:
 
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding: str) -> None:
-    watch = TrainWatch(capture)
+    watch = TrainErrorAccumulator(capture)
     asset = RelightingMap(k=9, encoding=encoding).encode(capture, FitRun(on_image=watch.look))
     watched, read = evaluate(asset, capture, watch=watch), evaluate(asset, capture)
     assert watched["holdout"] == read["holdout"]  # the peak of the train images included
@@ -38,8 +38,8 @@ def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding
 
 
 def test_a_sample_of_texels_comes_near(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.evaluation.errors_by_role.WATCHED_BYTES", 6 * 40 * 900)
-    watch = TrainWatch(capture)
+    monkeypatch.setattr("srbf.evaluation.errors_by_role.MEMORY_BYTES", 6 * 40 * 900)
+    watch = TrainErrorAccumulator(capture)
     assert len(watch.texels) == 900 and (np.diff(watch.texels) > 0).all()
     assert (capture.coverage().ravel()[watch.texels] == 1).all()
     asset = RelightingMap(k=9).encode(capture, FitRun(on_image=watch.look))

@@ -70,8 +70,8 @@ def test_every_family_is_told_apart(capture: Capture) -> None:
     ]
     harmonics, eigen, clustered, *_ = contest(sample, methods, "holdout", 1.0)
     assert (harmonics.family, harmonics.name, harmonics.bytes_per_texel) == ("spherical harmonics", "9 maps", 72)
-    assert (eigen.family, eigen.name, eigen.bytes_per_texel) == ("eigen map", "8 scalars", 16)
-    assert (clustered.family, clustered.name) == ("clustered eigen map", "4 scalars, 3 clusters, bytes")
+    assert (eigen.family, eigen.name, eigen.bytes_per_texel) == ("eigen map", "8 components", 16)
+    assert (clustered.family, clustered.name) == ("clustered eigen map", "4 components, 3 clusters, bytes")
     assert clustered.bytes_per_texel == 5  # four scalars and the index
     assert eigen.psnr > harmonics.psnr  # at fewer bytes: the facets' answers have a few components
 

@@ -9,7 +9,7 @@ import pytest
 
 from srbf.errors import InputError
 from srbf.evaluation.temporal_stability import compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
-from srbf.light_domain.directions import LOWEST
+from srbf.light_domain.directions import MIN_ELEVATION
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap
@@ -36,7 +36,7 @@ def test_great_circles(domain: str) -> None:
     for circle in path:
         assert np.linalg.svd(circle)[1][2] < 1e-9  # in a plane through the middle
     if domain == "hemisphere":
-        assert path[..., 2].min() == pytest.approx(np.sin(LOWEST))
+        assert path[..., 2].min() == pytest.approx(np.sin(MIN_ELEVATION))
         assert path[..., 2].max() > 0.999
     else:
         np.testing.assert_allclose(path[:, 0], path[:, -1], atol=1e-12)
@@ -54,7 +54,7 @@ def shadowed() -> np.ndarray:
 def test_a_perfect_relighter() -> None:
     motion = compare(PATH, shadowed(), shadowed())
     assert (motion.change_ratio, motion.largest_step) == (1, 1)
-    assert (motion.brightness_error, motion.largest_ripple, motion.ghosting) == (0, 0, 0)
+    assert (motion.brightness_error, motion.largest_flicker, motion.ghosting) == (0, 0, 0)
     assert motion.edge_kept == pytest.approx(1, rel=ROUNDING)
     assert motion.edge_texels == 1 and motion.edge.sum() > 0
 
@@ -69,16 +69,16 @@ def test_a_gain_is_no_ripple() -> None:
     motion = compare(PATH, np.float32(1.3) * reference, reference)
     assert motion.change_ratio == pytest.approx(1.3, rel=ROUNDING)
     assert motion.brightness_error == pytest.approx(0.3, rel=1e-4)
-    assert motion.largest_ripple < ROUNDING
+    assert motion.largest_flicker < ROUNDING
     assert motion.edge_texels == 0 and motion.ghosting == 0  # a cosine is no shadow edge
 
 
 def test_a_wave_is_the_ripple_of_its_height() -> None:
     reference = PATH[..., 2]
-    angle = np.linspace(LOWEST, np.pi - LOWEST, 100)
+    angle = np.linspace(MIN_ELEVATION, np.pi - MIN_ELEVATION, 100)
     motion = compare(PATH, curve(reference + 0.03 * np.sin(16 * angle)), curve(reference))
     # Waves this short are nearly orthogonal to an affine function of the direction: it takes up a few per cent, at the ends.
-    assert motion.largest_ripple == pytest.approx(0.03 / reference.mean(), rel=0.1)
+    assert motion.largest_flicker == pytest.approx(0.03 / reference.mean(), rel=0.1)
     assert motion.change_ratio > 1
 
 
@@ -129,12 +129,12 @@ def test_twenty_five_gaussians_of_the_hemisphere_pulse_and_those_of_the_sphere_h
     lights = point_set("hammersley", 400, "hemisphere")
     paper = lambert_sweep(RelightingMap(k=25, spread="mean", ridge=0).encode, lights)
     assert 0.06 < paper.brightness_error < 0.1
-    assert paper.largest_ripple > 0.015
+    assert paper.largest_flicker > 0.015
     around = lambert_sweep(RelightingMap(k=25, domain="sphere", spread="mean", ridge=0, encoding="float").encode, lights)
     assert around.brightness_error < 0.02
     chosen = lambert_sweep(RelightingMap(k=25).encode, lights)  # spread and ridge by what they predict
     assert chosen.brightness_error < 0.02
-    assert around.largest_ripple < 0.01
+    assert around.largest_flicker < 0.01
 
 
 def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray) -> None:
@@ -154,7 +154,7 @@ def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray)
         assert brightness == pytest.approx((expected - 0.25).reshape(-1, 3)[texels].mean(), abs=1e-4)
     assert motion.change_ratio == pytest.approx(1, abs=0.15)
     document = json.loads(json.dumps(motion.as_dict(), allow_nan=False))
-    np.testing.assert_array_equal(document["ripple"], motion.ripple)
+    np.testing.assert_array_equal(document["flicker"], motion.flicker)
 
 
 def test_a_dense_reference_is_the_truth_where_lights_are_dense(make_capture) -> None:

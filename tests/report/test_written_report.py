@@ -113,8 +113,8 @@ def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report:
             "psnr pooled",
             "holdout",
             "relative residual",
-            "bytes a texel",
-            "occluder beyond the lamp",
+            "bytes per texel",
+            "occluder beyond the light",
         ):
             assert fact in text
 

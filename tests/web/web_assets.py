@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from srbf import methods
-from srbf.asset import LAYERS, Asset, layer_entries
+from srbf.asset import Asset, layer_entries
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 
 FLOAT = 1e-4  # of the sum of the magnitudes of all terms; a few 1e-6 are usual
@@ -88,7 +88,7 @@ def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> n
     values = asset.coefficients()
     bare = replace(
         asset,
-        manifest={**asset.manifest, LAYERS[asset.method]: [{**entry, "encoding": "float"} for entry in asset.layers]},
+        manifest={**asset.manifest, asset.layers_key: [{**entry, "encoding": "float"} for entry in asset.layers]},
         scale=np.ones_like(asset.scale),
         bias=np.zeros_like(asset.bias),
     )

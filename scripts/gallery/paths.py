@@ -1,4 +1,4 @@
-"""Where the files of one scene are."""
+"""Paths of a scene's files."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from srbf.capture import Capture
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where the files of one scene are."""
+class ScenePaths:
+    """Paths of a scene's files: bakes and assets below `folder`, pictures in `docs`."""
 
     scene: Scene
     folder: Path
@@ -27,7 +27,7 @@ class Places:
 
     @property
     def rendered(self) -> Path:
-        """What Blender rendered: the capture itself, but for photographs, which are imported."""
+        """The capture that Blender rendered; with a dome, its photographs are then imported into `capture`."""
         return self.folder / "dome" if self.scene.dome else self.capture
 
     @property
@@ -36,7 +36,7 @@ class Places:
 
     @property
     def true_point_lights(self) -> Path:
-        return self.folder / "true-point_lights"
+        return self.folder / "true-point-lights"
 
     @property
     def scores(self) -> Path:
@@ -52,7 +52,7 @@ class Places:
 
     @property
     def point_light_strip(self) -> Path:
-        return self.docs / f"{self.scene.name}-point_lights.webp"
+        return self.docs / f"{self.scene.name}-point-lights.webp"
 
     def asset(self, fit: Fit) -> Path:
         return self.folder / fit.folder
@@ -61,9 +61,9 @@ class Places:
         return self.folder / f"{fit.folder}.errors.json"
 
     def point_light_errors(self, fit: Fit) -> Path:
-        return self.folder / f"{fit.folder}.point_lights.json"
+        return self.folder / f"{fit.folder}.point-lights.json"
 
     def responses(self, fit: Fit) -> Capture:
-        """What a fit is fitted to."""
+        """The capture that a fit uses: combined or indirect images."""
         opened = Capture.open(self.capture)
         return opened.combined() if fit.light == "all" else opened
