@@ -23,7 +23,7 @@ class FitCommand(Command):
         bare = {_flag(entry): str(entry.default) for m in all_methods() for entry in _settings(m) if entry.name in m.implied_by}
         bare = {flag: value for flag, value in bare.items() if value.isdecimal()}
         whole: list[str] = []
-        for argument, following in zip(args, [*args[1:], ""], strict=True):
+        for argument, following in zip(args, [*args[1:], ""], strict=False):
             whole.append(argument)
             if argument in bare and not re.fullmatch(r"[-+]?\d[\w.]*", following):
                 whole.append(bare[argument])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 from typer.testing import CliRunner, Result
 
 from srbf import methods
@@ -131,7 +132,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
+@pytest.mark.parametrize("flags", [["eigen-map", "--components", 6], ["clustered-eigen-map", "--components", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
     capture = make_capture(lambda d: 1 + np.sin(waves @ d), position=plane_positions)
@@ -336,8 +337,8 @@ def test_the_library_needs_numpy_and_scipy_alone() -> None:
 @pytest.mark.parametrize(
     "flags",
     [
-        ["--method", "eigen-map", "--scalars", "6", "--weighting", "relative", "--encoding", "uint8"],
-        ["--method", "clustered-eigen-map", "--scalars", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
+        ["--method", "eigen-map", "--components", "6", "--weighting", "relative", "--encoding", "uint8"],
+        ["--method", "clustered-eigen-map", "--components", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
         ["--method", "relighting-map", "-k", "9", "--basis", "spherical-harmonics"],
         ["--method", "relighting-map", "-k", "6", "--basis", "ptm", "--ridge", "0.1"],
     ],
@@ -360,7 +361,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
 @pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
-    assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
+    assert done.exit_code == 0 and "chose 4 components as bytes" in done.stderr  # Lambert needs one, and an image holds four
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
     ok("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--psnr", 20, "--force")
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
@@ -369,7 +370,7 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--method", "relighting-map", "--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
+        (["--method", "relighting-map", "--components", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
         (["--method", "relighting-map", "--budget", 8], "--budget with --method auto"),
         (["-k", 9, "--budget", 8], "-k with --method relighting-map"),
         (["-k", 9, "--clusters", 8], "--clusters with --method clustered-eigen-map"),
@@ -379,8 +380,8 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
         (["--method", "eigen-map", "--basis", "ptm"], "--basis"),
         (["--method", "eigen-map", "--spread", "mean"], "--spread"),
         (["--method", "eigen-map", "--ridge", 0], "ridge"),
-        (["--method", "eigen-map", "--scalars", 0], "scalars"),
-        (["--method", "eigen-map", "--scalars", 181], "at most 180 scalars for 60 lights"),
+        (["--method", "eigen-map", "--components", 0], "scalars"),
+        (["--method", "eigen-map", "--components", 181], "at most 180 components for 60 lights"),
         (["--method", "clustered-eigen-map", "--weighting", "plain"], "--weighting"),
         (["--method", "clustered-eigen-map", "--clusters", 300], "256 clusters"),
         (["--method", "auto", "--encoding", "half"], "--encoding"),
