@@ -10,13 +10,14 @@ import typer
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
+from srbf.cli.flags import flags_alone
 from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
-from srbf.fitting.options import method_for
+from srbf.fitting.options import method_for, with_settings
 from srbf.relighting.direct_light import Added, chosen
 
 COMMAND = FitCommand
@@ -58,6 +59,8 @@ def evaluate(
             raise typer.BadParameter(
                 "expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct"
             )
+        with flags_alone():
+            with_settings(method, settings)
         with progress_bar("leave one out") as update:
             _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
         return

@@ -10,7 +10,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
-from srbf.fitting.auto_method import within_budget
+from srbf.fitting.auto_method import check_target, within_budget
 from srbf.light_domain import domain_of_capture
 from srbf.methods.protocol import QUIET, FitRun, Method
 from srbf.registry import all_methods, method_named, method_names
@@ -28,15 +28,27 @@ def method_for(
     InputError on a setting that the method does not have, on values out of range, and on a capture whose lights it cannot fit.
     """
     settings = {} if settings is None else settings
+    chosen = with_settings(method, settings)
+    if chosen is None:
+        return within_budget(capture, say=say, **settings)
+    kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
+    if kind not in chosen.domains:
+        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {chosen.name}, found {kind}")
+    return chosen
+
+
+def with_settings(method: str | None, settings: dict[str, Any]) -> Method | None:
+    """The method that is named, or implied, with its settings; None for `auto`, whose settings are checked too. See `method_for`."""
     name = implied_method(settings) if method is None else method
     if name == AUTO:
         _check_settings(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
-        return within_budget(capture, say=say, **settings)
+        check_target(settings.get("budget"), settings.get("psnr"))
+        shared = {name: value for name, value in settings.items() if name not in BUDGET_SETTINGS}
+        for candidate in (c for m in all_methods() for c in m.candidates(1 << 5, 1 << 20, 1 << 10)):
+            replace(candidate, **shared)  # type: ignore[type-var]  # refuses values out of range before the capture is read
+        return None
     chosen = method_named(name)
     _check_settings(name, settings, chosen.settings())
-    kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
-    if kind not in chosen.domains:
-        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}")
     return chosen(**settings)
 
 

@@ -221,7 +221,7 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     out = tmp_path / "new"
     assert "capture.json" in refused("fit", tmp_path, "-o", out)
     (tmp_path / "file").write_text("")
-    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset")
+    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset", "-k", 9)
     assert "60 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200, "--ridge", 0)
     light = capture.folder / capture.lights[3].file
     pixels = capture.image(3).copy()
@@ -367,21 +367,25 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
 
 
+def test_more_components_than_the_capture_has_numbers(made: Path, tmp_path: Path) -> None:
+    words = refused("fit", made / "capture", "-o", tmp_path / "asset", "--components", 181)
+    assert "at most 180 components for 60 lights" in words and not (tmp_path / "asset").exists()
+
+
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--method", "relighting-map", "--components", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
-        (["--method", "relighting-map", "--budget", 8], "--budget with --method auto"),
-        (["-k", 9, "--budget", 8], "-k with --method relighting-map"),
-        (["-k", 9, "--clusters", 8], "--clusters with --method clustered-eigen-map"),
-        (["--method", "eigen-map", "-k", 9], "-k with --method relighting-map"),
+        (["--method", "relighting-map", "--components", 4], "--components applies only to method eigen-map or clustered-eigen-map"),
+        (["--method", "relighting-map", "--budget", 8], "--budget applies only to method auto"),
+        (["-k", 9, "--budget", 8], "-k applies only to method relighting-map"),
+        (["-k", 9, "--clusters", 8], "-k applies only to method relighting-map"),
+        (["--method", "eigen-map", "-k", 9], "-k applies only to method relighting-map"),
         (["--method", "eigen-map", "--clusters", 4], "--clusters"),
-        (["--method", "eigen-map", "--psnr", 30], "--psnr with --method auto"),
+        (["--method", "eigen-map", "--psnr", 30], "--psnr applies only to method auto"),
         (["--method", "eigen-map", "--basis", "ptm"], "--basis"),
         (["--method", "eigen-map", "--spread", "mean"], "--spread"),
         (["--method", "eigen-map", "--ridge", 0], "ridge"),
-        (["--method", "eigen-map", "--components", 0], "scalars"),
-        (["--method", "eigen-map", "--components", 181], "at most 180 components for 60 lights"),
+        (["--method", "eigen-map", "--components", 0], "--components"),
         (["--method", "clustered-eigen-map", "--weighting", "plain"], "--weighting"),
         (["--method", "clustered-eigen-map", "--clusters", 300], "256 clusters"),
         (["--method", "auto", "--encoding", "half"], "--encoding"),
@@ -397,5 +401,5 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     ],
 )
 def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
-    assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
+    assert words in misused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

@@ -106,7 +106,7 @@ def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeyp
     lights = [*capture.indices("train"), *capture.indices("validation")]
     images = np.stack([capture.image(i).reshape(-1, 3) for i in lights], axis=1)
     np.testing.assert_array_equal(sampled.responses, images[sampled.texels])
-    np.testing.assert_array_equal(sampled.directions, capture.directions(lights))
+    np.testing.assert_array_equal(sampled.coordinates, capture.directions(lights))
 
 
 def test_a_sample_is_of_covered_texels(make_capture) -> None:
