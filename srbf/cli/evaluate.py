@@ -72,7 +72,7 @@ def evaluate(
                 opened, reference, point_reference, samples, seed, update, note, blender, added.response
             )
         if json:
-            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # the former key, for one version
+            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # its former key, for one version; words: ok
             return
         typer.echo(f"{point_reference} true point lights against the point relighter, relative RMSE (at the best scale of each falloff)")
         typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")
