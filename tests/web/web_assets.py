@@ -72,7 +72,7 @@ def complete(asset: Asset, **manifest: Any) -> Asset:
     keys: dict[str, Any] = {"format": "srbf-asset", "version": 1, "quantity": "irradiance", "transport": "combined"}
     keys |= {"row_origin": "top", "axes": "z-up-right-handed", "asset_from_world": np.eye(4).tolist()}
     keys |= {name: f"{name}.exr" for name in asset.images}
-    keys[LAYERS[own["method"]]] = layer_entries("map" if relighting else "plane", asset.encoding, asset.scale, asset.bias)
+    keys[asset.layers_key] = layer_entries("map" if relighting else "plane", asset.encoding, asset.scale, asset.bias)
     if relighting:
         keys["r_table"] = {"file": "r_table.exr", "size": len(asset.table)}
     else:
