@@ -10,14 +10,13 @@ import typer
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
-from srbf.cli.flags import flags_alone
 from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
-from srbf.fitting.options import method_for, with_settings
+from srbf.fitting.options import method_for
 from srbf.relighting.direct_light import Added, chosen
 
 COMMAND = FitCommand
@@ -59,8 +58,6 @@ def evaluate(
             raise typer.BadParameter(
                 "expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct"
             )
-        with flags_alone():
-            with_settings(method, settings)
         with progress_bar("leave one out") as update:
             _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
         return
@@ -75,7 +72,7 @@ def evaluate(
                 opened, reference, point_reference, samples, seed, update, note, blender, added.response
             )
         if json:
-            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # the former key, for one version
+            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # its former key, for one version; words: ok
             return
         typer.echo(f"{point_reference} true point lights against the point relighter, relative RMSE (at the best scale of each falloff)")
         typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")

@@ -10,14 +10,13 @@ import typer
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
-from srbf.cli.flags import flags_alone
 from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
-from srbf.fitting.options import encode, method_for, with_settings
+from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
 from srbf.methods import FitRun, method_of
 
@@ -44,8 +43,6 @@ def fit(
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
     they are many: `srbf evaluate` reads them all again. With --dask other machines fit blocks of rows, and train is read once more here.
     """
-    with flags_alone():
-        with_settings(method, settings)
     check_replaceable(output, force, MANIFEST)
     opened = Capture.open(capture)
     started = time.perf_counter()

@@ -121,7 +121,7 @@ class Commands(typer.core.TyperGroup):
         except MemoryError:
             fail("expected enough memory, found none left; use fewer maps or smaller images")
         except KeyboardInterrupt:
-            fail("stopped; the same command goes on with a bake, other outputs were not written")
+            fail("stopped; the same command resumes a bake, other outputs were not written")
 
 
 def _refuse(error: Any, group: Any) -> None:

@@ -10,7 +10,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
-from srbf.fitting.auto_method import check_target, within_budget
+from srbf.fitting.auto_method import check_budget, within_budget
 from srbf.light_domain import domain_of_capture
 from srbf.methods.protocol import QUIET, FitRun, Method
 from srbf.registry import all_methods, method_named, method_names
@@ -28,28 +28,26 @@ def method_for(
     InputError on a setting that the method does not have, on values out of range, and on a capture whose lights it cannot fit.
     """
     settings = {} if settings is None else settings
-    chosen = with_settings(method, settings)
-    if chosen is None:
+    name = check_settings(method, settings)
+    if name == AUTO:
         return within_budget(capture, say=say, **settings)
+    chosen = method_named(name)
     kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
     if kind not in chosen.domains:
-        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {chosen.name}, found {kind}")
-    return chosen
+        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}")
+    return chosen(**settings)
 
 
-def with_settings(method: str | None, settings: dict[str, Any]) -> Method | None:
-    """The method that is named, or implied, with its settings; None for `auto`, whose settings are checked too. See `method_for`."""
+def check_settings(method: str | None, settings: dict[str, Any]) -> str:
+    """The method's name, given or implied. InputError on a setting that it does not have, and on a value out of range."""
     name = implied_method(settings) if method is None else method
     if name == AUTO:
-        _check_settings(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
-        check_target(settings.get("budget"), settings.get("psnr"))
-        shared = {name: value for name, value in settings.items() if name not in BUDGET_SETTINGS}
-        for candidate in (c for m in all_methods() for c in m.candidates(1 << 5, 1 << 20, 1 << 10)):
-            replace(candidate, **shared)  # type: ignore[type-var]  # refuses values out of range before the capture is read
-        return None
-    chosen = method_named(name)
-    _check_settings(name, settings, chosen.settings())
-    return chosen(**settings)
+        _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
+        check_budget(settings.get("budget"), settings.get("psnr"))
+    else:
+        _check_known(name, settings, method_named(name).settings())
+        method_named(name)(**settings)
+    return name
 
 
 def implied_method(settings: dict[str, Any]) -> str:
@@ -76,7 +74,7 @@ def _shared_settings() -> set[str]:
     return set.intersection(*(set(m.settings()) for m in candidates)) - {"components", "encoding"}
 
 
-def _check_settings(name: str, settings: dict[str, Any], known: Any) -> None:
+def _check_known(name: str, settings: dict[str, Any], known: Any) -> None:
     for setting in settings:
         if setting not in known:
             owners = [AUTO] if setting in BUDGET_SETTINGS else [m.name for m in all_methods() if setting in m.settings()]
