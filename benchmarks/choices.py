@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.basis.gaussian import spread_of, weight
+from srbf.basis.gaussian import GaussianBasis, spread_of, weight
 from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.encode.light_function_fit import dense_centers, functions_through
 from srbf.encode.model_selection import TexelSample
@@ -161,6 +161,7 @@ def maps(case: Case, k: int) -> tuple[float, float]:
         np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted, domain
     )
     basis, ridge, _ = RelightingMap(k, encoding="float").model(lambda: sample, domain)
+    assert isinstance(basis, GaussianBasis)
     mean = spread_of(centers, "mean")
     best = max(reached(min(1.0, float(factor * mean)), r) for factor in (0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 2) for r in (0.0, *RIDGES))
     return reached(basis.spread, ridge), best

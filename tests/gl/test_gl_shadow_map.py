@@ -24,8 +24,10 @@ EDGES = 0.05  # rms where 3 x 3 texels of a 2048-texel map are softer than a ray
 @pytest.fixture(scope="module")
 def scene() -> Any:
     pane = quad([0.2, -0.9, 0.3], [0.9, -0.9, 0.5], [0.9, 0.9, 0.5], [0.2, 0.9, 0.3])
-    tint = np.linspace(0.2, 1.2, 24).reshape(8, 3)
-    return build_plane(ball(0.4, [-0.4, 0, 0.6]), panes=(pane, pane + np.float32([0, 0, 0.2])), tint=tint, size=64, footprint=1.0)
+    transmittance = np.linspace(0.2, 1.2, 24).reshape(8, 3)
+    return build_plane(
+        ball(0.4, [-0.4, 0, 0.6]), panes=(pane, pane + np.float32([0, 0, 0.2])), transmittance=transmittance, size=64, footprint=1.0
+    )
 
 
 @pytest.mark.parametrize("number", range(4))
