@@ -69,10 +69,37 @@ class RelightingMap(Method):
 
     T(p, L) ~ sum_i c_i(p) exp(-acos(L . Q_i)^2 / (2 spread^2))            [Wong2005, eq. 1-2]
 
-    k maps, centers Q_i of a point set on the domain (`auto`: Fibonacci, on the hemisphere where all lights are above it), spread by rule
-    or in rad, `ridge` added to the normal equations' diagonal, and the encoding of the maps on disk. `auto` spread and ridge: the one
-    pair for all texels that predicts the validation lights best, or train lights left out, the encoding's rounding included.
-    `basis`: other functions in the Gaussians' place, as baselines: k = 4, 9, 16 … harmonics, or the 6 of polynomial texture maps.
+    Parameters
+    ----------
+    k
+        How many maps, 1 to 2048: each of C = 3 colors.
+    centers
+        Point set of the Q_i on the domain; `auto`: Fibonacci.
+    domain
+        `sphere` or `hemisphere`; `auto`: the hemisphere where all lights are above it.
+    spread
+        Width of the Gaussians: rad, above 0, or a rule, `mean` or `min`.
+    ridge
+        Added to the diagonal of the normal equations, 0 or more. `auto` spread and ridge: the one pair for all texels that predicts the
+        validation lights best, or train lights left out, the encoding's rounding included.
+    encoding
+        Of the maps on disk: `half`, `float` or `uint8`.
+    basis
+        Other functions in the Gaussians' place, as baselines: k = 4, 9, 16 … harmonics, or the 6 of polynomial texture maps.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> method = RelightingMap(k=9, ridge=1e-3)
+    >>> fit(capture, method).k
+    9
+    >>> RelightingMap(k=0)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected 1 to 2048 maps (the layers of a texture array), found `k=0`
     """
 
     name: ClassVar[str] = "relighting-map"

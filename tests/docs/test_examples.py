@@ -11,20 +11,24 @@ import pytest
 from made_captures import write_capture
 
 import srbf
+from srbf.lights import attenuation, environment_samples, light_vectors, moved, spot_cone
 
-PUBLIC = [srbf, *(getattr(srbf, name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light")]
+LIGHTS = (attenuation, environment_samples, light_vectors, moved, spot_cone)
+NAMED = [getattr(srbf, name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light"]
+PUBLIC = [srbf, *NAMED, *LIGHTS]
 
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """What the examples may name besides srbf's own names: `capture`, `asset`, `np` and an empty `folder`."""
+    """What the examples may name besides srbf's own names: `capture`, `asset`, `np` and a `folder` that holds both."""
     folder = tmp_path_factory.mktemp("examples")
     slopes = np.random.default_rng(0).normal(size=(6, 8, 3, 3))
     position = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0), [0.0]), axis=-1)[:, :, 0].astype(np.float32)
     capture = write_capture(folder / "capture", lambda d: np.maximum(1 + slopes @ d, 0), lights=40, position=position)
     asset = srbf.fit(capture, k=9)
     asset.save(folder / "asset")
-    return {**{name: getattr(srbf, name) for name in srbf.__all__}, "np": np, "capture": capture, "asset": asset, "folder": folder}
+    own = {name: getattr(srbf, name) for name in srbf.__all__}
+    return {**own, "np": np, "capture": capture, "asset": asset, "folder": folder}
 
 
 @pytest.mark.parametrize("member", PUBLIC, ids=lambda member: getattr(member, "__name__", str(member)))
