@@ -249,7 +249,7 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     Raises
     ------
     InputError
-        Where the matrix is singular or not finite.
+        Where the matrix leaves the light without a direction, position, a0 or radius.
 
     Examples
     --------

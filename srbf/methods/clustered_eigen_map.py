@@ -78,13 +78,13 @@ class ClusteredEigenMap(CoefficientMaps):
     domain
         `sphere` or `hemisphere`; `auto`: where the lights are.
     spread
-        Width of the light functions' kernel, rad; `auto` as of the eigen map.
+        Width of the light functions' kernel, rad, above 0; `auto` as of the eigen map.
     ridge
-        Added to the diagonal of the kernel matrix; `auto` as of the eigen map.
+        Added to the diagonal of the kernel matrix, above 0; `auto` as of the eigen map.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
     seed
-        Of the first clusters.
+        Of the clustering's random numbers.
 
     Raises
     ------

@@ -64,10 +64,10 @@ class EigenMap(CoefficientMaps):
     domain
         `sphere` or `hemisphere`; `auto`: where the lights are.
     spread
-        Width of the light functions' kernel, rad.
+        Width of the light functions' kernel, rad, above 0.
     ridge
-        Added to the diagonal of the kernel matrix. `auto` spread and ridge: those that predict best the lights left out and the validation
-        lights (`light_function_fit.choose_functions`).
+        Added to the diagonal of the kernel matrix, above 0. `auto` spread and ridge: those that predict best the lights left out and
+        the validation lights (`light_function_fit.choose_functions`).
     weighting
         Of the rows of T. `plain` gives the least squared error, `relative` divides each by its mean, so that dark texels count as much as
         bright ones.

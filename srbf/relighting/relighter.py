@@ -123,7 +123,7 @@ class Relighter:
         self.close()
 
     def close(self) -> None:
-        """Release every GL object, and the context where it is the relighter's own; again without effect.
+        """Release every GL object, and the context where it is the relighter's own. A second call has no effect.
 
         Examples
         --------
