@@ -162,7 +162,23 @@ class Capture:
         return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
 
     def scene(self) -> bytes | None:
-        """The bytes of the .glb of receivers and occluders; None where the capture has none. ManifestError where the file is missing."""
+        """The triangles of receivers and occluders.
+
+        Returns
+        -------
+        bytes or None
+            Of a .glb; None where the capture has none.
+
+        Raises
+        ------
+        ManifestError
+            Where the file is missing.
+
+        Examples
+        --------
+        >>> capture.scene() is None
+        True
+        """
         if "scene" not in self.manifest:
             return None
         path = self.folder / self.manifest["scene"]
@@ -224,7 +240,29 @@ class Capture:
         return np.array([light.direction for light in chosen], np.float64).reshape(-1, 3)
 
     def positions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
-        """Positions of the point lights `indices` (default: all), m; InputError where they are directional."""
+        """Positions of point lights.
+
+        Parameters
+        ----------
+        indices
+            Of lights; None: all.
+
+        Returns
+        -------
+        ndarray
+            (L, 3) float64 in the world, m.
+
+        Raises
+        ------
+        InputError
+            Where the lights are directional.
+
+        Examples
+        --------
+        >>> capture.positions()
+        Traceback (most recent call last):
+        srbf.errors.InputError: ...
+        """
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.position for light in chosen], np.float64).reshape(-1, 3)
 
@@ -258,9 +296,30 @@ class Capture:
         return self._read(self.lights[index].file, 3)
 
     def partial_image(self, index: int) -> tuple[Float32[ndarray, "H W 3"], Bool[ndarray, "H W"]]:
-        """(responses to light `index`, 0 outside its region; the region). The region is all receivers where the light names none.
+        """The responses to one light, and the region that its image holds. Values outside the region are not looked at: they may be NaN.
 
-        Values outside the region are not looked at: they may be NaN. ImageError as of `image`.
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        responses
+            (H, W, 3) float32, 0 outside the region.
+        region
+            (H, W) bool; all receivers where the light names none.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> responses, region = capture.partial_image(0)
+        >>> responses.shape, bool(region.all())
+        ((6, 8, 3), True)
         """
         light = self.lights[index]
         known = self.region(index)
@@ -269,7 +328,28 @@ class Capture:
         return self._partial(light.file, known), known
 
     def region(self, index: int) -> Bool[ndarray, "H W"] | None:
-        """Which receivers the image of light `index` holds; None where it holds all. A mask file holds those above 0."""
+        """Which receivers the image of a light holds. A mask file holds those above 0.
+
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W) bool; None where it holds all.
+
+        Raises
+        ------
+        ImageError
+            Where the mask is damaged, missing, or of another size.
+
+        Examples
+        --------
+        >>> capture.region(0) is None
+        True
+        """
         region = self.lights[index].region
         if region is None:
             return None
@@ -574,7 +654,23 @@ class Capture:
         return self._coverage
 
     def ambient(self) -> Float32[ndarray, "H W 3"] | None:
-        """The receivers with all lights of the capture off; None where the scene does not emit."""
+        """The receivers with all lights of the capture off.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W, 3) float32; None where the scene does not emit.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> capture.ambient() is None
+        True
+        """
         return self.channel("ambient")
 
     @cached_property
@@ -589,7 +685,23 @@ class Capture:
         return coverage
 
     def seam_edges(self) -> Float32[ndarray, "E 8"] | None:
-        """Edges that the UV layer cuts where the surface is smooth: u0 v0 u1 v1, v up, on one side, then on the other; None without any."""
+        """Edges that the UV layer cuts where the surface is smooth.
+
+        Returns
+        -------
+        ndarray or None
+            (E, 8) float32: u0 v0 u1 v1, v up, on one side, then on the other; None without any.
+
+        Raises
+        ------
+        ImageError
+            Where the file is damaged, missing, or not finite.
+
+        Examples
+        --------
+        >>> capture.seam_edges() is None
+        True
+        """
         if "seams" not in self.manifest:
             return None
         path = self.folder / self.manifest["seams"]

@@ -28,12 +28,54 @@ __all__ = [
 
 
 def method_of(asset: Asset) -> type[Method]:
-    """The class of the asset's method."""
+    """The class of the asset's method.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+
+    Returns
+    -------
+    type
+        `RelightingMap`, `EigenMap`, `ClusteredEigenMap` or another registered method.
+
+    Raises
+    ------
+    InputError
+        On a method that is not registered.
+
+    Examples
+    --------
+    >>> from srbf.methods import method_of
+    >>> method_of(asset) is RelightingMap
+    True
+    """
     return method_named(asset.method)
 
 
 def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
-    """Lights of the world in the frame that the asset was captured in."""
+    """Lights of the world in the frame that the asset was captured in.
+
+    Parameters
+    ----------
+    asset
+        Whose `asset_from_world` moves them.
+    lights
+        Of any kind.
+
+    Returns
+    -------
+    list
+        Of lights, in order.
+
+    Examples
+    --------
+    >>> from srbf.methods import in_asset_frame
+    >>> sun = DirectionalLight((0.0, 0.0, 1.0))
+    >>> in_asset_frame(asset, [sun]) == [sun]
+    True
+    """
     return [moved(light, asset.asset_from_world) for light in lights]
 
 

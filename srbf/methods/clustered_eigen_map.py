@@ -123,9 +123,30 @@ class ClusteredEigenMap(CoefficientMaps):
 
         Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `components`) + 40 bytes per texel, two blocks of
         `capture.STREAM_BYTES`, twice the sample (12 bytes per light and sampled texel), what `run.on_image` keeps, and some 0.2 GB of
-        libraries. Components of two clusters cannot be compared, so `run.stitch` closes the seams of the images, and what its texels show
-        is read once more: both sides then agree as well as their clusters hold them.
-        InputError where there are no train lights, or more components than captured numbers per texel.
+        libraries.
+
+        Parameters
+        ----------
+        capture
+            With train lights.
+        run
+            `stitch` closes the seams of the images, since components of two clusters cannot be compared, and what its texels show is read
+            once more: both sides then agree as well as their clusters hold them.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where there are no train lights, or more components than captured numbers per texel.
+
+        Examples
+        --------
+        >>> ClusteredEigenMap(clusters=2, components=4).encode(capture).tables["cluster_index"].shape
+        (6, 8)
         """
         train = capture.indices("train")
         if not train:

@@ -108,7 +108,31 @@ class EigenMap(CoefficientMaps):
 
         Peak memory, whatever the number of lights: about 12 `components` + 40 bytes per texel, two blocks of `capture.STREAM_BYTES`, the
         sample (12 bytes per light and texel of SAMPLE_TEXELS), what `run.on_image` keeps, and some 0.2 GB of libraries.
-        InputError where there are no train lights, or more components than captured numbers per texel.
+
+        Parameters
+        ----------
+        capture
+            With train lights.
+        run
+            `stitch` closes the seams of the coefficient maps.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where there are no train lights, or more components than captured numbers per texel.
+
+        Examples
+        --------
+        >>> EigenMap(components=4).encode(capture).components
+        4
+        >>> EigenMap(components=200).encode(capture)
+        Traceback (most recent call last):
+        srbf.errors.InputError: expected at most 120 components for 40 lights, found 200
         """
         train = capture.indices("train")
         if not train:

@@ -133,15 +133,34 @@ class RelightingMap(Method):
             HARMONICS[self.basis](self.k)  # says which k it can have
 
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
-        """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve a texel.
+        """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve per texel.
 
-        `auto` reads a sample of the texels before. `run.stitch` closes the seams of the dilated maps before they are
-        rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes a texel, two
-        blocks of `capture.STREAM_BYTES`, what `run.on_image` keeps, and some 0.2 GB of libraries. With
-        `run.solve_rows` others stream the images and solve.
+        Numerical trouble (condition, rank, residual) is data in the manifest's `source.fit`; coefficients past half's range are kept by a
+        scale and warned of. Peak memory, whatever the number of lights: 18 k + 40 bytes per texel, two blocks of `capture.STREAM_BYTES`,
+        what `run.on_image` keeps, and some 0.2 GB of libraries.
 
-        InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
-        the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
+        Parameters
+        ----------
+        capture
+            With train lights. `auto` reads a sample of its texels before.
+        run
+            `stitch` closes the seams of the dilated maps before they are rounded; with `solve_rows` others stream the images and solve.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where the lights are too few for k without a ridge, and on a domain or basis that the lights cannot have.
+
+        Examples
+        --------
+        >>> fitted = RelightingMap(k=9, ridge=1e-3).encode(capture)
+        >>> fitted.manifest["source"]["fit"]["ridge"]
+        0.001
         """
         train = capture.indices("train")
         if not train:

@@ -37,8 +37,30 @@ def relight(
 ) -> Float32[ndarray, "H W 3"]:
     """max(0, sum over lights) + ambient, as `srbf.methods.relight` but by shaders; for many frames keep a `Relighter`.
 
-    Within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half` ones. Raises what `Relighter`
-    raises.
+    Within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half` ones.
+
+    Parameters
+    ----------
+    asset, target
+        Of the `Relighter`.
+    lights, multipass, units
+        Of `Relighter.relight`.
+
+    Returns
+    -------
+    ndarray
+        (H, W, 3) float32, linear, row 0 at the top.
+
+    Raises
+    ------
+    ShaderError, InputError
+        As of `Relighter` and `Relighter.relight`.
+
+    Examples
+    --------
+    >>> from srbf.relighting.relighter import relight
+    >>> relight(asset, [DirectionalLight((0.0, 0.0, 1.0))], target="half").shape
+    (6, 8, 3)
     """
     with Relighter(asset, target=target) as relighter:
         return relighter.relight(lights, multipass=multipass, units=units)

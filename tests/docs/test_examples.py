@@ -15,11 +15,15 @@ import srbf
 from srbf import lights, methods, sphere
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver
+from srbf.relighting.relighter import relight
 
 ROOT = Path(__file__).parents[2]
 BAKING = (Bake, BakeSettings, Receiver)
 LIGHTS = (lights.attenuation, lights.environment_samples, lights.light_vectors, lights.moved, lights.spot_cone)
-METHODS = (methods.linear_response, methods.outside_domain, methods.projected_weights, methods.relight, methods.responses)
+METHODS = (
+    *(methods.in_asset_frame, methods.linear_response, methods.method_of, methods.outside_domain),
+    *(methods.projected_weights, methods.relight, methods.responses, relight),
+)
 SPHERE = (sphere.fibonacci, sphere.hammersley, sphere.mean_spacing, sphere.normalize, sphere.point_set, sphere.random_directions)
 NAMED = [srbf.__getattr__(name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light"]
 PUBLIC = [srbf, *NAMED, *BAKING, *LIGHTS, *METHODS, *SPHERE]
