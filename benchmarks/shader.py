@@ -1,10 +1,10 @@
 """Time of the shaders of every method against a minimal one that only sums as many layers: `python benchmarks/shader.py`.
 
 `--sides 1024 4096`: texels per side; `--screen`: frames per second of a lightmapped surface that fills 1920 x 1080; `--formula`: point
-lights also by formula. Assets have random half floats, since values do not change the time: 25 relighting maps, eigen maps of 28
-and 16 components, 64 clusters of 8 components. All draw into one RGBA32F target, blended. Milliseconds are medians of alternating runs, with
-the weights of distant lights projected beforehand; `host` is the CPU time of that. GB/s: the texel data over the time, against copying a buffer
-on the same device, counting reads and writes.
+lights also by formula. Assets have random half floats, since values do not change the time: 25 relighting maps, eigen maps of 28 and 16
+components, 64 clusters of 8 components. All draw into one RGBA32F target, blended. Milliseconds are medians of alternating runs, with the
+weights of distant lights projected beforehand; `host` is the CPU time of that. GB/s: the texel data over the time, against copying a
+buffer on the same device, counting reads and writes.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import pytest
 
 from srbf.errors import InputError
 from srbf.evaluation.temporal_stability import compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
-from srbf.light_domain.directions import MIN_ELEVATION
+from srbf.light_domain.directions import LOWEST
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap
@@ -36,7 +36,7 @@ def test_great_circles(domain: str) -> None:
     for circle in path:
         assert np.linalg.svd(circle)[1][2] < 1e-9  # in a plane through the middle
     if domain == "hemisphere":
-        assert path[..., 2].min() == pytest.approx(np.sin(MIN_ELEVATION))
+        assert path[..., 2].min() == pytest.approx(np.sin(LOWEST))
         assert path[..., 2].max() > 0.999
     else:
         np.testing.assert_allclose(path[:, 0], path[:, -1], atol=1e-12)
@@ -75,7 +75,7 @@ def test_a_gain_is_no_flicker() -> None:
 
 def test_a_wave_is_flicker_of_its_height() -> None:
     reference = PATH[..., 2]
-    angle = np.linspace(MIN_ELEVATION, np.pi - MIN_ELEVATION, 100)
+    angle = np.linspace(LOWEST, np.pi - LOWEST, 100)
     motion = compare(PATH, curve(reference + 0.03 * np.sin(16 * angle)), curve(reference))
     # Waves this short are nearly orthogonal to an affine function of the direction: it takes up a few per cent, at the ends.
     assert motion.largest_flicker == pytest.approx(0.03 / reference.mean(), rel=0.1)
