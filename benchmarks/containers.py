@@ -20,7 +20,7 @@ import numpy as np
 from numpy import ndarray
 from scipy import ndimage
 
-from srbf.asset import LAYERS, Asset
+from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.quantization import quantize, round_together
 from srbf.encode.uv_seams import Stitch
@@ -131,7 +131,7 @@ def tiled(asset: Asset) -> Asset:
     """The asset repeated to SIDE² texels."""
     times = (1, SIDE // asset.height, SIDE // asset.width, 1)
     images = {name: np.tile(image, times[1:3] + (1,) * (image.ndim - 2)) for name, image in asset.images.items()}
-    manifest = {**asset.manifest, "width": SIDE, "height": SIDE, LAYERS[asset.method]: asset.layers}
+    manifest = {**asset.manifest, "width": SIDE, "height": SIDE, asset.layers_key: asset.layers}
     return replace(asset, manifest=manifest, stored=np.tile(asset.stored, times), images=images)
 
 
@@ -180,7 +180,7 @@ def at_the_edges(path: Path, folder: Path) -> None:
 def as_level(asset: Asset, layers: ndarray) -> Asset:
     """The asset with float layers of another size, to relight."""
     entries = [{**entry, "encoding": "float"} for entry in asset.layers]
-    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], LAYERS[asset.method]: entries}
+    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], asset.layers_key: entries}
     one = np.ones_like(asset.scale)
     return replace(asset, manifest=manifest, stored=layers, scale=one, bias=0 * one, images={})
 

@@ -32,8 +32,8 @@ NOISE = 0.15  # of a texel's value: a render of a few samples
 TARGETS = {"relighting-map": 1.5, "eigen-map": 2.5, "clustered-eigen-map": 4.0}  # times the baseline
 FLAGS: dict[str, list[str]] = {
     "relighting-map": [],
-    "eigen-map": ["--method", "eigen-map", "--scalars", "28"],
-    "clustered-eigen-map": ["--method", "clustered-eigen-map", "--clusters", "64", "--scalars", "8"],
+    "eigen-map": ["--method", "eigen-map", "--components", "28"],
+    "clustered-eigen-map": ["--method", "clustered-eigen-map", "--clusters", "64", "--components", "8"],
 }
 
 

@@ -92,12 +92,12 @@ def arguments(settings: BakeSettings) -> list[str]:
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",
-        "light-box": None if points is None or points.box is None else ",".join(map(repr, points.box)),
+        "light-bounds": None if points is None or points.box is None else ",".join(map(repr, points.box)),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
-    flags += [f"--no-shadow={name}" for name in settings.no_shadow]
+    flags += [f"--no-cast-shadow={name}" for name in settings.no_shadow]
     flags += ["--keep-scene-lights"] if settings.keep_scene_lights else []
     return flags + (["--denoise"] if settings.denoise else [])
 

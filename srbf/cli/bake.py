@@ -68,7 +68,7 @@ def bake(
     force: flag.Overwrite = False,
     restart: flag.Restart = False,
 ) -> None:
-    """Bake SCENE under many lights, one at a time, in passes. Stopped at any moment, the same command goes on."""
+    """Bake SCENE under many lights, one at a time, in passes. If it is stopped, the same command resumes it."""
     width, height = size or Size(DEFAULT_SIZE, DEFAULT_SIZE)
     with flags_alone():
         named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
@@ -145,7 +145,7 @@ def _done(shard: Shard | None) -> str:
     return "prepared" if shard.is_preparation else f"baked shard {shard.name} of"
 
 
-def _check_spread(job: Bake, shard: Shard | None, farm: Literal["openjd"] | None, anew: bool) -> None:
+def _check_spread(job: Bake, shard: Shard | None, farm: Literal["openjd"] | None, again: bool) -> None:
     """Wrong usage where ways to spread the work exclude each other, or need to know how much there is to do."""
     given = [name for name, value in (("--dask", job.dask), ("--shard", shard), ("--farm", farm)) if value is not None]
     if len(given) > 1:
@@ -156,5 +156,5 @@ def _check_spread(job: Bake, shard: Shard | None, farm: Literal["openjd"] | None
         raise typer.BadParameter(
             f"{given[0]} needs to know how much there is to do: expected --samples COUNT, found --samples auto or --time-limit"
         )
-    if shard is not None and not shard.is_preparation and anew:
+    if shard is not None and not shard.is_preparation and again:
         raise typer.BadParameter("--force and --restart would drop what other shards baked; give them with --shard prepare")

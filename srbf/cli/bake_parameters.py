@@ -22,7 +22,7 @@ from srbf.cli.values import (
 
 SCENE, LIGHTS, QUALITY, FARM, SAFETY = "Scene", "Lights", "Quality", "Farm", "Safety"
 
-Scene = Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)]
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="The .blend; it is not changed, and nothing in it runs.", show_default=False)]
 SceneName = Annotated[
     str | None,
     typer.Option(
@@ -229,6 +229,6 @@ KeepAccumulation = Annotated[
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Print receiver, lights, disk and time; bake nothing.", rich_help_panel=SAFETY)]
 Overwrite = Annotated[bool, typer.Option("--force", help="Replace an output that exists.", rich_help_panel=SAFETY)]
 Restart = Annotated[
-    bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin anew.", rich_help_panel=SAFETY)
+    bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin again.", rich_help_panel=SAFETY)
 ]
 JsonProgress = Annotated[bool, typer.Option("--json-progress", help="Progress as JSON lines on stderr: done, total, what, seconds_left.")]

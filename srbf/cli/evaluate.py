@@ -29,7 +29,7 @@ def evaluate(
     settings: dict[str, Any],
     reference: Annotated[
         Path | None,
-        typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
+        typer.Argument(metavar="REFERENCE", help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
     ] = None,
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="ASSET is a CAPTURE: fit it to all lights but one, for each, by the flags of srbf fit.")
@@ -72,7 +72,7 @@ def evaluate(
                 opened, reference, point_reference, samples, seed, update, note, blender, added.response
             )
         if json:
-            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # the former key, for one version
+            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # its former key, for one version; words: ok
             return
         typer.echo(f"{point_reference} true point lights against the point relighter, relative RMSE (at the best scale of each falloff)")
         typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")

@@ -100,7 +100,7 @@ def export(
 def _kept(kept: Asset, count: int) -> str:
     lost = kept.manifest["source"]["kept"].get("relative_residual")
     change = "" if lost is None else f", relative change {lost:.3g} over the domain"
-    return f"kept {count} of {kept.manifest['source']['kept']['of']}: {kept.bytes_per_texel()['directional']} bytes a texel{change}"
+    return f"kept {count} of {kept.manifest['source']['kept']['of']}: {kept.bytes_per_texel()['directional']} bytes per texel{change}"
 
 
 def _summary(report: Report, asset: Asset) -> list[str]:
@@ -108,7 +108,7 @@ def _summary(report: Report, asset: Asset) -> list[str]:
     with_mips = "" if report.levels == 1 else f", {report.bytes_per_texel_resident:.4g} with its mip levels"
     return [
         f"{report.target}: {len(asset.stored)} layers of {report.encoding}, {mips}, {report.disk_bytes / MIB:.2f} MiB on disk",
-        f"GPU: {report.bytes_per_texel:g} bytes a texel{with_mips}; layers {report.layer_bytes / MIB:.2f} MiB, "
+        f"GPU: {report.bytes_per_texel:g} bytes per texel{with_mips}; layers {report.layer_bytes / MIB:.2f} MiB, "
         f"all {report.resident_bytes / MIB:.2f} MiB",
         "relit, nothing is lost of the asset as given"
         if report.psnr >= MAX_PSNR

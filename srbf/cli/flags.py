@@ -15,7 +15,7 @@ FORMER_FLAGS = {  # hidden aliases, for one version
     "--a0": "--reference-distance",
     "--hang-after": "--worker-timeout",
     "--keep": "--reduce-to",
-    "--keep-lamps": "--keep-scene-lights",
+    "--keep-lamps": "--keep-scene-lights",  # words: ok
     "--keep-sums": "--keep-accumulation",
     "--levels": "--mip-levels",
     "--light-box": "--light-bounds",
@@ -23,7 +23,7 @@ FORMER_FLAGS = {  # hidden aliases, for one version
     "--no-shadow": "--no-cast-shadow",
     "--part": "--shard",
     "--scalars": "--components",
-    "--texels-per-metre": "--texels-per-meter",
+    "--texels-per-metre": "--texels-per-meter",  # words: ok
     "--time": "--time-limit",
 }
 OTHERWISE_NAMED = {  # arguments of the library whose flag has another name

@@ -90,8 +90,13 @@ class Commands(typer.core.TyperGroup):
         with formatter.section("Commands"):
             formatter.write_dl(list(self.SUMMARIES.items()))
 
+    def get_params(self, ctx: Any) -> list[Any]:
+        """None where a command comes first: typer would import pydantic to see that no flag was given."""
+        return [] if ctx.meta.get("srbf.command first") else super().get_params(ctx)
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         bare = not args
+        ctx.meta["srbf.command first"] = not bare and not args[0].startswith("-")
         try:
             return super().parse_args(ctx, args)
         except UsageError as error:
@@ -116,7 +121,7 @@ class Commands(typer.core.TyperGroup):
         except MemoryError:
             fail("expected enough memory, found none left; use fewer maps or smaller images")
         except KeyboardInterrupt:
-            fail("stopped; the same command goes on with a bake, other outputs were not written")
+            fail("stopped; the same command resumes a bake, other outputs were not written")
 
 
 def _refuse(error: Any, group: Any) -> None:

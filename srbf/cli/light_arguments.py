@@ -10,7 +10,6 @@ import numpy as np
 
 from srbf import schemas
 from srbf.errors import InputError
-from srbf.importing.pictures import read_picture, said_once
 from srbf.io import files
 from srbf.lights import DirectionalLight, EnvironmentLight, Falloff, Light, PointLight, SpotLight
 
@@ -60,6 +59,8 @@ def _light(entry: dict[str, Any], folder: Path) -> Light:
 
 
 def _environment(path: Path) -> np.ndarray:
+    from srbf.importing.pictures import read_picture, said_once
+
     picture = read_picture(path, "linear")
     for line in said_once([(path.name, picture.notes)]):
         warnings.warn(line, stacklevel=2)

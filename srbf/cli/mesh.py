@@ -14,7 +14,9 @@ from srbf.export.scene_mesh import write_scene_mesh
 
 
 def mesh(
-    scene: Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)],
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="The .blend; it is not changed, and nothing in it runs.", show_default=False)
+    ],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The .glb to write.", show_default=False)],
     capture: Annotated[
         Path | None,

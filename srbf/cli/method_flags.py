@@ -6,13 +6,16 @@ import inspect
 import re
 from collections.abc import Callable
 from dataclasses import MISSING, Field, fields
+from itertools import zip_longest
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 import typer
 
+from srbf.cli.flags import flags_alone
 from srbf.cli.group import Command
+from srbf.cli.values import COUNT, Number
 from srbf.fitting.auto_method import DEFAULT_BUDGET
-from srbf.fitting.options import AUTO
+from srbf.fitting.options import AUTO, check_settings
 from srbf.registry import all_methods, method_names
 
 
@@ -23,7 +26,7 @@ class FitCommand(Command):
         bare = {_flag(entry): str(entry.default) for m in all_methods() for entry in _settings(m) if entry.name in m.implied_by}
         bare = {flag: value for flag, value in bare.items() if value.isdecimal()}
         whole: list[str] = []
-        for argument, following in zip(args, [*args[1:], ""], strict=True):
+        for argument, following in zip_longest(args, args[1:], fillvalue=""):
             whole.append(argument)
             if argument in bare and not re.fullmatch(r"[-+]?\d[\w.]*", following):
                 whole.append(bare[argument])
@@ -36,8 +39,11 @@ def with_method_flags(command: Callable[..., None]) -> Callable[..., None]:
     flags = _flags()
 
     def run(**values: Any) -> None:
-        settings = {name: values.pop(name) for name in flags if name != "method"}
-        command(**values, settings={name: value for name, value in settings.items() if value is not None})
+        given = {name: values.pop(name) for name in flags if name != "method"}
+        settings = {name: value for name, value in given.items() if value is not None}
+        with flags_alone():
+            check_settings(values["method"], settings)
+        command(**values, settings=settings)
 
     kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for name, parameter in own.items() if name not in ("method", "settings")]
     added = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=hint) for name, hint in flags.items()]
@@ -66,11 +72,18 @@ def _flags() -> dict[str, Any]:
             owners.setdefault(entry.name, []).append((method.name, entry, hints[entry.name]))
     flags |= {name: _annotation(found) for name, found in owners.items()}
     flags["budget"] = Annotated[
-        int | None, typer.Option("--budget", metavar="BYTES", help=f"auto: per texel, at most ({DEFAULT_BUDGET}).", show_default=False)
+        int | None,
+        typer.Option("--budget", metavar="BYTES", parser=COUNT, help=f"auto: per texel, at most ({DEFAULT_BUDGET}).", show_default=False),
     ]
     flags["psnr"] = Annotated[
         float | None,
-        typer.Option("--psnr", metavar="DB", help="auto: to reach on held-out lights with the fewest bytes.", show_default=False),
+        typer.Option(
+            "--psnr",
+            metavar="DECIBELS",
+            parser=Number(),
+            help="auto: to reach on held-out lights with the fewest bytes.",
+            show_default=False,
+        ),
     ]
     return flags
 
@@ -86,12 +99,12 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
     words = tuple(dict.fromkeys(word for _, own, _ in owners for word in own.metadata["words"]))
     hints = {hint for _, _, hint in owners}
     if words:
-        parser = _word_or_number(words)
+        parser = Number(words=words)
         return Annotated[
             Any, typer.Option(_flag(entry), parser=parser, metavar="|".join((*words, "NUMBER")), help=help_text, show_default=False)
         ]
     if hints == {int}:
-        return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", help=help_text, show_default=False)]
+        return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", parser=COUNT, help=help_text, show_default=False)]
     choices = tuple(dict.fromkeys(choice for hint in hints for choice in _choices(hint)))
     return Annotated[Literal[choices] | None, typer.Option(_flag(entry), help=help_text, show_default=False)]  # type: ignore[valid-type]
 
@@ -110,15 +123,3 @@ def _choices(hint: Any) -> list[str]:
     if get_origin(hint) is Literal:
         return [str(value) for value in get_args(hint)]
     return [choice for part in get_args(hint) for choice in _choices(part)]
-
-
-def _word_or_number(words: tuple[str, ...]) -> Callable[[str], str | float]:
-    def parse(text: str) -> str | float:
-        if text in words:
-            return text
-        try:
-            return float(text)
-        except ValueError:
-            raise typer.BadParameter(f"expected {', '.join(words)} or a number, found {text!r}") from None
-
-    return parse

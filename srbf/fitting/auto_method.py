@@ -29,6 +29,16 @@ LEAST_LIGHTS = 8  # that a choice without validation lights needs
 WORTH = 0.2  # dB that more clusters or more bytes must bring to be chosen
 
 
+def check_budget(budget: int | None, psnr: float | None) -> None:
+    """InputError on a budget below LEAST_BUDGET, on a PSNR that is no number, or on both."""
+    if budget is not None and psnr is not None:
+        raise InputError("expected a `budget` or a `psnr`, found both")
+    if budget is not None and budget < LEAST_BUDGET:
+        raise InputError(f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, found {budget}")
+    if psnr is not None and not np.isfinite(psnr):
+        raise InputError(f"expected `psnr` in dB, found {psnr:g}")
+
+
 def within_budget(
     capture: Capture,
     budget: int | None = None,
@@ -45,12 +55,7 @@ def within_budget(
     With fewer than LEAST_LIGHTS train lights and no validation lights the simplest is taken. `settings` go to the method. InputError on a
     budget below LEAST_BUDGET, or on both budget and psnr.
     """
-    if budget is not None and psnr is not None:
-        raise InputError("expected a `budget` or a `psnr`, found both")
-    if budget is not None and budget < LEAST_BUDGET:
-        raise InputError(f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, found {budget}")
-    if psnr is not None and not np.isfinite(psnr):
-        raise InputError(f"expected `psnr` in dB, found {psnr:g}")
+    check_budget(budget, psnr)
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
     trial = capture.load(texels)

@@ -10,13 +10,66 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
-from srbf.fitting.auto_method import within_budget
+from srbf.fitting.auto_method import check_budget, within_budget
 from srbf.light_domain import domain_of_capture
 from srbf.methods.protocol import QUIET, FitRun, Method
 from srbf.registry import all_methods, method_named, method_names
 
 AUTO = "auto"
 BUDGET_SETTINGS = ("budget", "psnr")  # of a choice
+
+
+def fit(
+    capture: Capture,
+    method: str | Method | None = None,
+    *,
+    stitch: bool = True,
+    run: FitRun = QUIET,
+    say: Callable[[str], None] = lambda line: None,
+    **settings: Any,
+) -> Asset:
+    """The asset of a capture: its train lights compressed by a method.
+
+    Parameters
+    ----------
+    capture
+        What `Capture.open` reads.
+    method
+        `relighting-map`, `eigen-map`, `clustered-eigen-map`, or one with its settings, such as `RelightingMap(k=25)`. By default what the
+        settings imply (`k` relighting maps, `components` an eigen map, `clusters` a clustered one), and without those `auto`: the best
+        within `budget` bytes per texel (16), or with the fewest bytes that reach `psnr` dB on held-out lights of a sample.
+    stitch
+        Close the seams of the UV layer, where the capture has any.
+    run
+        What to report progress to.
+    say
+        Called with a line on what was chosen.
+    **settings
+        Of the method.
+
+    Returns
+    -------
+    Asset
+        In memory; `Asset.save` writes it.
+
+    Raises
+    ------
+    InputError
+        On a setting that the method does not have, on values out of range, and on a capture without train lights or with lights that
+        the method cannot fit.
+
+    Examples
+    --------
+    >>> fit(capture, k=9).k
+    9
+    >>> fit(capture, budget=8).bytes_per_texel()["directional"] <= 8
+    True
+    """
+    if isinstance(method, Method):
+        if settings:
+            raise InputError(f"expected settings within the method, found {', '.join(settings)} beside {method.name}")
+        return encode(method, capture, run, stitch)
+    return encode(method_for(capture, method, settings, say), capture, run, stitch)
 
 
 def method_for(
@@ -28,16 +81,26 @@ def method_for(
     InputError on a setting that the method does not have, on values out of range, and on a capture whose lights it cannot fit.
     """
     settings = {} if settings is None else settings
-    name = implied_method(settings) if method is None else method
+    name = check_settings(method, settings)
     if name == AUTO:
-        _check_settings(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
         return within_budget(capture, say=say, **settings)
     chosen = method_named(name)
-    _check_settings(name, settings, chosen.settings())
     kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
     if kind not in chosen.domains:
         raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}")
     return chosen(**settings)
+
+
+def check_settings(method: str | None, settings: dict[str, Any]) -> str:
+    """The method's name, given or implied. InputError on a setting that it does not have, and on a value out of range."""
+    name = implied_method(settings) if method is None else method
+    if name == AUTO:
+        _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
+        check_budget(settings.get("budget"), settings.get("psnr"))
+    else:
+        _check_known(name, settings, method_named(name).settings())
+        method_named(name)(**settings)
+    return name
 
 
 def implied_method(settings: dict[str, Any]) -> str:
@@ -64,7 +127,7 @@ def _shared_settings() -> set[str]:
     return set.intersection(*(set(m.settings()) for m in candidates)) - {"components", "encoding"}
 
 
-def _check_settings(name: str, settings: dict[str, Any], known: Any) -> None:
+def _check_known(name: str, settings: dict[str, Any], known: Any) -> None:
     for setting in settings:
         if setting not in known:
             owners = [AUTO] if setting in BUDGET_SETTINGS else [m.name for m in all_methods() if setting in m.settings()]

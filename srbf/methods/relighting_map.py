@@ -224,7 +224,7 @@ class RelightingMap(Method):
             return None
         return (
             f"caution: {self.k} maps of {lights} train lights hold more than was captured; "
-            f"more photographs, or -k {lights} and fewer, cost less"
+            f"more photographs, or `k={lights}` and fewer, cost less"
         )
 
     @classmethod

@@ -276,15 +276,15 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     ):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise"}
-    assert not missing and "--no-shadow=Roof" in flags
+    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise", "no_shadow"}
+    assert not missing and "--no-cast-shadow=Roof" in flags
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
     assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))
     point_lights = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
     flags = arguments(BakeSettings(Receiver("view"), points=point_lights))
     (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
-    (light_box,) = (flag.removeprefix("--light-box=") for flag in flags if flag.startswith("--light-box="))
+    (light_box,) = (flag.removeprefix("--light-bounds=") for flag in flags if flag.startswith("--light-bounds="))
     assert PointGrid.parse(light_set, light_box) == PointGrid(point_lights.spacing, point_lights.box)
     job = template(bake_of(tmp_path, lights=77), None)
     assert [step["name"] for step in job["steps"]] == ["Prepare", "Bake", "Finish", "Fit"]

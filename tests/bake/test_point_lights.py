@@ -112,7 +112,7 @@ def test_no_room_is_said(blend, tmp_path: Path) -> None:
 def test_a_white_plane_under_point_lights(blend, tmp_path: Path) -> None:
     """cos / d^2 of irradiance, through the command; and a directional asset of the plane predicts it, since nothing casts a shadow."""
     flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 64, "--holdout-samples", 64]
-    points = ["--light-set", "point:0.8", "--light-box", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
+    points = ["--light-set", "point:0.8", "--light-bounds", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
     done = subprocess.run(
         [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "point_lights", *map(str, flags + points)],
         capture_output=True,

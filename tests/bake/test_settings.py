@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from srbf.bake.folder import STATE
 from srbf.bake.job import base_job
@@ -16,7 +17,7 @@ from srbf.bake.run import Bake
 from srbf.bake.scene_query import size_of_begun, with_frame
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.capture import MANIFEST
-from srbf.cli.parameters import parse_sun_angle
+from srbf.cli.values import AUTO_OR_ANGLE
 from srbf.errors import InputError
 from srbf.sphere import point_set
 
@@ -42,11 +43,11 @@ def test_a_lone_light_gets_the_largest_sun() -> None:
 
 
 def test_sun_angle_as_text() -> None:
-    assert parse_sun_angle("auto") == "auto" and parse_sun_angle("0.1") == 0.1
-    with pytest.raises(InputError, match="--sun-angle auto or a number of radians, found 'wide'"):
-        parse_sun_angle("wide")
+    assert AUTO_OR_ANGLE("auto") == "auto" and AUTO_OR_ANGLE("0.1") == 0.1
+    with pytest.raises(typer.BadParameter, match="auto or a number .*found 'wide'"):
+        AUTO_OR_ANGLE("wide")
     with pytest.raises(InputError, match="sun angle"):
-        BakeSettings(Receiver("view"), sun_angle=parse_sun_angle("nan"))
+        BakeSettings(Receiver("view"), sun_angle=float("nan"))
 
 
 def test_lightmaps_share_an_atlas_and_others_stand_alone() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_captures import write_capture
 from typer.testing import CliRunner, Result
 
 from srbf import methods
@@ -83,7 +84,7 @@ def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, mon
     found = {"point_lights": [[0, 0, 1]], "by_distance": []}
     monkeypatch.setattr("srbf.cli.evaluate.compare_with_point_lights", lambda *_: found)
     result = json.loads(ok("evaluate", asset, tmp_path / "scene.blend", "--point-reference", 1, "--json"))
-    assert result == {**found, "lamps": [[0, 0, 1]]}  # for one version
+    assert result == {**found, "lamps": [[0, 0, 1]]}  # for one version; words: ok
 
 
 @pytest.mark.parametrize(
@@ -102,8 +103,8 @@ def test_fit_flags_reach_the_asset(capture: Capture, tmp_path: Path, flags: list
 
 @pytest.mark.parametrize("renderer", ["numpy", "gl"])
 def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, renderer: str) -> None:
-    sky = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
-    write_image(tmp_path / "sky.exr", sky, "float")
+    environment = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "environment.exr", environment, "float")
     flags = [
         "--directional",
         "-1,0,1,1,0.5,0.2",
@@ -112,7 +113,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         "--point",
         "-0.2,0.1,0.8",
         "--environment",
-        tmp_path / "sky.exr",
+        tmp_path / "environment.exr",
     ]
     flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--reference-distance", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
     ok("relight", asset, "-o", tmp_path / "out.exr", *flags)
@@ -120,7 +121,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         DirectionalLight((-1, 0, 1), (1, 0.5, 0.2)),
         DirectionalLight((0, 0, 1)),
         PointLight((-0.2, 0.1, 0.8), a0=0.7, falloff="inverse-square"),
-        EnvironmentLight(sky),
+        EnvironmentLight(environment),
         SpotLight((0, 0, 1), (2, 2, 2), direction=(0, 0, -1), inner=0.2, outer=0.5, a0=0.7, falloff="inverse-square"),
     ]
     expected = methods.relight(Asset.open(asset), lights)
@@ -131,7 +132,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
+@pytest.mark.parametrize("flags", [["eigen-map", "--components", 6], ["clustered-eigen-map", "--components", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
     capture = make_capture(lambda d: 1 + np.sin(waves @ d), position=plane_positions)
@@ -146,12 +147,12 @@ def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_
 
 
 def test_frames(asset: Path, tmp_path: Path) -> None:
-    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
+    write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
     spot = {"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, -1], "inner": 0.1, "outer": 0.4}
     point = {"kind": "point", "position": [0, 0, 1], "color": [1, 2, 3], "a0": 2, "falloff": "inverse-square"}
     frames = [
         [{"kind": "directional", "direction": [0, 0, 3], "color": [1, 1, 1]}, point],
-        [spot, {"kind": "environment", "file": "sky.exr"}],
+        [spot, {"kind": "environment", "file": "environment.exr"}],
         [],
     ]
     (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": lights} for lights in frames]}))
@@ -220,7 +221,7 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     out = tmp_path / "new"
     assert "capture.json" in refused("fit", tmp_path, "-o", out)
     (tmp_path / "file").write_text("")
-    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset")
+    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset", "-k", 4)
     assert "60 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200, "--ridge", 0)
     light = capture.folder / capture.lights[3].file
     pixels = capture.image(3).copy()
@@ -231,9 +232,9 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     target.open(str(light), oiio.ImageSpec(14, 10, 3, oiio.FLOAT))
     target.write_image(pixels)
     target.close()
-    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out, "-k", 4)
     light.write_bytes(light.read_bytes()[:200])
-    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out, "-k", 4)
     assert "0003.exr" in refused("evaluate", asset, capture.folder, "--json")
     light.unlink()
     assert "0003.exr" in refused("info", capture.folder)
@@ -336,8 +337,8 @@ def test_the_library_needs_numpy_and_scipy_alone() -> None:
 @pytest.mark.parametrize(
     "flags",
     [
-        ["--method", "eigen-map", "--scalars", "6", "--weighting", "relative", "--encoding", "uint8"],
-        ["--method", "clustered-eigen-map", "--scalars", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
+        ["--method", "eigen-map", "--components", "6", "--weighting", "relative", "--encoding", "uint8"],
+        ["--method", "clustered-eigen-map", "--components", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
         ["--method", "relighting-map", "-k", "9", "--basis", "spherical-harmonics"],
         ["--method", "relighting-map", "-k", "6", "--basis", "ptm", "--ridge", "0.1"],
     ],
@@ -360,7 +361,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
 @pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
-    assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
+    assert done.exit_code == 0 and "chose 4 components as bytes" in done.stderr  # Lambert needs one, and an image holds four
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
     ok("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--psnr", 20, "--force")
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
@@ -369,32 +370,39 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--method", "relighting-map", "--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
-        (["--method", "relighting-map", "--budget", 8], "--budget with --method auto"),
-        (["-k", 9, "--budget", 8], "-k with --method relighting-map"),
-        (["-k", 9, "--clusters", 8], "--clusters with --method clustered-eigen-map"),
-        (["--method", "eigen-map", "-k", 9], "-k with --method relighting-map"),
-        (["--method", "eigen-map", "--clusters", 4], "--clusters"),
-        (["--method", "eigen-map", "--psnr", 30], "--psnr with --method auto"),
+        (["--method", "relighting-map", "--components", 4], "--components applies only to method eigen-map or clustered-eigen-map"),
+        (["--method", "relighting-map", "--budget", 8], "--budget applies only to method auto"),
+        (["-k", 9, "--budget", 8], "-k applies only to method relighting-map"),
+        (["-k", 9, "--clusters", 8], "-k applies only to method relighting-map"),
+        (["--method", "eigen-map", "-k", 9], "-k applies only to method relighting-map"),
+        (["--method", "eigen-map", "--clusters", 4], "--clusters applies only to"),
+        (["--method", "eigen-map", "--psnr", 30], "--psnr applies only to method auto"),
         (["--method", "eigen-map", "--basis", "ptm"], "--basis"),
-        (["--method", "eigen-map", "--spread", "mean"], "--spread"),
+        (["--method", "eigen-map", "--spread", "mean"], "spread"),
         (["--method", "eigen-map", "--ridge", 0], "ridge"),
-        (["--method", "eigen-map", "--scalars", 0], "scalars"),
-        (["--method", "eigen-map", "--scalars", 181], "at most 180 scalars for 60 lights"),
+        (["--method", "eigen-map", "--components", 0], "--components: expected a whole number of 1 or more, found '0'"),
         (["--method", "clustered-eigen-map", "--weighting", "plain"], "--weighting"),
         (["--method", "clustered-eigen-map", "--clusters", 300], "256 clusters"),
         (["--method", "auto", "--encoding", "half"], "--encoding"),
-        (["--method", "auto", "--budget", 3], "at least 4"),
-        (["--method", "auto", "--budget", 8, "--psnr", 30], "found both"),
-        (["--method", "auto", "--psnr", "nan"], "psnr"),
+        (["--method", "auto", "--budget", 3], "a --budget of at least 4"),
+        (["--budget", 8, "--psnr", 30], "a --budget or a --psnr, found both"),
+        (["--psnr", "nan"], "--psnr: expected a number, found 'nan'"),
         (["--basis", "ptm", "-k", 7], "-k of 6"),
         (["--basis", "spherical-harmonics", "-k", 10], "found 10"),
-        (["--ridge", "some"], "--ridge"),
-        (["--ridge", "-1"], "ridge"),
-        (["--spread", "narrow"], "--spread"),
-        (["-k", 0], "-k 0"),
+        (["--ridge", "some"], "--ridge: expected auto or a number, found 'some'"),
+        (["--spread", "narrow"], "--spread: expected auto, mean, min or a number, found 'narrow'"),
+        (["-k", 0], "-k: expected a whole number of 1 or more, found '0'"),
     ],
 )
-def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
+def test_flags_that_do_not_go_together(tmp_path: Path, flags: list, words: str) -> None:
+    """Wrong usage: no capture is looked at."""
+    assert words in misused("fit", tmp_path / "none", "-o", tmp_path / "asset", *flags)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [(["--components", 181], "at most 180 components for 60 lights"), (["-k", 200, "--ridge", 0], "60 lights for -k 200")],
+)
+def test_flags_that_a_capture_does_not_allow(made: Path, tmp_path: Path, flags: list, words: str) -> None:
     assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

@@ -34,7 +34,7 @@ def test_it_says_what_is_lost_and_what_it_costs(asset: Path, tmp_path: Path) -> 
     exported = Asset.open(tmp_path / "out")
     psnr = exported.manifest["source"]["export"]["psnr"]
     assert f"relit PSNR {psnr:.2f} dB" in done.stderr and "9 layers of bc7, 4 levels" in done.stderr
-    assert "GPU: 9 bytes a texel, " in done.stderr and "multiples of 4" in done.stderr
+    assert "GPU: 9 bytes per texel, " in done.stderr and "multiples of 4" in done.stderr
     facts = json.loads(srbf("info", tmp_path / "out", "--json").stdout)
     assert facts["encoding"] == "bc7" and facts["levels"] == 4 and facts["bytes_per_texel"]["spot"] == 9
     relit = srbf("relight", tmp_path / "out", "-o", tmp_path / "x.exr", "--directional", "0,0.3,1", "--point", "0,0,1")

@@ -18,7 +18,7 @@ USES = {flag: [name for name in COMMANDS if any(now in p.opts for p in TABLE[nam
 
 
 def test_each_former_flag_is_of_some_command() -> None:
-    assert {flag for flag, commands in USES.items() if not commands} <= {"--scalars"}  # until `srbf fit` has --components
+    assert all(USES.values())
     assert set(FORMER_FLAGS.values()).isdisjoint(FORMER_FLAGS)
 
 
@@ -27,7 +27,7 @@ def test_a_former_flag_works_and_is_not_shown(former: str, command: str) -> None
     parameters = {flag: parameter for parameter in TABLE[command].params for flag in parameter.opts}
     parameter = parameters[FORMER_FLAGS[former]]
     value = WITH_VALUE.get(former, "2")
-    required = ["a", "-o", "b"]
+    required = ["a"] if command == "evaluate" else ["a", "-o", "b"]
     forms = [[former]] if parameter.is_flag else [[former, value], [f"{former}={value}"]]
     for form in forms:
         new = [parameter.opts[0] + form[0][len(former) :], *form[1:]]
@@ -71,9 +71,8 @@ def test_messages_name_flags() -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_is_in_words(command: str) -> None:
     """No type of Python stands for a value, and the list of commands has a summary of one line for each."""
-    theirs = {parameter.name for parameter in TABLE["fit"].params} if command in ("fit", "evaluate") else set()
     for parameter in TABLE[command].params:
-        if parameter.param_type_name == "option" and not parameter.is_flag and parameter.name not in theirs:
+        if parameter.param_type_name == "option" and not parameter.is_flag:
             shown = parameter.get_help_record(typer.Context(TABLE[command]))[0].split(" ")[-1]
             assert parameter.metavar or "|" in shown or shown == "<openjd>", shown
     lines = [line for line in ok("--help").splitlines() if line.split()[:1] == [command]]

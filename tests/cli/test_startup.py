@@ -11,7 +11,20 @@ import pytest
 
 from srbf.cli import COMMANDS
 
-LIBRARIES = ("numpy", "scipy", "OpenImageIO", "jsonschema", "rich", "sklearn", "embreex", "moderngl", "dask", "PIL", "jaxtyping")
+LIBRARIES = (
+    "numpy",
+    "pydantic",
+    "scipy",
+    "OpenImageIO",
+    "jsonschema",
+    "rich",
+    "sklearn",
+    "embreex",
+    "moderngl",
+    "dask",
+    "PIL",
+    "jaxtyping",
+)
 
 
 def imported(*arguments: object) -> set[str]:

@@ -8,7 +8,7 @@ import pytest
 from srbf.basis.gaussian import weight
 from srbf.capture import STRIP, Capture
 from srbf.encode.model_selection import TexelSample, choose
-from srbf.encode.weighted_rows import LightSpace, solid_angles
+from srbf.encode.weighted_rows import LightSpace
 from srbf.errors import InputError
 from srbf.light_domain import Directions
 from srbf.sphere import normalize, point_set, random_directions
@@ -106,7 +106,7 @@ def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeyp
     lights = [*capture.indices("train"), *capture.indices("validation")]
     images = np.stack([capture.image(i).reshape(-1, 3) for i in lights], axis=1)
     np.testing.assert_array_equal(sampled.responses, images[sampled.texels])
-    np.testing.assert_array_equal(sampled.directions, capture.directions(lights))
+    np.testing.assert_array_equal(sampled.coordinates, capture.directions(lights))
 
 
 def test_a_sample_is_of_covered_texels(make_capture) -> None:
@@ -124,13 +124,13 @@ def test_gram_is_the_images_mean_products() -> None:
     np.testing.assert_allclose(given.gram, images @ images.T / 90, rtol=FLOAT32, atol=1e-5)
 
 
-def test_solid_angles_of_a_lattice_are_equal_and_twins_share() -> None:
-    assert solid_angles(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
+def test_quadrature_weights_of_a_lattice_are_equal_and_twins_share() -> None:
+    assert Directions.quadrature(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
     octahedron = np.concatenate([np.eye(3), -np.eye(3)])
-    np.testing.assert_allclose(solid_angles(octahedron), 1)
+    np.testing.assert_allclose(Directions.quadrature(octahedron), 1)
     lights = point_set("fibonacci", 60, "sphere")
     twin = normalize(lights[:1] + 1e-6)
-    shares = solid_angles(np.concatenate([lights, twin]))
+    shares = Directions.quadrature(np.concatenate([lights, twin]))
     assert shares[[0, -1]] == pytest.approx(shares[1:-1].mean() / 2, rel=0.1)
 
 

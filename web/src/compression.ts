@@ -6,6 +6,6 @@ import { SrbfError } from "./errors";
 export function checkCompression(asset: Asset, reads: (encoding: "bc7" | "bc1") => boolean): void {
   const { encoding } = asset.layers;
   if ((encoding === "bc7" || encoding === "bc1") && !reads(encoding)) {
-    throw new SrbfError(`expected a GPU that reads ${encoding}, found one that does not; serve it srbf export --target uint8`);
+    throw new SrbfError(`expected a GPU that reads ${encoding}, found one that does not; serve it srbf export --target png`);
   }
 }

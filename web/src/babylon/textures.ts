@@ -19,7 +19,7 @@ export class BabylonTextures {
   constructor(asset: Asset, scene: Scene, filter: "linear" | "nearest") {
     const { width, height, count, encoding, levels } = asset.layers;
     if (encoding === "bc7" || encoding === "bc1") {
-      throw new SrbfError(`expected half, float or uint8 layers for Babylon.js, found ${encoding}; srbf export --target exr or uint8`);
+      throw new SrbfError(`expected half, float or uint8 layers for Babylon.js, found ${encoding}; srbf export --target exr or png`);
     }
     const sampling = filter === "linear" ? Texture.BILINEAR_SAMPLINGMODE : Texture.NEAREST_SAMPLINGMODE;
     const plain = (data: ArrayBufferView, w: number, h: number, format: number, type: number) =>

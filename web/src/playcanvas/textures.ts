@@ -27,7 +27,7 @@ export class PlayCanvasTextures {
   constructor(asset: Asset, device: GraphicsDevice, filter: "linear" | "nearest") {
     const { width, height, count, encoding, levels } = asset.layers;
     if (encoding === "bc7" || encoding === "bc1") {
-      throw new SrbfError(`expected half, float or uint8 layers for PlayCanvas, found ${encoding}; srbf export --target exr or uint8`);
+      throw new SrbfError(`expected half, float or uint8 layers for PlayCanvas, found ${encoding}; srbf export --target exr or png`);
     }
     const { tables, ambient } = asset;
     const size = width * height * 4;
