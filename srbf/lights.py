@@ -1,4 +1,4 @@
-"""Lights to relight by: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
+"""Lights for relighting: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from srbf.sphere import Domain, normalize
 Falloff = Literal["linear", "inverse-square"]
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
-DEFAULT_RADIUS = 1e-4  # meters: a receiver no nearer than this, so that a lamp in a surface stays finite
+DEFAULT_RADIUS = 1e-4  # meters, the smallest distance counted, so that a light in a surface stays finite
 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it."""
+    """A distant light: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it."""
 
     direction: Triple
     color: Triple = WHITE
@@ -32,7 +32,7 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class PointLight:
-    """A lamp at `position`; `color` is its irradiance at the distance a0 [Wong2005, "Attenuation"].
+    """A point light at `position` (m); `color` is its irradiance at the distance a0 [Wong2005, "Attenuation"].
 
     falloff `linear` is the article's a0/|L|, `inverse-square` is (a0/|L|)^2; |L| is never less than `radius` (m).
     """
@@ -57,7 +57,7 @@ class PointLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(PointLight):
-    """A point light times a smooth cone about `direction` (where it shines): full inside the half-angle `inner`, none past `outer`."""
+    """A point light times a smooth cone about `direction` (its axis): full inside the half-angle `inner`, none past `outer`."""
 
     direction: Triple
     inner: float
@@ -145,8 +145,8 @@ def environment_samples(
 ) -> tuple[Float64[ndarray, "H W 3"], Float64[ndarray, "H W"]]:
     """Directions of an equirectangular map's texel centers turned by `rotation`, and the solid angle (sr) of each texel.
 
-    On the hemisphere only what is above the (turned) horizon counts. Unturned, this is exact: a row that straddles the horizon
-    is cut there and its center moved to the middle of what is left.
+    On the hemisphere only directions above the horizon count. Without rotation this is exact: a row across the horizon is cut there,
+    and its center moves to the middle of the remaining part.
     """
     height, width = image.shape[:2]
     elevation = np.pi / 2 - np.arange(height + 1) * (np.pi / height)

@@ -1,4 +1,4 @@
-"""Baselines that others use for the same job: spherical and hemispherical harmonics, polynomial texture maps."""
+"""Basis functions of other methods, as baselines: spherical and hemispherical harmonics, polynomial texture maps."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class HemisphericalHarmonics(SphericalHarmonics):
 
 @dataclass(frozen=True)
 class PolynomialTextureMap:
-    """1, x, y, xy, x^2, y^2 of the light direction [Malzbender2001]: six functions, meant for lights on the hemisphere."""
+    """1, x, y, xy, x^2, y^2 of the light direction [Malzbender2001]: six functions, for lights on the hemisphere."""
 
     k: int = PTM_TERMS
     kind: HarmonicKind = "ptm"

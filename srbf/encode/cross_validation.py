@@ -1,4 +1,4 @@
-"""How well lights are predicted that a fit did not see: single lights left out, and bands of them."""
+"""Cross-validation over lights: errors at single lights and at bands of lights that are left out."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy import ndarray
 from srbf.arrays import Float64, Int
 from srbf.solve.kernel_ridge import KernelPath
 
-RANK = 128  # principal directions of the images that errors are computed by; the rest counts as noise, alike at all lights
-LEAST_ERROR = 1e-5  # of the mean power: smaller errors count as this, or lights that leave all black would decide
+RANK = 128  # principal components of the images, used for errors; the rest counts as equal noise of all lights
+LEAST_ERROR = 1e-5  # of the mean power, the smallest error counted; otherwise black images would dominate
 
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Squared errors of lights that a linear fit did not see, from the inner products of the lights' images alone.
+    """Squared errors of a linear fit at left-out lights, from the inner products of the lights' images.
 
-    `root` (L + V, R): its rows' inner products are those of the images of L train and V validation lights, but for `noise`, which each
-    image has besides. `groups` are train lights to leave out together. `least` is the squared error that smaller ones count as.
+    `root` (L + V, R): its rows' inner products are those of the images of L train and V validation lights without the `noise` of
+    each image. `groups` are train lights to leave out together. `least` is the smallest squared error counted.
     """
 
     root: Float64[ndarray, "M R"]
@@ -45,13 +45,13 @@ class HeldOut:
         return len(self.root) > self.train
 
     def single(self, path: KernelPath, ridge: float) -> Float64[ndarray, " L"]:
-        """Of every train light when it alone is left out."""
+        """Squared error of every train light if it alone is left out."""
         solved = path.solve(ridge, self.root[: self.train])
         squares = np.einsum("lr,lr->l", solved, solved) + self.noise * path.diagonal(ridge, 2)
         return squares / path.diagonal(ridge) ** 2
 
     def in_bands(self, path: KernelPath, ridge: float) -> Float64[ndarray, " G"]:
-        """Of the middle light of every band when the band is left out."""
+        """Squared error of the middle light of every band if the band is left out."""
         solved = path.solve(ridge, self.root[: self.train])
         squares = []
         for groups in self.groups:
@@ -62,16 +62,16 @@ class HeldOut:
         return np.concatenate(squares)
 
     def validation(self, path: KernelPath, ridge: float, kernel: Float64[ndarray, "V L"]) -> Float64[ndarray, " V"]:
-        """Of every validation light, whose kernel with the train lights is `kernel`."""
+        """Squared error of every validation light, whose kernel with the train lights is `kernel`."""
         weights = path.solve(ridge, kernel.T).T  # (V, L)
         residual = self.root[self.train :] - weights @ self.root[: self.train]
         return np.einsum("vr,vr->v", residual, residual) + self.noise * (1 + np.einsum("vl,vl->v", weights, weights))
 
     def score(self, single: Float64[ndarray, " L"], banded: Float64[ndarray, " G"], unseen: Float64[ndarray, " V"] | None = None) -> float:
-        """What choices are compared by: mean logarithms of squared errors, so that no light drowns the rest.
+        """The criterion of choices: mean logarithms of squared errors, so that no light dominates.
 
-        Lights left out alone leave gaps too small between rings, bands leave gaps too wide: both count alike. Validation lights, in gaps
-        as they are, count as much as the two.
+        Single left-out lights leave too small gaps between rings, bands too wide ones; both have equal weight. Validation lights, in
+        the real gaps, have the weight of both together.
         """
         seen = (self._mean_log(single) + self._mean_log(banded)) / 2
         return seen if unseen is None else (seen + self._mean_log(unseen)) / 2

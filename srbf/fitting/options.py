@@ -19,6 +19,59 @@ AUTO = "auto"
 BUDGET_SETTINGS = ("budget", "psnr")  # of a choice
 
 
+def fit(
+    capture: Capture,
+    method: str | Method | None = None,
+    *,
+    stitch: bool = True,
+    run: FitRun = QUIET,
+    say: Callable[[str], None] = lambda line: None,
+    **settings: Any,
+) -> Asset:
+    """The asset of a capture: its train lights compressed by a method.
+
+    Parameters
+    ----------
+    capture
+        What `Capture.open` reads.
+    method
+        `relighting-map`, `eigen-map`, `clustered-eigen-map`, or one with its settings, such as `RelightingMap(k=25)`. By default what the
+        settings imply (`k` relighting maps, `components` an eigen map, `clusters` a clustered one), and without those `auto`: the best
+        within `budget` bytes per texel (16), or with the fewest bytes that reach `psnr` dB on held-out lights of a sample.
+    stitch
+        Close the seams of the UV layer, where the capture has any.
+    run
+        What to report progress to.
+    say
+        Called with a line on what was chosen.
+    **settings
+        Of the method.
+
+    Returns
+    -------
+    Asset
+        In memory; `Asset.save` writes it.
+
+    Raises
+    ------
+    InputError
+        On a setting that the method does not have, on values out of range, and on a capture without train lights or with lights that
+        the method cannot fit.
+
+    Examples
+    --------
+    >>> fit(capture, k=9).k
+    9
+    >>> fit(capture, budget=8).bytes_per_texel()["directional"] <= 8
+    True
+    """
+    if isinstance(method, Method):
+        if settings:
+            raise InputError(f"expected settings within the method, found {', '.join(settings)} beside {method.name}")
+        return encode(method, capture, run, stitch)
+    return encode(method_for(capture, method, settings, say), capture, run, stitch)
+
+
 def method_for(
     capture: Capture, method: str | None = None, settings: dict[str, Any] | None = None, say: Callable[[str], None] = lambda line: None
 ) -> Method:

@@ -112,7 +112,7 @@ class CoefficientMaps(Method):
         weights = np.zeros((asset.clusters * (asset.components + 1), 3))
         functions = asset.light_functions
         for coordinates, colors in domain_of_asset(asset.manifest).shared(lights):
-            weights += functions.fold(coordinates, colors)
+            weights += functions.project(coordinates, colors)
         return weights
 
     @classmethod
@@ -154,10 +154,10 @@ class CoefficientMaps(Method):
 def check_settings(components: int, spread: float | str, ridge: float | str, encoding: str) -> None:
     """InputError on settings that no coefficient maps can have."""
     if not 1 <= components <= MOST_COMPONENTS:
-        raise InputError(f"expected 1 to {MOST_COMPONENTS} components, found {components}")
+        raise InputError(f"expected 1 to {MOST_COMPONENTS} `components`, found {components}")
     for name, value in (("spread", spread), ("ridge", ridge)):
         if value != "auto" and not (isinstance(value, (int, float)) and np.isfinite(value) and value > 0):
-            raise InputError(f"expected a {name} of auto or a number above 0 for light functions, found {value}")
+            raise InputError(f"expected `{name}` auto or a number above 0 for light functions, found {value}")
     if encoding not in get_args(Encoding):
         raise InputError(f"expected an encoding of half, float, uint8, found {encoding!r}")
 

@@ -25,9 +25,7 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     ranks, relative = ranks[kept], np.maximum(relative[kept], FLOOR)
     last = float(max(len(ranks), components, 10))
     rank_axis = Axis(1, last, "components (log scale)", log=True)
-    left = Plot(
-        450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value, relative to the first", log=True), (24, 20, 42, 58)
-    )
+    left = Plot(450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value over the first", log=True), (24, 20, 42, 58))
     left.line(ranks, relative, "blue")
     left.rule(x=components, style="line red thin dash")
     left.label(components, 1.0, f"{components} numbers", "strong red halo", dx=6, dy=12)

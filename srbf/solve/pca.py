@@ -9,10 +9,10 @@ from srbf.arrays import Float, Float32, Float64
 
 
 def principal_axes(rows: Float[ndarray, "n M"], count: int) -> tuple[Float32[ndarray, "count M"], Float64[ndarray, " count"]]:
-    """(orthonormal axes, singular values) of `rows` as they stand: subtract a mean before, or do not.
+    """(orthonormal axes, singular values) of `rows`; subtract a mean beforehand if required.
 
-    From the smaller of the two Gram matrices, float64: singular values below about 1e-8 of the first are noise. Where the rows have
-    fewer axes than asked for, the rest are 0. Work: n M min(n, M) flops and the leading eigenvectors of min(n, M)^2 numbers.
+    From the smaller of the two Gram matrices, float64: singular values below about 1e-8 of the first are noise. If the rows have
+    fewer axes than `count`, the rest are 0. Cost: n M min(n, M) flops and the leading eigenvectors of min(n, M)^2 numbers.
     """
     from scipy.linalg import eigh
 

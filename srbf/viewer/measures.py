@@ -1,4 +1,4 @@
-"""What the page asks to be measured when it is asked to show it: the error of every light, and spectra; of a few thousand texels."""
+"""Measurements on request of the page: the error of every light, and spectra, from a few thousand texels."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from srbf.light_domain import domain_of_asset, domain_of_capture
 from srbf.methods import method_of
 from srbf.methods import responses as asset_responses
 
-DIRECTIONS = 192  # that an asset is asked for where its own spectrum is taken: as many as it has light to tell apart
+DIRECTIONS = 192  # at which an asset is evaluated for its spectrum, enough for its number of functions
 
 
 class Measures:
-    """Figures of assets of one scene, and of their capture where there is one; each is taken once, when it is first asked for."""
+    """Measurements of assets of one scene, and of their capture if given; each is computed once, on first request."""
 
     def __init__(self, assets: Sequence[Asset], capture: Capture | None = None) -> None:
         self._assets = assets
@@ -34,12 +34,12 @@ class Measures:
 
     def errors(self, index: int) -> bytes:
         """JSON of asset `index` against every light of the capture: `rmse` and `psnr` (dB; of the peak of the train references) by light,
-        and `texels`, how many were looked at. Both are clamped at 0, but of indirect light, where the clamp comes later."""
+        and `texels`, the number of sampled texels. Both images are clamped at 0, except for indirect light."""
         return self._once("errors", index)
 
     def spectrum(self, index: int) -> bytes:
-        """JSON of asset `index`: singular values, largest first, of what it answers (`asset`) and of what the capture did (`capture`, or
-        null), both of the same texels and over the root of the number of answers; `scalars`: numbers that the asset keeps of a texel."""
+        """JSON of asset `index`: singular values, largest first, of its responses (`asset`) and of those of the capture (`capture`, or
+        null), for the same texels and over the root of the number of responses; `scalars`: the asset's numbers per texel."""
         return self._once("spectrum", index)
 
     def _once(self, what: str, index: int) -> bytes:
@@ -88,6 +88,6 @@ class Measures:
 
 
 def _listed(values: Float64[ndarray, " r"]) -> list[float]:
-    """All but what is rounding: six digits are enough for a plot."""
+    """All values above rounding errors, with six digits."""
     kept = values[values > 1e-5 * max(float(values[0]), 1e-30)]
     return [float(f"{value:.6g}") for value in kept]

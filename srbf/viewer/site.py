@@ -1,4 +1,4 @@
-"""`web`: a folder for any static host: the viewer's page, the asset, and the mesh that it lights."""
+"""`web`: a folder for any static host: the viewer's page, the asset and its mesh."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FORMS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `index.html` with its script and style, `viewer.json`, `spectrum.json`, `asset.json` with its images in
-    `data/`, and `mesh.glb` of a lightmap: `settings.mesh`, else rebuilt from its texels.
+    `data/`, and `mesh.glb` of a lightmap: `settings.mesh`, or rebuilt from its texels.
 
     MissingLibraryError without the built page; InputError on a mesh without a UV set.
     """
@@ -47,7 +47,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def shown_mesh(asset: Asset, mesh: Path | None, notes: list[str]) -> bytes | None:
-    """The model of a lightmap; None for a view, and, with a note, where the asset has none and none is given."""
+    """The mesh of a lightmap; None for a view, and, with a note, if no mesh is available."""
     if mesh is None and asset.receiver_kind == "view":
         return None
     try:

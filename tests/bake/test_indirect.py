@@ -98,7 +98,7 @@ def test_glass_leaves_little_in_the_images(bake) -> None:
     left = np.mean([np.abs(capture.image(i)).mean() for i in capture.indices("train")])
     assert left < 0.02 * direct
     triangles = read_triangles(capture.scene())
-    (transmittance,) = [t for t in triangles.tints if t.any()]  # words: ok
+    (transmittance,) = [t for t in triangles.transmittance if t.any()]  # words: ok
     np.testing.assert_allclose(transmittance[4:], np.tile([0.8, 0.4, 0.2], (4, 1)), atol=0.02)  # steep light passed it everywhere
 
 

@@ -1,4 +1,4 @@
-"""What is chosen, against slow twins that fit every candidate anew and look."""
+"""What is chosen, against slow twins that fit every candidate again and look."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeyp
     lights = [*capture.indices("train"), *capture.indices("validation")]
     images = np.stack([capture.image(i).reshape(-1, 3) for i in lights], axis=1)
     np.testing.assert_array_equal(sampled.responses, images[sampled.texels])
-    np.testing.assert_array_equal(sampled.directions, capture.directions(lights))
+    np.testing.assert_array_equal(sampled.coordinates, capture.directions(lights))
 
 
 def test_a_sample_is_of_covered_texels(make_capture) -> None:
@@ -150,9 +150,9 @@ def test_the_usual_stays_unless_another_is_much_better() -> None:
     given, centers = sample(0.5, False)
     options = candidates(given, centers)
     best = choose(given, options, RIDGES)
-    alike = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
-    kept = choose(given, options, RIDGES, usual=alike)
-    assert (kept.spread, kept.ridge) == alike and kept.error < 1.5 * best.error
+    same = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
+    kept = choose(given, options, RIDGES, usual=same)
+    assert (kept.spread, kept.ridge) == same and kept.error < 1.5 * best.error
     assert choose(given, options, RIDGES, usual=(9.0, 9.0)) == best  # not among them
     clean, centers = sample(1e-3, False)
     sure = choose(clean, candidates(clean, centers), RIDGES)

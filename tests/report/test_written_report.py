@@ -98,6 +98,7 @@ def test_the_animation_moves_and_is_small(report: Path) -> None:
         assert np.abs(np.asarray(animation.convert("RGB")) - first).mean() > 2
 
 
+@pytest.mark.slow
 def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report: Path) -> None:
     html, markdown = (report / "index.html").read_text(), (report / "report.md").read_text()
     sources = re.findall(r'src="([^"]*)"', html)

@@ -25,8 +25,8 @@ class Described:
     vulkan: int
     type_size: int
     model: int
-    block: int  # texels a side
-    plane: int  # bytes a block, and what a level starts on a multiple of
+    block: int  # texels per side
+    plane: int  # bytes per block; levels start at multiples of it
     samples: tuple[tuple[int, int, int, int, int], ...]
 
 
@@ -65,7 +65,7 @@ def pack(texture: TextureArray) -> bytes:
 
 
 def unpack(data: bytes) -> TextureArray:
-    """The array in the bytes of a file; ValueError on what `pack` does not write."""
+    """The array in the bytes of a file; ValueError for files that `pack` does not write."""
     if len(data) < HEADER or data[:12] != IDENTIFIER:
         raise ValueError("no KTX2 header")
     vulkan, _, width, height, depth, layers, faces, count, scheme = struct.unpack_from("<9I", data, 12)
