@@ -39,7 +39,7 @@ class Asset:
     """Stored layers with the rule value = stored * scale + bias, the functions that they weigh, and the receivers' geometry.
 
     `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255; BC7 and BC1 are decoded to bytes, of mip
-    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; scalar planes
+    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; coefficient maps
     are four to a layer, C = 4.
     `tables` holds what the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32,
     `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
@@ -82,7 +82,7 @@ class Asset:
 
     @property
     def components(self) -> int:
-        """How many scalar planes."""
+        """How many components."""
         return self.manifest["scalars"]
 
     @property
@@ -139,7 +139,7 @@ class Asset:
 
     @property
     def light_functions(self) -> LightFunctions:
-        """w_f(L) of scalar planes: function (S + 1) m + j is that of plane j in cluster m, j = 0 the mean's."""
+        """w_f(L) of coefficient maps: function (S + 1) m + j is that of component j in cluster m, j = 0 the mean's."""
         basis = self.manifest["light_basis"]
         return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), self.tables["light_coefficients"])
 
@@ -188,7 +188,7 @@ class Asset:
         return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to ask it for answers, not to save."""
+        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to get responses of, not to save."""
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
@@ -219,7 +219,7 @@ class Asset:
         return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
-        """Write the folder whole or not at all, an image a layer; fills in `sha256`."""
+        """Write the folder whole or not at all, one image per layer; fills in `sha256`."""
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
             if "layer" in self.layers[0]:  # read from a texture array: saved as what it decoded to
                 self.manifest[self.layers_key] = layer_entries(self.layers_key[:-1], self.held, self.scale, self.bias)

@@ -52,8 +52,8 @@ class EigenMap(CoefficientMaps):
 
     T(p, L, c) ~ w_0(L, c) + sum_j a_j(p) w_j(L, c), j = 1 … `components`
 
-    The rows of T, (L x 3) numbers a texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
-    number a texel for all three colors. What an axis holds at the lights becomes a function of every direction by kernel
+    The rows of T, (L x 3) numbers per texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
+    number per texel for all three colors. What an axis holds at the lights becomes a function of every direction by kernel
     ridge regression on a dense set of spherical Gaussians. One kernel, of one spread or of two, and one ridge serve all functions: those
     that predict best the lights left out and the validation lights (`auto`, `light_function_fit.choose_functions`). Columns of T are
     weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives the least squared error, `relative` divides

@@ -48,9 +48,9 @@ class Relighter:
     """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
 
     Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
-    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. `environments`: where their weights
-    are integrated; by shaders a sky may change from frame to frame. With a `view` receivers stand where its depth buffer says, not where
-    the position map does.
+    it makes a headless one of its own. `functions`: R of point lights from the asset's table, or by formula. `environments`: where their
+    weights are integrated; by shaders they may change from frame to frame. With a `view` receivers are where its depth buffer says, not
+    where the position map does.
     Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
     """
 
@@ -83,9 +83,9 @@ class Relighter:
                 self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
                 _, self._relit_buffer = self._target(self._type)
                 self._programs = Programs(self._context, self._resources)
-                self._sky = None
+                self._environment = None
                 if environments == "gpu":
-                    self._sky = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
+                    self._environment = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise
@@ -132,10 +132,10 @@ class Relighter:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if point_lights:
             self._passes.check_point_lights()
-        skies = [light for light in inside if isinstance(light, EnvironmentLight)] if self._sky is not None else []
-        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in skies])
+        environments_lit = [light for light in inside if isinstance(light, EnvironmentLight)] if self._environment is not None else []
+        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in environments_lit])
         with self._context:
-            by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
+            by_shader = None if self._environment is None or not environments_lit else self._environment.weights(weights, environments_lit)
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)
