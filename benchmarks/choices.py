@@ -1,7 +1,7 @@
-"""What the automatic choices lose against the best in hindsight: `python benchmarks/choices.py [CAPTURE | FOLDER]…`.
+"""Loss of the automatic choices against the best ones by the test lights: `python benchmarks/choices.py [CAPTURE | FOLDER]…`.
 
-Without any: nearly flat glossy boards under ring domes, with test lights between the rings. Of a CAPTURE the holdout lights are relit, of a
-FOLDER as SynthRTI has them (`…/Dome/dirs.lp` beside `…/Test/dirs.lp`) those of the second list. The light functions of an eigen map by
+Without arguments: nearly flat glossy boards under ring domes, test lights between the rings. A CAPTURE is tested on its holdout lights,
+a FOLDER in the layout of SynthRTI (`…/Dome/dirs.lp` beside `…/Test/dirs.lp`) on its second list. The light functions of an eigen map by
 `auto` beside the best single (spread, ridge) of a grid, and 25 and 35 maps beside theirs, dB. The table is Markdown.
 """
 
@@ -36,7 +36,7 @@ DOMES = {  # lights and elevation (degrees) of each ring
 }
 MATERIALS = {"four glosses": (0.1, 0.2, 0.35, 0.6), "two glosses": (0.12, 0.4), "satin": (0.3,), "shiny": (0.15,), "matte": (0.6,)}
 COMPONENTS, TEXELS = 48, 2000
-SPREADS = tuple(np.geomspace(0.5, 5, 12))  # of the lights' spacing, or of the centers' mean distance
+SPREADS = tuple(np.geomspace(0.5, 5, 12))  # light spacings, or mean distances of the centers
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 
 
@@ -66,7 +66,7 @@ def on_rings(counts: tuple[int, ...], elevations: tuple[float, ...]) -> np.ndarr
 
 
 def between_rings(elevations: tuple[float, ...], rng: np.random.Generator, count: int = 20) -> np.ndarray:
-    """Directions half-way between the rings, at random turns."""
+    """Directions half-way between the rings, at random azimuths."""
     edges = np.radians(elevations)
     elevation = ((edges[1:] + edges[:-1]) / 2)[np.arange(count) % (len(edges) - 1)]
     turn = rng.uniform(0, 2 * np.pi, count)
@@ -98,7 +98,7 @@ def boards(texels: int = 300) -> Iterator[Case]:
 
 
 def case_of(name: str, capture: Capture, peak: float | None = None) -> Case:
-    """A capture's train and holdout lights on a sample of its texels, whatever validation lights it has left out."""
+    """A capture's train and holdout lights on a sample of its texels, without its validation lights."""
     capture = capture.combined()
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TEXELS else np.sort(np.random.default_rng(0).choice(covered, TEXELS, replace=False))

@@ -1,8 +1,8 @@
-"""A worker with the messages of blender_bake that renders by a formula, at once: a `--blender` for tests of the host alone.
+"""A worker with the messages of blender_bake that renders by a formula: a `--blender` for tests of the host alone.
 
-It misbehaves as SRBF_FAULT says, KIND:LIGHT, only the first time where the kind ends in -once (SRBF_FAULT_STATE is the file that
-remembers): die, stop (the process stops answering), error, nan, short (a torn file), small (another size), wrong (another light);
-`garbage` talks nonsense between its events, `slow` takes its time.
+SRBF_FAULT is KIND:LIGHT; a kind that ends in -once occurs once (SRBF_FAULT_STATE is a file that records it). Kinds: die, stop (the
+process hangs), error, nan, short (a truncated file), small (another size), wrong (another light). `garbage` prints invalid lines
+between its events, `slow` waits.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-SLOW = 0.03  # seconds a light
+SLOW = 0.03  # seconds per light
 
 
 class FakeBlender:
-    """One job: the scene's facts and the receiver's channels, then requests as they come."""
+    """One job: the scene's facts and the receiver's channels, then requests."""
 
     def __init__(self, job: dict[str, Any]) -> None:
         self._job = job
@@ -66,7 +66,7 @@ class FakeBlender:
         if fault == "stop":
             os.kill(os.getpid(), signal.SIGSTOP)
         if fault == "error":
-            self._emit("error", message="Blender could not bake 'Plane': so it was asked")
+            self._emit("error", message="Blender could not bake 'Plane': as requested")
             sys.exit(1)
         noise = np.random.default_rng([request["seed"], samples]).normal(scale=samples**-0.5, size=(*self._size, 1))
         direct = np.maximum(self._normal @ np.array(light["direction"]), 0)[:, :, None] * np.array([1.0, 0.5, 0.25])
@@ -100,7 +100,7 @@ class FakeBlender:
 
 
 def _requests() -> Iterator[dict[str, Any]]:
-    """Until the host ends it or is no more."""
+    """Requests until the host closes the pipe or exits."""
     for line in iter(sys.stdin.readline, ""):
         request = json.loads(line)
         if request.get("end"):

@@ -16,8 +16,8 @@ class SRBF_OT_bake(bpy.types.Operator):
 
     bl_idname = "srbf.bake"
     bl_label = "Bake Relighting"
-    anew: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Anew", options={"SKIP_SAVE"}, description="Delete the previous bake, and bake the current scene"
+    again: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Again", options={"SKIP_SAVE"}, description="Delete the previous bake, and bake the current scene"
     )
 
     @classmethod
@@ -25,9 +25,9 @@ class SRBF_OT_bake(bpy.types.Operator):
         return _can_start(cls, settings.problem(context.scene.srbf))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self.anew and settings.state_of(settings.folder_of(context.scene.srbf) / "capture") != "nothing":
+        if self.again and settings.state_of(settings.folder_of(context.scene.srbf) / "capture") != "nothing":
             message = "The previous bake is deleted, and the current scene is baked"
-            return context.window_manager.invoke_confirm(self, event, title="Bake anew?", message=message, confirm_text="Bake Anew")
+            return context.window_manager.invoke_confirm(self, event, title="Bake again?", message=message, confirm_text="Bake Again")
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -36,11 +36,11 @@ class SRBF_OT_bake(bpy.types.Operator):
         state = settings.state_of(folder / "capture")
         copy = folder / settings.SCENE_COPY
         try:
-            if state == "nothing" or self.anew or not copy.is_file():
+            if state == "nothing" or self.again or not copy.is_file():
                 folder.mkdir(parents=True, exist_ok=True)
                 with show.own_materials():
                     bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=True, compress=False)
-            arguments = settings.bake_arguments(asked, folder, state, self.anew, bpy.app.binary_path)
+            arguments = settings.bake_arguments(asked, folder, state, self.again, bpy.app.binary_path)
             running.start(process.Job("Bake", process.host_command(arguments), folder / "bake.progress"))
         except (OSError, RuntimeError, AssetError, process.MissingHostError) as error:
             return _failed(self, error)

@@ -69,7 +69,7 @@ def _draw_bake(layout: bpy.types.UILayout, asked: settings.SrbfSettings) -> None
     else:
         if state == "half done":
             row.operator("srbf.bake", text="Resume", icon="PLAY")
-        row.operator("srbf.bake", text="Bake Anew", icon="FILE_REFRESH").anew = True
+        row.operator("srbf.bake", text="Bake Again", icon="FILE_REFRESH").again = True
     if running.last():
         _wrapped(layout, running.last())
 

@@ -98,7 +98,7 @@ def state_of(capture: Path) -> State:
     return "done" if (capture / "capture.json").is_file() else "nothing"
 
 
-def bake_arguments(settings: Any, folder: Path, state: State, anew: bool, blender: str) -> list[str]:
+def bake_arguments(settings: Any, folder: Path, state: State, again: bool, blender: str) -> list[str]:
     """Arguments of `srbf bake` for the scene's copy in `folder`, with the Blender at the path `blender` (empty: the bpy module)."""
     receiver = receiver_of(settings)
     kind = "lightmap" if settings.receiver == "OBJECT" else "view"
@@ -107,7 +107,7 @@ def bake_arguments(settings: Any, folder: Path, state: State, anew: bool, blende
     arguments += ["--samples", "auto" if settings.auto_samples else str(settings.samples), "--json-progress"]
     if settings.soft:
         arguments += ["--sun-angle", "auto"]
-    if anew and state != "nothing":
+    if again and state != "nothing":
         arguments.append("--force" if state == "done" else "--restart")
     return arguments + (["--blender", blender] if blender else [])
 

@@ -12,7 +12,7 @@ from srbf.methods.relighting_map import RelightingMap
 
 
 def main(capture_folder: str, picture: str) -> None:
-    """Fit 25 maps, say the held-out error, relight by a blue sky light and, where there are positions, a warm lamp."""
+    """Fit 25 maps, print the held-out error, relight by a blue directional light and, where there are positions, a warm point light."""
     capture = Capture.open(capture_folder)
     asset = RelightingMap(k=25).encode(capture)
     errors = evaluate(asset, capture)

@@ -15,6 +15,7 @@ from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
+from srbf.captured_light import UNIT_TOLERANCE
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers import read_texture_array
@@ -31,7 +32,6 @@ LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two:
 MANIFEST = "asset.json"
 GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
 SCENE_FILE = "scene.glb"
-UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(eq=False)

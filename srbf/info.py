@@ -14,7 +14,7 @@ from srbf.errors import ManifestError
 from srbf.io.image import size_of
 from srbf.methods import method_of
 
-UNFINISHED = "bake.json"  # beside the manifest of a bake that can still be gone on with
+UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
 
 
 def _samples(capture: Capture) -> dict[str, Any]:
-    """The fewest samples a texel that a light of each role has, where the capture says so."""
+    """The fewest samples per texel that a light of each role has, where the capture says so."""
     lights = capture.manifest["lights"]
     if not all("samples" in light for light in lights):
         return {}

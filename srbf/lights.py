@@ -45,7 +45,7 @@ class DirectionalLight:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", _unit(self.direction))
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class PointLight:
     radius: float = DEFAULT_RADIUS
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _triple(self.position, "position"))
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "position", triple(self.position, "position"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
         for name in ("a0", "radius"):
             value = float(getattr(self, name))
             if not (np.isfinite(value) and value > 0):
@@ -173,7 +173,7 @@ class EnvironmentLight:
         if not np.isfinite(image).all():
             raise InputError("expected a finite environment image, found NaN or Inf pixels")
         object.__setattr__(self, "image", image)
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
 
 
 Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight
@@ -268,7 +268,7 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     if isinstance(light, DirectionalLight):
         return replace(light, direction=_unit(linear @ light.direction))
     scale = float(np.cbrt(abs(np.linalg.det(linear))))
-    position = _triple(linear @ light.position + matrix[:3, 3], "position")
+    position = triple(linear @ light.position + matrix[:3, 3], "position")
     changes: dict[str, Any] = {"position": position, "a0": light.a0 * scale, "radius": light.radius * scale}
     if isinstance(light, SpotLight):
         return replace(light, direction=_unit(linear @ light.direction), **changes)
@@ -360,7 +360,8 @@ def environment_samples(
     return directions, solid_angle
 
 
-def _triple(value: object, name: str) -> Triple:
+def triple(value: object, name: str = "a vector") -> Triple:
+    """Three finite numbers as a tuple of floats; InputError for others, with `name` in its text."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError) as error:
@@ -371,5 +372,5 @@ def _triple(value: object, name: str) -> Triple:
 
 
 def _unit(value: object) -> Triple:
-    x, y, z = normalize(np.array(_triple(value, "direction")))
+    x, y, z = normalize(np.array(triple(value, "direction")))
     return (float(x), float(y), float(z))

@@ -64,7 +64,7 @@ def build_planes(
     patches: bool = False,
     seed: int = 0,
 ) -> Asset:
-    """An asset of random scalar planes with smooth random light functions; clusters are scattered, or in patches of 4 x 3 texels.
+    """An asset of random coefficient maps with smooth random light functions; clusters are scattered, or in patches of 4 x 3 texels.
 
     None clusters is an eigen map, a number of them a clustered one.
     """

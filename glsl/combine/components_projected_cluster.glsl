@@ -7,7 +7,7 @@
    twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #ifndef SRBF_COMPONENTS
-#error define SRBF_COMPONENTS: how many components a texel has
+#error define SRBF_COMPONENTS: components per texel
 #endif
 #ifndef SRBF_LAYERS
 #define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)

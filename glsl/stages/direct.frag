@@ -12,7 +12,7 @@ precision highp sampler2D;
 uniform sampler2D points;
 uniform sampler2D normals;
 uniform sampler2D heights;
-uniform sampler2D tints;
+uniform sampler2D transmittance;
 uniform sampler2D wallHeights;
 uniform vec3 across;
 uniform vec3 up;
@@ -36,6 +36,6 @@ void main() {
     float bias = BIAS * step;
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
-    visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
+    visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
     response = vec4(srbfDirect(normal, toLight, visibility) * weight, 1.0);
 }

@@ -14,7 +14,7 @@ uniform sampler2D points;   // a: weight in the texel's mean
 uniform sampler2D normals;  // of shading; a: height of the rounded surface above its triangle, meters
 uniform sampler2D faces;    // normals of the triangles
 uniform sampler2D heights;
-uniform sampler2D tints;
+uniform sampler2D transmittance;
 uniform sampler2D wallHeights;
 uniform vec3 across;
 uniform vec3 up;
@@ -46,6 +46,6 @@ void main() {
     float bias = BIAS * step;
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
-    visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
+    visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
     response = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
 }

@@ -14,7 +14,7 @@ from scripts.gallery.paths import ScenePaths
 from scripts.gallery.scenes import Fit, Lantern, Sun
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.lights import DirectionalLight, Light, PointLight
+from srbf.lights import DirectionalLight, Light, PointLight, triple
 from srbf.methods import linear_response
 from srbf.relighting.direct_light import Added
 
@@ -92,7 +92,7 @@ def lantern_lights(lantern: Lantern, frames: int) -> list[PointLight]:
     curve = CubicSpline(np.concatenate([[0], np.cumsum(lengths)]), corners, bc_type="periodic")
     positions = curve(np.arange(frames) * (lengths.sum() / frames))
     color = np.array(lantern.color)
-    return [PointLight(_triple(position), _triple(color), falloff="inverse-square", radius=lantern.radius) for position in positions]
+    return [PointLight(triple(position), triple(color), falloff="inverse-square", radius=lantern.radius) for position in positions]
 
 
 def with_flame(linear: ndarray, asset: Asset, point_light: PointLight) -> ndarray:
@@ -128,8 +128,3 @@ def pixel_angle(camera: dict, width: int) -> float:
     """Width of a pixel at depth 1, m."""
     top_right, _, _, top_left = np.array(camera["frame"])
     return float((top_right[0] - top_left[0]) / -top_left[2] / width)
-
-
-def _triple(values: ndarray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)

@@ -50,8 +50,7 @@ def compare_with_point_lights(
         raise InputError("expected covered texels in the asset, found none")
     if "position" not in asset.images:
         raise InputError("expected an asset with a position map for a comparison with point lights, found none")
-    source = asset.manifest.get("source", {})
-    described = source.get("receivers") or [source[key] for key in ("receiver",) if key in source]
+    described = asset.receivers
     if not described:
         raise InputError("expected an asset baked from a scene, found one that names no receiver")
     if not scene.is_file():

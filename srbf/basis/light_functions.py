@@ -32,7 +32,7 @@ class LightFunctions:
             values[:, chosen] = (weights @ coefficients).reshape(len(directions), -1, 3)
         return values
 
-    def fold(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
+    def project(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
         """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map."""
         projected = np.empty((len(self.spreads), 3))
         for chosen, weights in self._by_spread(directions):

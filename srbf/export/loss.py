@@ -17,7 +17,7 @@ AT_A_TIME = 8
 def relit_psnr(asset: Asset, other: Asset) -> float:
     """PSNR (dB) of `other` relit against `asset` relit, the mean over LIGHTS directions of the domain.
 
-    As DESIGN has it of captures: over covered texels, clamped at 0 (indirect answers unclamped), without ambient; the peak is the 99.9 %
+    As DESIGN has it of captures: over covered texels, clamped at 0 (indirect responses unclamped), without ambient; the peak is the 99.9 %
     quantile of the asset's own pictures. MAX_PSNR where nothing differs.
     """
     covered = asset.covered

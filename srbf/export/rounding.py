@@ -38,7 +38,7 @@ def blocks_together(
     """(K, bytes) uint8 of layers that are only seen in sums weighted by overlapping `functions`.
 
     As `quantization.round_together` [Babai1986], a block's loss in the place of a byte's: what the blocks of one layer lose, the layers
-    still to be compressed make up for. Then once more over all: each layer is compressed anew for what all others lack, and a block
+    still to be compressed make up for. Then once more over all: each layer is compressed again for what all others lack, and a block
     kept where the functions' metric G = R^T R says that less is lost: with errors e, change d of layer i counts 2 d (G e)_i + G_ii d^2.
     """
     height, width = values.shape[1:3]

@@ -154,14 +154,14 @@ class _Writer:
         return SceneMesh(self._objects, self._triangles, len(self._materials), size, tuple(self._receivers), camera)
 
     def _object(self, name: str, parts: list[dict[str, Any]], scratch: Path) -> int:
-        alike: dict[tuple[Any, ...], list[Float32[ndarray, "n C"]]] = {}
+        grouped: dict[tuple[Any, ...], list[Float32[ndarray, "n C"]]] = {}
         for part in parts:
             key = (part["material"], tuple((column, int(width)) for column, width in part["columns"]))
-            alike.setdefault(key, []).append(np.load(scratch / part["file"]))
-        corners = np.concatenate([rows[:, :3] for group in alike.values() for rows in group]).reshape(-1, 3, 3)
-        glass = any(self._looks[look]["transmission"] > 0 for look, _ in alike)
+            grouped.setdefault(key, []).append(np.load(scratch / part["file"]))
+        corners = np.concatenate([rows[:, :3] for group in grouped.values() for rows in group]).reshape(-1, 3, 3)
+        glass = any(self._looks[look]["transmission"] > 0 for look, _ in grouped)
         thickness = mean_thickness(corners) if glass else 0.0
-        primitives = [self._primitive(look, columns, np.concatenate(rows), thickness) for (look, columns), rows in alike.items()]
+        primitives = [self._primitive(look, columns, np.concatenate(rows), thickness) for (look, columns), rows in grouped.items()]
         if any("TEXCOORD_1" in primitive["attributes"] for primitive in primitives):
             self._receivers.append(name)
         return self.document.add("nodes", {"name": name, "mesh": self.document.add("meshes", {"name": name, "primitives": primitives})})

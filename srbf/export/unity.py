@@ -22,8 +22,8 @@ IMPORTED = "relit.srbf"
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `relit.srbf`, which Unity imports, `asset.json` with its images, `SrbfAsset.hlsl`, a sample shader, and the
-    code in `Srbf/`, which a project needs once. Half floats and floats are EXRs, an image a layer; bytes, BC7 and BC1 a DDS file with mip
-    levels.
+    code in `Srbf/`, which a project needs once. Half floats and floats are EXRs, one image per layer; bytes, BC7 and BC1 a DDS file
+    with mip levels.
 
     InputError on an asset that no shader relights.
     """

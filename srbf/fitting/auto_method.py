@@ -1,4 +1,4 @@
-"""Method, clusters and scalars for a number of bytes a texel, or for a number of decibels, by what they do to lights they did not see."""
+"""Choice of method and size for a number of bytes per texel, or of decibels, by the error on held-out lights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from srbf.methods.protocol import Method
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
 
-DEFAULT_BUDGET = 16  # bytes a texel
+DEFAULT_BUDGET = 16  # bytes per texel
 LEAST_BUDGET = 4  # one image of four bytes
 MOST_SIZE = 68  # bytes per texel that are tried for a number of decibels
 TRIED_TEXELS = 1 << 13

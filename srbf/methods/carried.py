@@ -33,7 +33,7 @@ def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dic
 def common_manifest(
     capture: Capture, method: str, domain: LightDomain, images: dict[str, ndarray], settings: dict[str, Any], fit: dict[str, Any]
 ) -> dict[str, Any]:
-    """The keys of asset.json that all methods write alike."""
+    """The keys of asset.json that all methods write."""
     made = capture.manifest.get("source", {})
     return {
         "format": "srbf-asset",

@@ -31,7 +31,7 @@ from srbf.sphere import Domain
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_PER_CLUSTER = 96
-FEATURES = 48  # numbers a texel by which it finds its cluster
+FEATURES = 48  # numbers per texel by which it finds its cluster
 
 TRIED_CLUSTERS = (16, 64, 256)
 MOST_TRIED = 64  # components of a candidate

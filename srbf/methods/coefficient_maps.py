@@ -112,7 +112,7 @@ class CoefficientMaps(Method):
         weights = np.zeros((asset.clusters * (asset.components + 1), 3))
         functions = asset.light_functions
         for coordinates, colors in domain_of_asset(asset.manifest).shared(lights):
-            weights += functions.fold(coordinates, colors)
+            weights += functions.project(coordinates, colors)
         return weights
 
     @classmethod

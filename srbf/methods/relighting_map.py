@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from srbf.gl.passes import Passes
 
 Basis = GaussianBasis | SphericalHarmonics | PolynomialTextureMap
-NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is foretold
-ROUNDING_MARGIN = 16  # of bytes: unseen lights lost 3 to 15 times what these texels foretell
+NOISE_TEXELS = 512  # any, and so many of the brightest, on which the loss of an encoding is predicted
+ROUNDING_MARGIN = 16  # of bytes: held-out lights lost 3 to 15 times what these texels predict
 TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest's spread
 LEAST_BYTE_RIDGE = 1e-2  # with less, maps cancel each other by more than bytes can hold
 

@@ -48,7 +48,7 @@ def relight(
     --------
     >>> sun = DirectionalLight((0.0, 0.0, 1.0), color=(1.0, 0.9, 0.8))
     >>> once, twice = relight(asset, [sun]), relight(asset, [sun, sun])
-    >>> bool(np.allclose(twice, 2 * once, atol=1e-5))  # linear in the lights, but for the clamp
+    >>> bool(np.allclose(twice, 2 * once, atol=1e-5))  # linear in the lights, up to the clamp
     True
     """
     with Added(asset, chosen(asset, direct)) as added:

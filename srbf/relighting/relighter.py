@@ -130,9 +130,9 @@ class Relighter:
                 self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
                 _, self._relit_buffer = self._target(self._type)
                 self._programs = Programs(self._context, self._resources)
-                self._sky = None
+                self._environment = None
                 if environments == "gpu":
-                    self._sky = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
+                    self._environment = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise
@@ -216,10 +216,10 @@ class Relighter:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if point_lights:
             self._passes.check_point_lights()
-        skies = [light for light in inside if isinstance(light, EnvironmentLight)] if self._sky is not None else []
-        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in skies])
+        environments_lit = [light for light in inside if isinstance(light, EnvironmentLight)] if self._environment is not None else []
+        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in environments_lit])
         with self._context:
-            by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
+            by_shader = None if self._environment is None or not environments_lit else self._environment.weights(weights, environments_lit)
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.lights import Light, PointLight, SpotLight, Triple, moved
+from srbf.lights import Light, PointLight, SpotLight, moved, triple
 
 LIGHTS_PER_STRIP = 6
 MARGIN_QUANTILE = 0.02  # of the positions at either end are ignored, so that a distant horizon does not move the lights away
@@ -94,7 +94,7 @@ def moving_point(asset: Asset, covered: ndarray, t: float) -> PointLight:
 def _point(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> PointLight:
     position = stage.point_light_at(t)
     a0 = max(float(np.linalg.norm(stage.point_light_at(0.5) - stage.center)), 1e-3)
-    return cast(PointLight, moved(PointLight(_triple(position), a0=a0), world))
+    return cast(PointLight, moved(PointLight(triple(position), a0=a0), world))
 
 
 def _spot(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> SpotLight:
@@ -103,9 +103,5 @@ def _spot(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> SpotLight:
     ray = target - position
     distance = max(float(np.linalg.norm(position - stage.center)), 1e-3)
     outer = float(np.arctan(0.4 * stage.radius / distance))
-    spot = SpotLight(_triple(position), a0=distance, direction=_triple(ray), inner=0.6 * outer, outer=outer)
+    spot = SpotLight(triple(position), a0=distance, direction=triple(ray), inner=0.6 * outer, outer=outer)
     return cast(SpotLight, moved(spot, world))
-
-
-def _triple(vector: Float64[ndarray, " 3"]) -> Triple:
-    return (float(vector[0]), float(vector[1]), float(vector[2]))

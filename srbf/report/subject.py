@@ -14,6 +14,7 @@ from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.captured_light import ROLES, Role
 from srbf.evaluation.errors_by_role import psnr
+from srbf.light_domain import domain_of_capture
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import responses
 from srbf.report.point_lights import demonstration_point_lights
@@ -74,12 +75,12 @@ def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_ligh
     ambient."""
     role: Role = next(r for r in ROLES[::-1] if capture.indices(r))
     indices = capture.indices(role)
-    directions = capture.directions(indices)
+    directions = domain_of_capture(capture).captured(capture, indices)
     chosen = [indices[i] for i in farthest_points(directions, SHOWN_LIGHTS)]
     chosen.sort(key=lambda i: -capture.lights[i].direction[2])
     covered = capture.coverage() >= COVERED
     references = np.stack([capture.image(i) for i in chosen])
-    relit = np.maximum(responses(asset, capture.directions(chosen)), 0)
+    relit = np.maximum(responses(asset, domain_of_capture(capture).captured(capture, chosen)), 0)
     level = float(np.quantile(references[:, covered], EXPOSURE_QUANTILE)) if covered.any() else 0.0
     gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
     points, spots = demonstration_point_lights(asset, covered, demo_lights)

@@ -31,8 +31,8 @@ class FittedCamera:
 def fitted_camera(asset: Asset) -> FittedCamera | None:
     """The pinhole camera that best fits the positions of a view's covered pixels; None without positions, or if none fits.
 
-    Direct linear transformation: u = (P1 x) / (P3 x) and v likewise, multiplied out, with the last entry of P set to 1 for x relative to
-    the points' center, which is in front of the camera; then P = lens · rotation · (1 | −position) by RQ decomposition.
+    Direct linear transformation: u = (P1 x) / (P3 x), v = (P2 x) / (P3 x), multiplied out, with the last entry of P set to 1 for x
+    relative to the points' center, which is in front of the camera; then P = lens · rotation · (1 | −position) by RQ decomposition.
     Ill-conditioned if all points lie in a plane: None.
     """
     if "position" not in asset.images:

@@ -1,4 +1,4 @@
-"""`viewer.json`: what the page is told before it reads an asset."""
+"""`viewer.json`: the page's configuration, read before the assets."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def described(asset: Asset, name: str, folder: str, spectrum: str, errors: str |
 
 
 def names(assets: Sequence[Asset], folders: Sequence[Path]) -> list[str]:
-    """What tells assets apart: their method and size, and the folder's name where two are alike."""
+    """Names of assets: their method and size, and the folder's name where two are the same."""
     told = [f"{family_of(asset)}, {name_of(asset)}" for asset in assets]
     return [f"{folder.resolve().name}: {name}" if told.count(name) > 1 else name for folder, name in zip(folders, told, strict=True)]
 

@@ -9,6 +9,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float64
 from srbf.io.scene_glb import KNOTS
+from srbf.lights import triple
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class SunFrame:
         lowest, highest = flat.min(axis=0), flat.max(axis=0)
         extent = max(float((highest - lowest).max()), 1e-6) * (1 + 2 * margin)
         low = (lowest + highest - extent) / 2
-        return SunFrame(_triple(across), _triple(up), _triple(direction), (float(low[0]), float(low[1])), extent)
+        return SunFrame(triple(across), triple(up), triple(direction), (float(low[0]), float(low[1])), extent)
 
 
 def place(
@@ -78,7 +79,3 @@ def transmittance(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n
 def direct(normal: Float[ndarray, "n 3"], to_light: Float[ndarray, " 3"], visibility: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """N.L times visibility: the irradiance by a directional light of unit irradiance."""
     return np.maximum(normal @ to_light, 0)[:, None] * visibility
-
-
-def _triple(vector: ndarray) -> tuple[float, float, float]:
-    return (float(vector[0]), float(vector[1]), float(vector[2]))

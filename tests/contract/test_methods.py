@@ -131,7 +131,7 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
     to_asset = np.eye(4)
     to_asset[:3, :3], to_asset[:3, 3] = turn.T / size, -turn.T @ at / size
     instance = replace(asymmetric, manifest={**asymmetric.manifest, "asset_from_world": to_asset.tolist()})
-    sun, point_light, spot, sky = LIGHTS
+    sun, point_light, spot, environment = LIGHTS
 
     def placed(light: PointLight) -> PointLight:
         return replace(light, position=tuple(size * turn @ light.position + at), a0=size * light.a0, radius=size * light.radius)
@@ -140,7 +140,7 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
         replace(sun, direction=tuple(turn @ sun.direction)),
         placed(point_light),
         replace(placed(spot), direction=tuple(turn @ spot.direction)),
-        replace(sky, image=np.roll(sky.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
+        replace(environment, image=np.roll(environment.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
     ]
     here = linear_response(asymmetric, LIGHTS)
     np.testing.assert_allclose(linear_response(instance, moved), here, atol=FLOAT32 * np.abs(here).max() * 10)

@@ -59,7 +59,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
     def error(light: int, without: np.ndarray) -> float:
         return float(((images[light] - predicted(light, np.setdiff1d(np.arange(count), without))) ** 2).mean())
 
-    tolerance = ROUNDING if count <= 128 else 0.2  # what is beyond the principal directions counts as noise, alike at all lights
+    tolerance = ROUNDING if count <= 128 else 0.2  # what is beyond the principal directions counts as noise, equally at all lights
     single = held_out.single(path, RIDGE)
     assert single[:12] == pytest.approx([error(i, np.array([i])) for i in range(12)], rel=tolerance)
     groups = [group for array in held_out.groups for group in array]

@@ -1,4 +1,4 @@
-"""What is chosen, against slow twins that fit every candidate anew and look."""
+"""What is chosen, against slow twins that fit every candidate again and look."""
 
 from __future__ import annotations
 
@@ -150,9 +150,9 @@ def test_the_usual_stays_unless_another_is_much_better() -> None:
     given, centers = sample(0.5, False)
     options = candidates(given, centers)
     best = choose(given, options, RIDGES)
-    alike = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
-    kept = choose(given, options, RIDGES, usual=alike)
-    assert (kept.spread, kept.ridge) == alike and kept.error < 1.5 * best.error
+    same = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
+    kept = choose(given, options, RIDGES, usual=same)
+    assert (kept.spread, kept.ridge) == same and kept.error < 1.5 * best.error
     assert choose(given, options, RIDGES, usual=(9.0, 9.0)) == best  # not among them
     clean, centers = sample(1e-3, False)
     sure = choose(clean, candidates(clean, centers), RIDGES)

@@ -15,7 +15,7 @@ from srbf.methods.relighting_map import RelightingMap
 from srbf.solve.streamed_product import TASK_COLUMNS
 
 METHOD = RelightingMap(k=9, spread="mean", ridge=0.1, encoding="float")
-ROUNDING = 1e-5  # of the largest coefficient: float32 sums over 30 lights in another order, times at most 1/(2 sqrt(ridge)) of the answer
+ROUNDING = 1e-5  # of the largest coefficient: float32 sums over 30 lights in another order, times at most 1/(2 sqrt(ridge)) of the result
 FLOAT64 = 1e-12
 
 

@@ -1,4 +1,4 @@
-"""What a byte buys: samples answer as their capture does, baselines are what they say, and a spectrum bounds every method."""
+"""Error by bytes: a sample scores like its capture, baselines have their bytes, and a spectrum bounds every method."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_every_family_is_told_apart(capture: Capture) -> None:
     assert (eigen.family, eigen.name, eigen.bytes_per_texel) == ("eigen map", "8 components", 16)
     assert (clustered.family, clustered.name) == ("clustered eigen map", "4 components, 3 clusters, bytes")
     assert clustered.bytes_per_texel == 5  # four scalars and the index
-    assert eigen.psnr > harmonics.psnr  # at fewer bytes: the facets' answers have a few components
+    assert eigen.psnr > harmonics.psnr  # at fewer bytes: the facets' responses have a few components
 
 
 def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
@@ -86,10 +86,10 @@ def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
     assert np.array_equal(found(tilted)[0], sample.image(train[0]).reshape(-1, 3))
     assert (nearest.family, every.family) == (NEAREST, ALL)
     assert nearest.bytes_per_texel == every.bytes_per_texel == 60 * IMAGE_BYTES
-    assert every.psnr > nearest.psnr + 3  # smooth answers are interpolated far better than they are picked
+    assert every.psnr > nearest.psnr + 3  # smooth responses are interpolated far better than they are picked
 
 
-def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Capture) -> None:
+def test_the_spectrum_is_that_of_the_responses_and_bounds_every_fit(capture: Capture) -> None:
     sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     train = sample.indices("train")
     responses = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)

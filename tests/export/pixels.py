@@ -44,7 +44,7 @@ def corner_shader() -> str:
 
 
 def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
-    """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of scalar planes, float32."""
+    """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of coefficient maps, float32."""
     weights = padded(methods.projected_weights(asset, lights).astype(np.float32))
     return weights if asset.method == "relighting-map" else weights.reshape(asset.clusters, asset.components + 1, 4)
 

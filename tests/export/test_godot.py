@@ -44,7 +44,7 @@ def projects(assets: dict[str, Asset], tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_project_is_an_asset_of_the_same_answer(method: str, assets: dict[str, Asset], projects: dict[str, Path]) -> None:
+def test_the_project_is_an_asset_of_the_same_response(method: str, assets: dict[str, Asset], projects: dict[str, Path]) -> None:
     np.testing.assert_array_equal(relight(Asset.open(projects[method]), LIGHTS), relight(assets[method], LIGHTS))
 
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.blender
 FLOAT32 = 2e-5  # relative to the same sum: a k-term sum, arccosine and exponential in Cycles' single precision
 TEXEL = 2e-3  # of the step to a neighbor: Cycles' first sample lies within 0.001 texel of the center, along either axis
 SUN = {"kind": "SUN", "name": "Sun", "energy": 2.0, "color": [1.0, 0.5, 0.25], "location": [0, 0, 0], "axis": [0.4, -0.3, 0.8]}
-SECOND = {"kind": "SUN", "name": "Sky", "energy": 0.5, "color": [0.1, 0.2, 0.9], "location": [0, 0, 5], "axis": [-0.7, 0.1, 0.3]}
+SECOND = {"kind": "SUN", "name": "Fill", "energy": 0.5, "color": [0.1, 0.2, 0.9], "location": [0, 0, 5], "axis": [-0.7, 0.1, 0.3]}
 POINT = {"kind": "POINT", "name": "Bulb", "energy": 30.0, "color": [1.0, 0.8, 0.6], "location": [0.3, -0.4, 0.7]}
 LOW = {"kind": "POINT", "name": "Candle", "energy": 4.0, "color": [0.9, 0.3, 0.1], "location": [-0.8, 0.5, 0.2]}
 

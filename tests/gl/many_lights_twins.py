@@ -1,4 +1,4 @@
-"""Twins of the functions for many lights in one pass, folded weights, R by formula and skies."""
+"""Twins of the functions for many lights in one pass, projected weights, R by formula and environments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ POINT_LIGHTS = [
     replace(SPOT, position=(0.0, 0.0, 50.0), inner=0.0, outer=1e-4),  # passes every receiver by
     replace(SPOT, falloff="linear", inner=0.2, outer=1.2),
 ]
-PLACES = 8  # more than there are lamps
+PLACES = 8  # more than there are point lights
 MANY = "pointLights, pointLightCount"
 COUNT = {"pointLightCount": len(POINT_LIGHTS)}
 
@@ -110,7 +110,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
                 defines=defines[by],
             )[:, 0]
             np.testing.assert_allclose(found, expected[:, i], atol=SUM)
-    assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that each is told from the other
+    assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that a mix-up shows
 
 
 @twin("lights/unpack_point_light.glsl")
@@ -161,7 +161,7 @@ def _(evaluate: Evaluate) -> None:
         )
 
     vectors = [light_vectors(light, positions) for light in POINT_LIGHTS]
-    strengths = np.stack([strength for _, strength in vectors])  # (lamps, N)
+    strengths = np.stack([strength for _, strength in vectors])  # (lights, N)
     shines = strengths > 0
     edge = (shines & (strengths < 1e-5)).any(axis=0)  # a cone's edge: single precision may say otherwise
     assert edge.sum() < N / 10 and len({*shines.sum(axis=0)}) > 1
@@ -178,7 +178,7 @@ def _(evaluate: Evaluate) -> None:
 
 
 def _far_and_point_lights(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
-    """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and LAMPS."""
+    """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and POINT_LIGHTS."""
     weights = projected_weights(asset, SUNS)
     positions = asset.images["position"][0]
     bias = np.abs(asset.bias[:, None])
@@ -337,7 +337,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
 
 
 def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
-    """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `lamps`."""
+    """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `point_lights`."""
     weights = projected_weights(asset, SUNS)
     bias = coefficient_maps.components_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.components)[:, 0]
     planes = np.abs(coefficient_maps.components_of(asset.coefficients(), asset.components)[:, 0]) + 2 * bias

@@ -200,7 +200,7 @@ def test_ambient_is_added_after_the_clamp(context: Any, make_asset: Callable[...
 
 
 def test_lights_add_up_before_the_clamp(context: Any, make_asset: Callable[..., Asset]) -> None:
-    """One light answered by -2, another by +3: together 1, not 3."""
+    """One light of response -2, another of +3: together 1, not 3."""
     coefficients = np.empty((7, 4, 5, 3), np.float32)
     asset = make_asset(7, height=4, width=5, coefficients=coefficients * 0)
     basis = asset.basis
@@ -231,11 +231,11 @@ def test_positions_stay_in_their_row_and_column(context: Any, make_asset: Callab
     with Relighter(asset, context=context) as relighter:
         lit = relighter.relight([near])
     assert np.unravel_index(lit[..., 0].argmax(), lit.shape[:2]) == (1, 8)
-    assert (np.abs(lit - methods.relight(asset, [near])) <= tolerance(asset, [near])).all()  # a receiver in the lamp included
+    assert (np.abs(lit - methods.relight(asset, [near])) <= tolerance(asset, [near])).all()  # a receiver in the light included
 
 
 def test_a_point_light_far_from_the_origin_keeps_its_digits(context: Any, make_asset: Callable[..., Asset]) -> None:
-    """Single precision would place this lamp to within 0.1 mm, 3e-4 of its distance."""
+    """Single precision would place this light to within 0.1 mm, 3e-4 of its distance."""
     asset = make_asset(25)
     offset = np.array([2000.0, -3000.0, 500.0])
     asset.images["position"] = (asset.images["position"] + offset).astype(np.float32)

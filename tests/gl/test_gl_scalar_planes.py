@@ -42,7 +42,7 @@ LIGHTS: dict[str, list[Light]] = {
     "hundred": [DirectionalLight((x, 0.2, 0.9), (0.01, 0.02, 0.03)) for x in np.linspace(-1, 1, 100).tolist()],
     "point": [PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "spot": [SPOT],
-    "two lamps": [SPOT, PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
+    "two lights": [SPOT, PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "several": [
         DirectionalLight((0.3, -0.5, 0.4), (0.2, 0.8, 0.3)),
         PointLight((-0.4, 0.6, -0.9), (1.0, 0.5, 2.0), falloff="inverse-square"),

@@ -40,7 +40,7 @@ def test_it_equals_rays_away_from_edges(context: Any, scene: Any, number: int) -
     spread = ndimage.maximum_filter(rays, (5, 5, 1)) - ndimage.minimum_filter(rays, (5, 5, 1))
     inside = spread.max(axis=2) < 0.02
     assert inside.mean() > 0.5 and rays[inside].min() < rays[inside].max()
-    np.testing.assert_allclose(mapped[inside], rays[inside], atol=0.01)  # half floats of the tints
+    np.testing.assert_allclose(mapped[inside], rays[inside], atol=0.01)  # half floats of the transmittances
     assert np.sqrt(((mapped - rays) ** 2).mean()) < EDGES
 
 

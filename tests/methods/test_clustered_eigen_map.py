@@ -19,7 +19,7 @@ HEIGHT, WIDTH = 18, 20
 
 
 def planted(clusters: int, components: int, seed: int = 0):
-    """(answer, labels): every texel in one of `clusters`, each with a mean and `scalars` RGB functions of its own."""
+    """(response, labels): every texel in one of `clusters`, each with a mean and `components` RGB functions of its own."""
     rng = np.random.default_rng(seed)
     labels = rng.integers(clusters, size=(HEIGHT, WIDTH))
     planes = rng.normal(size=(components, HEIGHT, WIDTH))
@@ -112,7 +112,7 @@ def test_more_clusters_than_texels(make_capture) -> None:
 
 @pytest.mark.slow
 def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
-    """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
+    """Every sixteen rows respond in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
     height, width, band = 512, 256, 16
     facing = np.random.default_rng(5).normal(size=(height // band, 3))
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)

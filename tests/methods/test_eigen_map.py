@@ -74,7 +74,7 @@ def test_the_error_left_is_that_of_the_truncated_svd(make_capture) -> None:
     rows = images.reshape(40, -1, 3).transpose(1, 0, 2).reshape(HEIGHT * WIDTH, -1)
     values = np.linalg.svd(rows - rows.mean(axis=0), compute_uv=False)
     error = responses(asset, capture.directions()) - images
-    # Lights of a Hammersley set do not all weigh alike, so the error is a little above the least there is.
+    # Lights of a Hammersley set do not all have the same weight, so the error is a little above the least there is.
     assert 1 - 1e-4 <= (error**2).sum() / (values[4:] ** 2).sum() < 1.1
 
 
@@ -138,7 +138,7 @@ def plane(make_capture, plane_positions) -> Asset:
 
 @pytest.mark.slow
 def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
-    # Directional lights weigh by the functions, point lights by their table: they meet but for the table's error.
+    # Directional lights weigh by the functions, point lights by their table: they agree up to the table's error.
     directions = random_directions(12, "hemisphere", np.random.default_rng(5))
     directions[:, 2] = np.maximum(directions[:, 2], 0.3)
     directions = normalize(directions)

@@ -44,7 +44,7 @@ def normals() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def lambert(tmp_path_factory: pytest.TempPathFactory) -> Capture:
-    """Receivers that answer max(0, n . L), without shadows."""
+    """Receivers with the response max(0, n . L), without shadows."""
     folder: Path = tmp_path_factory.mktemp("lambert")
     (folder / "lights").mkdir()
     lights = []

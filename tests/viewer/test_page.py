@@ -194,7 +194,7 @@ def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url:
 @pytest.mark.parametrize("suffix", ["exr", "png", "hdr"])
 def test_an_environment_dropped_on_the_page_lights_it(chromium: Any, asset: Asset, url: str, tmp_path: Path, suffix: str) -> None:
     environment = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)
-    path = tmp_path / f"sky.{suffix}"
+    path = tmp_path / f"environment.{suffix}"
     if suffix == "hdr":
         write_radiance(path, environment)
     else:
@@ -220,7 +220,11 @@ def write_radiance(path: Path, environment: np.ndarray) -> None:
 
 def test_files_that_are_no_environment_are_refused_in_one_line(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url, width=WIDTH, height=HEIGHT)
-    for name, expected in {"sky.gif": "as .exr, .hdr or .png", "sky.exr": "cannot read sky.exr", "sky.hdr": "cannot read sky.hdr"}.items():
+    for name, expected in {
+        "environment.gif": "as .exr, .hdr or .png",
+        "environment.exr": "cannot read environment.exr",
+        "environment.hdr": "cannot read environment.hdr",
+    }.items():
         chromium("drop", name=name, bytes=base64.b64encode(b"not a picture").decode())
         assert expected in chromium("run", script="document.getElementById('toast').textContent")
     assert chromium("run", script="document.querySelectorAll('#chips .chip').length") == 2, "the sun, and the list to add others from"

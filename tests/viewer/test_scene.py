@@ -1,4 +1,4 @@
-"""Lamps hung in the scene, meshes under the orbit camera, and the capture beside what is relit."""
+"""Point lights in the scene, meshes under the orbit camera, and the capture beside what is relit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Direct light by rays against closed forms: cosines, shadow edges, penumbrae, tints, lamps."""
+"""Direct light by rays against closed forms: cosines, shadow edges, penumbrae, transmittance, point lights."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def columns(size: int = 40) -> np.ndarray:
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0.6, 0, 0.8), (-0.3, 0.5, 0.2)])
-def test_an_open_plane_answers_with_its_cosine(plane, direction) -> None:
+def test_an_open_plane_responds_with_its_cosine(plane, direction) -> None:
     unit = normalize(np.array(direction, float))
     light = DirectionalLight(tuple(unit), (1.0, 2.0, 0.5))
     np.testing.assert_allclose(

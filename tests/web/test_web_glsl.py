@@ -31,7 +31,7 @@ def resolved(npm: Callable[..., str]) -> dict[str, str]:
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_the_package_resolves_a_stage_as_the_library_does(resolved: dict[str, str], stage: str) -> None:
-    """The same lines in the same order, but for comments, #version and #line."""
+    """The same lines in the same order, except comments, #version and #line."""
     text = re.sub(r"/\*.*?\*/|//[^\n]*|^\s*#\s*(?:version|line)\b[^\n]*", "", resolve(stage).text, flags=re.DOTALL | re.MULTILINE)
     lines = [line.rstrip() for line in text.splitlines() if line.strip()]
     assert len(lines) >= 5

@@ -156,7 +156,7 @@ def test_linear_filtering_is_bilinear(browser: Any, served: dict) -> None:
 
 
 def test_a_mesh_far_away_shows_the_file_s_own_mip_level(browser: Any, make_asset: Callable[..., Asset]) -> None:
-    """At two texels a pixel, level 1 of BC7 layers as the export filtered them."""
+    """At two texels per pixel, level 1 of BC7 layers as the export filtered them."""
     asset = complete(on_a_plane(make_asset(k=4, encoding="half", height=16, width=24)))
     asset.images["coverage"][:] = 1
     url = browser.place(lambda folder: export(asset, "dds", folder, Settings(levels=2)))
@@ -194,7 +194,7 @@ def test_a_gltf_export_loads_and_is_lit_by_the_asset_that_it_names(browser: Any,
         ({"type": "PointLight", "distance": 3}, "expected a light of distance 0"),
     ],
 )
-def test_lights_that_no_asset_answers_are_refused(browser: Any, served: dict, light: dict, message: str) -> None:
+def test_lights_that_no_asset_supports_are_refused(browser: Any, served: dict, light: dict, message: str) -> None:
     _, url = served["relighting-map", "half"]
     light = {"color": (1, 1, 1), "intensity": 1, "position": (0, 1, 0), **light}
     job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": [light]}

@@ -110,7 +110,7 @@ export class DirectLight {
         normals: { value: null },
         heights: { value: this.heights.texture },
         wallHeights: { value: this.wallHeights.texture },
-        tints: { value: this.transmittances.texture },
+        transmittance: { value: this.transmittances.texture },
         reflectance: { value: this.reflectance },
         weight: { value: [0, 0, 0] },
       },

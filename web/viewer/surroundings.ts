@@ -213,8 +213,8 @@ function daylight(): Scene {
     fragmentShader: `varying vec3 towards;
 void main() {
     float h = normalize(towards).y;
-    vec3 sky = mix(vec3(0.95, 0.97, 1.0), vec3(1.6, 1.75, 2.0), smoothstep(0.0, 0.9, h));
-    gl_FragColor = vec4(mix(vec3(0.16, 0.15, 0.14), sky, smoothstep(-0.05, 0.08, h)), 1.0);
+    vec3 above = mix(vec3(0.95, 0.97, 1.0), vec3(1.6, 1.75, 2.0), smoothstep(0.0, 0.9, h));
+    gl_FragColor = vec4(mix(vec3(0.16, 0.15, 0.14), above, smoothstep(-0.05, 0.08, h)), 1.0);
 }`,
   });
   scene.add(new Mesh(new SphereGeometry(10, 32, 16), material));

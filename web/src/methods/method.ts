@@ -24,7 +24,7 @@ export interface Method {
   /** Whether layers may be filtered between texels; otherwise a lightmap is drawn from them first, and that is filtered. */
   readonly filterable: boolean;
   /**
-   * GLSL ES 3.00 that declares the uniforms and `vec3 srbfSum(vec2 uv, float level, vec3 receiver)`, `srbfRelit` likewise, and
+   * GLSL ES 3.00 that declares the uniforms and `vec3 srbfSum(vec2 uv, float level, vec3 receiver)`, `srbfRelit` of the same parameters, and
    * `vec3 srbfRelitSurface(vec2 uv, vec3 receiver)`: see `shaderText`.
    */
   readonly shader: string;
