@@ -36,15 +36,34 @@ SCENE_FILE = "scene.glb"
 
 @dataclass(eq=False)
 class Asset:
-    """Stored layers with the rule value = stored * scale + bias, the functions that they weigh, and the receivers' geometry.
+    """What a fit leaves to ship: stored layers, the functions that they weigh, and the receivers' geometry.
 
-    `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255; BC7 and BC1 are decoded to bytes, of mip
-    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; coefficient maps
-    are four to a layer, C = 4.
-    `tables` holds what the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32,
-    `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
-    `images` holds position, normal (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
-    `manifest` is asset.json: what is in memory is exactly what the files say.
+    A layer's value is stored * scale + bias. Relighting maps are N = K layers of C = 3, one per Gaussian; coefficient maps are four to a
+    layer, C = 4. What is in memory is exactly what the files say.
+
+    Parameters
+    ----------
+    manifest
+        The content of asset.json.
+    stored
+        (N, H, W, C) float16, float32 or uint8, as on disk. A byte counts as byte / 255; BC7 and BC1 are decoded to bytes; of mip levels the
+        full size alone is kept.
+    scale, bias
+        (N, C) float32.
+    tables
+        What the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32, `w_table` (rows,
+        columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
+    images
+        position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
+    scene
+        scene.glb of an indirect asset: what casts the shadows of the light to be added.
+
+    Examples
+    --------
+    >>> asset.method, asset.k, asset.encoding
+    ('relighting-map', 9, 'half')
+    >>> asset.stored.shape, asset.basis.centers.shape
+    ((9, 6, 8, 3), (9, 3))
     """
 
     manifest: dict[str, Any]
@@ -82,7 +101,7 @@ class Asset:
 
     @property
     def components(self) -> int:
-        """How many components."""
+        """How many components per texel: coefficient maps, four to a layer."""
         return self.manifest["scalars"]
 
     @property
@@ -139,7 +158,14 @@ class Asset:
 
     @property
     def light_functions(self) -> LightFunctions:
-        """w_f(L) of coefficient maps: function (S + 1) m + j is that of component j in cluster m, j = 0 the mean's."""
+        """w_f(L) of eigen maps: function (S + 1) m + j is that of component j in cluster m, j = 0 the mean's.
+
+        Examples
+        --------
+        >>> eigen = fit(capture, components=4)
+        >>> eigen.light_functions.evaluate(np.array([[0.0, 0.0, 1.0]])).shape  # (L, F, 3)
+        (1, 5, 3)
+        """
         basis = self.manifest["light_basis"]
         return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), self.tables["light_coefficients"])
 
@@ -149,7 +175,23 @@ class Asset:
 
     @property
     def basis(self) -> GaussianBasis:
-        """The Gaussians that relighting maps weigh, centers normalized here; InputError on an asset of other functions."""
+        """The Gaussians that relighting maps weigh.
+
+        Returns
+        -------
+        GaussianBasis
+            `centers` (K, 3), normalized here, and `spread`, rad.
+
+        Raises
+        ------
+        InputError
+            On an asset of other functions.
+
+        Examples
+        --------
+        >>> asset.basis.centers.shape, asset.basis.spread > 0
+        ((9, 3), True)
+        """
         basis = self.manifest.get("basis", {"kind": self.method})
         if basis["kind"] != "gaussian":
             raise InputError(f"expected relighting maps of Gaussians, found {basis['kind']}")
@@ -158,23 +200,67 @@ class Asset:
 
     @property
     def map_functions(self) -> GaussianBasis | SphericalHarmonics | PolynomialTextureMap:
-        """The functions that relighting maps weigh, Gaussians or a baseline's."""
+        """The functions that relighting maps weigh, Gaussians or a baseline's.
+
+        Examples
+        --------
+        >>> asset.map_functions.evaluate(np.array([[0.0, 0.0, 1.0]])).shape  # (L, K)
+        (1, 9)
+        """
         kind = self.manifest["basis"]["kind"]
         return self.basis if kind == "gaussian" else HARMONICS[kind](self.k)
 
     @property
     def asset_from_world(self) -> Float64[ndarray, "4 4"]:
-        """World to the frame that the asset was captured in: identity until an instance moves it."""
+        """World to the frame that the asset was captured in: identity until an instance moves it.
+
+        Returns
+        -------
+        ndarray
+            (4, 4) float64, acts on columns (x, y, z, 1).
+
+        Examples
+        --------
+        >>> bool((asset.asset_from_world == np.eye(4)).all())
+        True
+        """
         return np.array(self.manifest.get("asset_from_world", np.eye(4).tolist()), np.float64)
 
     @property
     def covered(self) -> Bool[ndarray, "H W"]:
-        """Which texels are real; all of them where the asset says nothing."""
+        """Which texels are real; all of them where the asset says nothing.
+
+        Returns
+        -------
+        ndarray
+            (H, W) bool.
+
+        Examples
+        --------
+        >>> asset.covered.shape, bool(asset.covered.all())
+        ((6, 8), True)
+        """
         coverage = self.images.get("coverage")
         return np.ones((self.height, self.width), bool) if coverage is None else coverage >= COVERED
 
     def coefficients(self, rows: slice = slice(None)) -> Float32[ndarray, "N h W C"]:
-        """The decoded layers, c_i of relighting maps, or some of their rows."""
+        """The decoded layers: c_i of relighting maps, a_j of eigen maps.
+
+        Parameters
+        ----------
+        rows
+            Some rows of texels; by default all.
+
+        Returns
+        -------
+        ndarray
+            (N, h, W, C) float32, linear.
+
+        Examples
+        --------
+        >>> asset.coefficients().shape, asset.coefficients(slice(0, 2)).shape
+        ((9, 6, 8, 3), (9, 2, 8, 3))
+        """
         stored = self.stored[:, rows].astype(np.float32)
         if self.held == "uint8":
             stored /= 255
@@ -188,30 +274,80 @@ class Asset:
         return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to get responses of, not to save."""
+        """An asset of some texels alone, without their geometry: to relight it, not to save.
+
+        Parameters
+        ----------
+        texels
+            (n,) flat indices, row by row from the top.
+
+        Returns
+        -------
+        Asset
+            Of height 1 and width n.
+
+        Examples
+        --------
+        >>> sun = DirectionalLight((0.0, 0.0, 1.0))
+        >>> bool(np.allclose(relight(asset.at(np.array([9])), [sun])[0, 0], relight(asset, [sun])[1, 1]))
+        True
+        """
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
         return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images={})
 
     def bytes_per_texel(self) -> dict[str, int | float]:
-        """What a shader reads of a texel's own data, by kind of light: its layers, three channels counting as four since no GPU
-        keeps three, blocks by their sixteenth, and its cluster's index; the position that point and spot lights need is left out.
+        """What a shader reads of a texel's own data, by kind of light: its layers and its cluster's index.
+
+        Three channels count as four, since no GPU keeps three, blocks by their sixteenth. The position that point and spot lights need is
+        left out.
+
+        Returns
+        -------
+        dict
+            Bytes by `directional`, `point`, `spot` and `environment`.
+
+        Examples
+        --------
+        >>> asset.bytes_per_texel()["directional"]  # 9 maps of 4 half floats
+        72
         """
         bits = TEXEL_BITS[self.encoding] * len(self.stored) + (8 if "cluster_index" in self.tables else 0)
         own = bits / 8 if bits % 8 else bits // 8
         return {"directional": own, "point": own, "spot": own, "environment": own}
 
     def layer_bytes(self) -> int:
-        """The layers as GPU memory, with the mip levels they have, and the clusters' index."""
+        """The layers as GPU memory, with the mip levels they have, and the clusters' index.
+
+        Returns
+        -------
+        int
+            Bytes of all texels.
+
+        Examples
+        --------
+        >>> asset.layer_bytes() == 9 * asset.width * asset.height * 8  # 9 maps of 4 half floats
+        True
+        """
         sizes = [level_size(self.width, self.height, level) for level in range(self.levels)]
         form = self.encoding
         a_layer = sum(2 * level_bytes("half", *size) if form == "float" else level_bytes(form, *size) for size in sizes)
         return len(self.stored) * a_layer + (self.width * self.height if "cluster_index" in self.tables else 0)
 
     def resident_bytes(self) -> int:
-        """Everything the folder holds, as GPU memory: layers, position, normal, albedo, ambient (RGBA float), coverage, the tables and the
-        scene."""
+        """Everything the folder holds, as GPU memory.
+
+        Returns
+        -------
+        int
+            Bytes of layers, position, normal, albedo, ambient (RGBA float), coverage, the tables and the scene.
+
+        Examples
+        --------
+        >>> asset.resident_bytes() > asset.layer_bytes() == 72 * asset.width * asset.height
+        True
+        """
         texels = self.width * self.height
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
         tables = {name: table for name, table in self.tables.items() if name != "cluster_index"}
@@ -219,7 +355,28 @@ class Asset:
         return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
-        """Write the folder whole or not at all, one image per layer; fills in `sha256`."""
+        """Write the folder whole or not at all, one image per layer; fills in `sha256` of the manifest.
+
+        Parameters
+        ----------
+        folder
+            Made with its parents.
+        force
+            Replace an asset that is there.
+
+        Raises
+        ------
+        OutputExistsError
+            Where the folder exists and `force` is not set, or it holds something else than an asset.
+
+        Examples
+        --------
+        >>> asset.save(folder / "saved")
+        >>> asset.save(folder / "saved")
+        Traceback (most recent call last):
+        srbf.errors.OutputExistsError: ...
+        >>> asset.save(folder / "saved", force=True)
+        """
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
             if "layer" in self.layers[0]:  # read from a texture array: saved as what it decoded to
                 self.manifest[self.layers_key] = layer_entries(self.layers_key[:-1], self.held, self.scale, self.bias)
@@ -243,7 +400,28 @@ class Asset:
 
     @staticmethod
     def open(folder: Path | str) -> Asset:
-        """Read an asset; ManifestError or ImageError, in one line, where a file is missing, damaged or not what asset.json says."""
+        """Read an asset, all of it.
+
+        Parameters
+        ----------
+        folder
+            What `save`, `srbf fit` or `srbf export` wrote.
+
+        Returns
+        -------
+        Asset
+            Exactly what the files say.
+
+        Raises
+        ------
+        ManifestError, ImageError
+            In one line, where a file is missing, damaged or not what asset.json says.
+
+        Examples
+        --------
+        >>> Asset.open(folder / "asset").method
+        'relighting-map'
+        """
         folder = Path(folder)
         path = folder / MANIFEST
         if not path.is_file():

@@ -36,7 +36,24 @@ OnImage = Callable[[int, ndarray], None]  # (position within the lights requeste
 
 @dataclass(frozen=True)
 class Capture:
-    """An opened capture; images are read on request. `manifest` is the content of capture.json."""
+    """An opened capture; images are read on request.
+
+    Parameters
+    ----------
+    folder
+        Holds capture.json and the images.
+    manifest
+        The content of capture.json.
+    lights
+        One per image: direction or position, role, file.
+
+    Examples
+    --------
+    >>> capture.width, capture.height, len(capture.lights)
+    (8, 6, 48)
+    >>> capture.quantity, capture.transport, capture.kind
+    ('irradiance', 'combined', 'directional')
+    """
 
     folder: Path
     manifest: dict[str, Any]
@@ -46,7 +63,25 @@ class Capture:
     def open(folder: Path | str) -> Capture:
         """Read and check capture.json; keys not known to this version are ignored.
 
-        Raises ManifestError, in one line, where there is none or it breaks the format.
+        Parameters
+        ----------
+        folder
+            Holds capture.json: what a bake or an import wrote.
+
+        Returns
+        -------
+        Capture
+            No image is read yet.
+
+        Raises
+        ------
+        ManifestError
+            In one line, where there is no capture.json or it breaks the format.
+
+        Examples
+        --------
+        >>> Capture.open(folder / "capture").lights == capture.lights
+        True
         """
         folder = Path(folder)
         path = folder / MANIFEST
@@ -103,7 +138,23 @@ class Capture:
         return all(light.direct is not None for light in self.lights)
 
     def combined(self) -> Capture:
-        """The same capture with the direct light added; itself where it is combined. ManifestError where direct images are missing."""
+        """The same capture with the direct light added to every image; itself where it is combined.
+
+        Returns
+        -------
+        Capture
+            Of `transport` combined.
+
+        Raises
+        ------
+        ManifestError
+            Where an indirect capture lacks direct images.
+
+        Examples
+        --------
+        >>> capture.combined() is capture
+        True
+        """
         if self.transport == "combined":
             return self
         if not self.has_direct:
@@ -111,7 +162,23 @@ class Capture:
         return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
 
     def scene(self) -> bytes | None:
-        """The bytes of the .glb of receivers and occluders; None where the capture has none. ManifestError where the file is missing."""
+        """The triangles of receivers and occluders.
+
+        Returns
+        -------
+        bytes or None
+            Of a .glb; None where the capture has none.
+
+        Raises
+        ------
+        ManifestError
+            Where the file is missing.
+
+        Examples
+        --------
+        >>> capture.scene() is None
+        True
+        """
         if "scene" not in self.manifest:
             return None
         path = self.folder / self.manifest["scene"]
@@ -125,32 +192,134 @@ class Capture:
         return self.manifest.get("source", {}).get("bits")
 
     def indices(self, role: Role) -> list[int]:
-        """Indices of the lights of this role, in order."""
+        """Indices of the lights of a role, in order.
+
+        Parameters
+        ----------
+        role
+            `train`: fitted. `validation`: random lights that choices look at. `holdout`: random lights that measure the error.
+
+        Returns
+        -------
+        list
+            Of integers, from 0 to the number of lights; empty where the capture has no such light.
+
+        Examples
+        --------
+        >>> len(capture.indices("train")), capture.indices("validation"), capture.indices("holdout")[:2]
+        (40, [], [40, 41])
+        """
         return [i for i, light in enumerate(self.lights) if light.role == role]
 
     def directions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
-        """Unit directions from the surface to the lights `indices` (default: all); InputError where they are not directional."""
+        """Unit directions from the surface to the lights.
+
+        Parameters
+        ----------
+        indices
+            Of lights; None: all.
+
+        Returns
+        -------
+        ndarray
+            (L, 3) float64, in Blender's world: z up.
+
+        Raises
+        ------
+        InputError
+            Where the lights are not directional.
+
+        Examples
+        --------
+        >>> directions = capture.directions(capture.indices("train"))
+        >>> directions.shape, bool((directions[:, 2] > 0).all())
+        ((40, 3), True)
+        """
         self.require_directional("directions")
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.direction for light in chosen], np.float64).reshape(-1, 3)
 
     def positions(self, indices: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
-        """Positions of the point lights `indices` (default: all), m; InputError where they are directional."""
+        """Positions of point lights.
+
+        Parameters
+        ----------
+        indices
+            Of lights; None: all.
+
+        Returns
+        -------
+        ndarray
+            (L, 3) float64 in the world, m.
+
+        Raises
+        ------
+        InputError
+            Where the lights are directional.
+
+        Examples
+        --------
+        >>> capture.positions()
+        Traceback (most recent call last):
+        srbf.errors.InputError: ...
+        """
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.position for light in chosen], np.float64).reshape(-1, 3)
 
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
-        """The receivers' responses to light `index`.
+        """The receivers' responses to one light: a column of T.
 
-        Raises ImageError for another size, a damaged file or NaN, InputError where the image covers a region only.
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        ndarray
+            (H, W, 3) float32, linear, row 0 at the top; of the capture's quantity, under a light of unit irradiance
+            (a point light's at 1 m).
+
+        Raises
+        ------
+        ImageError
+            On another size, a damaged file or NaN.
+        InputError
+            Where the image covers a region only.
+
+        Examples
+        --------
+        >>> capture.image(0).shape
+        (6, 8, 3)
         """
         self.require_whole([index])
         return self._read(self.lights[index].file, 3)
 
     def partial_image(self, index: int) -> tuple[Float32[ndarray, "H W 3"], Bool[ndarray, "H W"]]:
-        """(responses to light `index`, 0 outside its region; the region). The region is all receivers where the light names none.
+        """The responses to one light, and the region that its image holds. Values outside the region are not looked at: they may be NaN.
 
-        Values outside the region are not looked at: they may be NaN. ImageError as of `image`.
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        responses
+            (H, W, 3) float32, 0 outside the region.
+        region
+            (H, W) bool; all receivers where the light names none.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> responses, region = capture.partial_image(0)
+        >>> responses.shape, bool(region.all())
+        ((6, 8, 3), True)
         """
         light = self.lights[index]
         known = self.region(index)
@@ -159,7 +328,28 @@ class Capture:
         return self._partial(light.file, known), known
 
     def region(self, index: int) -> Bool[ndarray, "H W"] | None:
-        """Which receivers the image of light `index` holds; None where it holds all. A mask file holds those above 0."""
+        """Which receivers the image of a light holds. A mask file holds those above 0.
+
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W) bool; None where it holds all.
+
+        Raises
+        ------
+        ImageError
+            Where the mask is damaged, missing, or of another size.
+
+        Examples
+        --------
+        >>> capture.region(0) is None
+        True
+        """
         region = self.lights[index].region
         if region is None:
             return None
@@ -180,10 +370,31 @@ class Capture:
                 )
 
     def blocks(self, indices: Sequence[int]) -> Iterator[tuple[int, Float32[ndarray, "b P 3"]]]:
-        """Blocks of T's columns: (position of the block's first light within `indices`, the block), the next block read ahead.
+        """Blocks of T's columns; the next block is read ahead.
 
-        Memory: three blocks of at most BLOCK_BYTES (or one image), however many lights there are. InputError where an image covers a
-        region only.
+        Memory: three blocks of at most BLOCK_BYTES (or one image), however many lights there are.
+
+        Parameters
+        ----------
+        indices
+            Of lights.
+
+        Yields
+        ------
+        tuple
+            The position of the block's first light within `indices`, and the block: (b, P, 3) float32, finite, P = H W.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+        InputError
+            Where an image covers a region only.
+
+        Examples
+        --------
+        >>> [(first, block.shape) for first, block in capture.blocks(capture.indices("train"))]
+        [(0, (40, 48, 3))]
         """
         size = max(1, BLOCK_BYTES // (self.width * self.height * 12))
         return self._blocks(indices, size, np.dtype(np.float32), 0)
@@ -191,12 +402,39 @@ class Capture:
     def stream(
         self, indices: Sequence[int], on_image: OnImage = lambda row, image: None, rows: Rows = None
     ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
-        """`blocks` as stored, for sums over many lights: float16 where all of `indices` are half floats, else float32; all finite.
+        """`blocks` as stored, for sums over many lights. A block is valid until the next iteration: its memory is used again.
 
-        A block is valid until the next iteration: its memory is used again. `on_image` gets every image once, straight from
-        its file, in the thread that read it. With `rows` the images have only those, in blocks of as many lights as without.
-        Memory: two blocks of STREAM_BYTES (or one image) and an image per core, however many lights there are. InputError where an
-        image covers a region only.
+        Memory: two blocks of STREAM_BYTES (or one image) and an image per core, however many lights there are.
+
+        Parameters
+        ----------
+        indices
+            Of lights.
+        on_image
+            Gets every image once, as (position within `indices`, (P, 3) as stored), straight from its file, in the thread that read it.
+        rows
+            Ranges (begin, end) of rows; the images have only those, in blocks of as many lights as without. None: all.
+
+        Yields
+        ------
+        tuple
+            The position of the block's first light within `indices`, and the block: (b, P, 3), finite; float16 where all of `indices` are
+            half floats, else float32.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+        InputError
+            Where an image covers a region only.
+
+        Examples
+        --------
+        >>> total = np.zeros((48, 3))
+        >>> for first, block in capture.stream(capture.indices("train")):
+        ...     total += block.sum(axis=0)
+        >>> [block.shape for _, block in capture.stream([0, 1], rows=[(0, 2)])]
+        [(2, 16, 3)]
         """
         with ThreadPoolExecutor(cores()) as readers:
             half = all(readers.map(lambda index: holds_half(self.folder / self.lights[index].file), indices))
@@ -205,9 +443,34 @@ class Capture:
         return self._blocks(indices, size, stored, 2, on_image, rows)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
-        """Rows of T: responses of the receivers `texels` (flat indices) to the lights `indices`.
+        """Rows of T: the responses of some receivers to some lights.
 
-        Only the strips of rows that hold such texels are decompressed. InputError where an image covers a region only.
+        Only the strips of rows that hold such texels are decompressed.
+
+        Parameters
+        ----------
+        indices
+            Of lights.
+        texels
+            (n,) flat indices of receivers, row by row from the top.
+
+        Returns
+        -------
+        ndarray
+            (n, L, 3) float32.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+        InputError
+            Where an image covers a region only.
+
+        Examples
+        --------
+        >>> rows = capture.sample([0, 1, 2], np.array([5, 17]))
+        >>> rows.shape, bool((rows[0, 1] == capture.image(1)[0, 5]).all())
+        ((2, 3, 3), True)
         """
         self.require_whole(indices)
         responses = np.empty((len(texels), len(indices), 3), np.float32)
@@ -223,9 +486,28 @@ class Capture:
         return responses
 
     def load(self, texels: Int[ndarray, " n"] | None = None) -> Capture:
-        """The capture with all responses in memory: of all receivers, or of the flat `texels` alone, as an image (1, n).
+        """The capture with its responses in memory: 12 bytes per receiver and light.
 
-        The latter has no channel but coverage. Memory: 12 bytes per receiver and light. InputError where an image covers a region only.
+        Parameters
+        ----------
+        texels
+            (n,) flat indices of receivers: they alone, as an image (1, n) with no channel but coverage. None: all receivers.
+
+        Returns
+        -------
+        Capture
+            Reads no image again.
+
+        Raises
+        ------
+        InputError
+            Where an image covers a region only.
+
+        Examples
+        --------
+        >>> small = capture.load(np.array([5, 17]))
+        >>> small.image(0).shape, len(small.lights)
+        ((1, 2, 3), 48)
         """
         whole = np.arange(self.width * self.height) if texels is None else texels
         responses = self.sample(range(len(self.lights)), whole)
@@ -239,7 +521,24 @@ class Capture:
         return InMemoryCapture(self.folder, manifest, lights, responses, coverage)
 
     def with_roles(self, roles: Sequence[Role | None]) -> Capture:
-        """The same images with other `roles`, one per light; lights of role None are left out."""
+        """The same images with other roles.
+
+        Parameters
+        ----------
+        roles
+            One per light; lights of role None are left out.
+
+        Returns
+        -------
+        Capture
+            Of the lights that have a role, in order.
+
+        Examples
+        --------
+        >>> half = capture.with_roles(["train" if i % 2 == 0 else "holdout" for i in range(48)])
+        >>> len(half.indices("train")), len(half.indices("holdout"))
+        (24, 24)
+        """
         chosen = [i for i, role in enumerate(roles) if role is not None]
         lights = tuple(replace(self.lights[i], role=role) for i in chosen if (role := roles[i]) is not None)
         return self._of(lights, chosen)
@@ -282,22 +581,96 @@ class Capture:
         return {name: channel for name, (channel, _) in self._channel_files.items()}
 
     def channel(self, name: str) -> Float32[ndarray, "H W C"] | None:
-        """The image of a channel (`srbf.channels` has components and units); None where the capture lacks it. ImageError as of `image`."""
+        """The image of a channel, beside those of the lights.
+
+        Parameters
+        ----------
+        name
+            A channel of `srbf.channels`, which has components and units.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W, C) float32; None where the capture lacks the channel.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> capture.channel("position").shape, capture.channel("normal") is None
+        ((6, 8, 3), True)
+        """
         if name not in self._channel_files:
             return None
         channel, file = self._channel_files[name]
         return self._read(file, channel.components)
 
     def geometry(self, name: Literal["position", "normal", "albedo"]) -> Float32[ndarray, "H W 3"] | None:
-        """World position (m), unit normal or albedo of every receiver; None where the capture lacks it."""
+        """World position (m), unit normal or albedo of every receiver.
+
+        Parameters
+        ----------
+        name
+            `position`, `normal` or `albedo`.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W, 3) float32; None where the capture lacks it.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> capture.geometry("position")[5, 7].tolist()
+        [7.0, 5.0, 0.0]
+        """
         return self.channel(name)
 
     def coverage(self) -> Float32[ndarray, "H W"]:
-        """The covered part of each texel, 0 to 1; 1 where the capture does not say. Read once, and not to be written to."""
+        """The covered part of each texel. Read once, and not to be written to.
+
+        Returns
+        -------
+        ndarray
+            (H, W) float32, 0 to 1; 1 everywhere where the capture does not say.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> float(capture.coverage().min())
+        1.0
+        """
         return self._coverage
 
     def ambient(self) -> Float32[ndarray, "H W 3"] | None:
-        """The receivers with all lights of the capture off; None where the scene does not emit."""
+        """The receivers with all lights of the capture off.
+
+        Returns
+        -------
+        ndarray or None
+            (H, W, 3) float32; None where the scene does not emit.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+
+        Examples
+        --------
+        >>> capture.ambient() is None
+        True
+        """
         return self.channel("ambient")
 
     @cached_property
@@ -312,7 +685,23 @@ class Capture:
         return coverage
 
     def seam_edges(self) -> Float32[ndarray, "E 8"] | None:
-        """Edges that the UV layer cuts where the surface is smooth: u0 v0 u1 v1, v up, on one side, then on the other; None without any."""
+        """Edges that the UV layer cuts where the surface is smooth.
+
+        Returns
+        -------
+        ndarray or None
+            (E, 8) float32: u0 v0 u1 v1, v up, on one side, then on the other; None without any.
+
+        Raises
+        ------
+        ImageError
+            Where the file is damaged, missing, or not finite.
+
+        Examples
+        --------
+        >>> capture.seam_edges() is None
+        True
+        """
         if "seams" not in self.manifest:
             return None
         path = self.folder / self.manifest["seams"]

@@ -20,7 +20,25 @@ DEFAULT_RADIUS = 1e-4  # meters, the smallest distance counted, so that a light 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A distant light: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it."""
+    """A distant light.
+
+    Parameters
+    ----------
+    direction
+        (x, y, z) from the surface to the light, of any length but 0; normalized.
+    color
+        Irradiance on a surface that faces the light, linear Rec.709.
+
+    Raises
+    ------
+    InputError
+        On a direction of length 0, and on numbers that are not three or not finite.
+
+    Examples
+    --------
+    >>> DirectionalLight((0, 0, 2), color=(1.0, 0.9, 0.8)).direction
+    (0.0, 0.0, 1.0)
+    """
 
     direction: Triple
     color: Triple = WHITE
@@ -32,9 +50,31 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class PointLight:
-    """A point light at `position` (m); `color` is its irradiance at the distance a0 [Wong2005, "Attenuation"].
+    """A point light [Wong2005, "Attenuation"].
 
-    falloff `linear` is the article's a0/|L|, `inverse-square` is (a0/|L|)^2; |L| is never less than `radius` (m).
+    Parameters
+    ----------
+    position
+        (x, y, z) in the world, m.
+    color
+        Irradiance at the distance `a0` on a surface that faces the light, linear Rec.709.
+    a0
+        The distance at which the attenuation is 1, m; above 0.
+    falloff
+        `linear`, the article's a0/|L|, or `inverse-square`, (a0/|L|)^2.
+    radius
+        m, above 0: |L| is never less, so that a light in a surface stays finite.
+
+    Raises
+    ------
+    InputError
+        On `a0` or `radius` not above 0, on another falloff, and on numbers that are not three or not finite.
+
+    Examples
+    --------
+    >>> lantern = PointLight((4.0, 3.0, 2.0), color=(1.0, 0.6, 0.3), a0=2.0, falloff="inverse-square")
+    >>> relight(asset, [lantern]).shape
+    (6, 8, 3)
     """
 
     position: Triple
@@ -57,7 +97,31 @@ class PointLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(PointLight):
-    """A point light times a smooth cone about `direction` (its axis): full inside the half-angle `inner`, none past `outer`."""
+    """A point light times a smooth cone about an axis: full inside the half-angle `inner`, none past `outer`.
+
+    Parameters
+    ----------
+    position, color, a0, falloff, radius
+        Of the point light.
+    direction
+        (x, y, z) of the axis, from the light; normalized.
+    inner, outer
+        Half-angles, rad: 0 <= inner <= outer <= pi.
+
+    Raises
+    ------
+    InputError
+        On half-angles out of range, and as `PointLight`.
+
+    Examples
+    --------
+    >>> spot = SpotLight((4.0, 3.0, 2.0), direction=(0, 0, -1), inner=0.3, outer=0.5)
+    >>> relight(asset, [spot]).shape
+    (6, 8, 3)
+    >>> SpotLight((0, 0, 0), direction=(0, 0, -1), inner=0.5, outer=0.3)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected spot half-angles 0 <= inner <= outer <= pi rad, found inner 0.5, outer 0.3
+    """
 
     direction: Triple
     inner: float
@@ -75,9 +139,27 @@ class SpotLight(PointLight):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
-    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z; `image` is (H, W, 3) float32.
+    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z.
 
-    `rotation` (3, 3) turns the map's directions, as `moved` does.
+    Parameters
+    ----------
+    image
+        (H, W, 3) radiance, linear Rec.709; kept as float32.
+    color
+        Multiplies the image.
+    rotation
+        (3, 3): turns the map's directions, as `moved` does. By default none.
+
+    Raises
+    ------
+    InputError
+        On an image of another shape, or with NaN or Inf.
+
+    Examples
+    --------
+    >>> overcast = EnvironmentLight(np.full((16, 32, 3), 0.5))
+    >>> relight(asset, [overcast]).shape
+    (6, 8, 3)
     """
 
     image: Float32[ndarray, "H W 3"]
@@ -100,19 +182,84 @@ SPOT_SOFTNESS_MIN = 1e-6  # in cosine: an edge of inner = outer stays a step wit
 
 
 def attenuation(distance: Float[ndarray, "*shape"], light: PointLight) -> Float[ndarray, "*shape"]:
-    """a0/|L|, or its square, with |L| >= radius [Wong2005, fig. 10]."""
+    """a0/|L|, or its square, with |L| >= radius [Wong2005, fig. 10].
+
+    Parameters
+    ----------
+    distance
+        |L|, m, of any shape.
+    light
+        Gives `a0`, `falloff` and `radius`.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape: the factor on the light's irradiance, 1 at the distance a0.
+
+    Examples
+    --------
+    >>> from srbf.lights import attenuation
+    >>> attenuation(np.array([1.0, 2.0, 4.0]), PointLight((0, 0, 0), a0=2.0)).tolist()
+    [2.0, 1.0, 0.5]
+    """
     ratio = light.a0 / np.maximum(distance, light.radius)
     return ratio if light.falloff == "linear" else ratio * ratio
 
 
 def spot_cone(cos_angle: Float[ndarray, "*shape"], cos_inner: float, cos_outer: float) -> Float[ndarray, "*shape"]:
-    """Smoothstep from 0 at the outer half-angle to 1 at the inner one, in the cosine of the angle off the spot's axis."""
+    """Smoothstep from 0 at the outer half-angle to 1 at the inner one, in the cosine of the angle off the spot's axis.
+
+    Parameters
+    ----------
+    cos_angle
+        Cosine of the angle off the axis, of any shape.
+    cos_inner, cos_outer
+        Cosines of the half-angles, cos_inner >= cos_outer. Where they are equal the edge is a step.
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `cos_angle`, 0 to 1.
+
+    Examples
+    --------
+    >>> from srbf.lights import spot_cone
+    >>> spot_cone(np.array([1.0, 0.75, 0.5]), cos_inner=1.0, cos_outer=0.5).tolist()
+    [1.0, 0.5, 0.0]
+    """
     t = np.clip((cos_angle - cos_outer) / max(cos_inner - cos_outer, SPOT_SOFTNESS_MIN), 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
-    """A light carried by a 4 x 4 rigid motion and uniform scale: a0 and radius scale along, an environment map turns."""
+    """A light carried by a rigid motion and uniform scale: a0 and radius scale along, an environment map turns.
+
+    Parameters
+    ----------
+    light
+        Of any kind.
+    matrix
+        (4, 4) float64, acts on columns (x, y, z, 1).
+
+    Returns
+    -------
+    Light
+        Of the same kind and color.
+
+    Raises
+    ------
+    InputError
+        Where the matrix leaves the light without a direction, position, a0 or radius.
+
+    Examples
+    --------
+    >>> from srbf.lights import moved
+    >>> up = np.diag([2.0, 2.0, 2.0, 1.0])
+    >>> up[2, 3] = 1.0
+    >>> light = moved(PointLight((1.0, 0.0, 0.0), a0=1.0), up)
+    >>> light.position, light.a0
+    ((2.0, 0.0, 1.0), 2.0)
+    """
     linear = matrix[:3, :3]
     if np.array_equal(matrix, np.eye(4)):
         return light
@@ -129,7 +276,29 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
 
 
 def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:
-    """Unit direction to the light and its strength, attenuation times a spot's cone, at `positions` of its frame [Wong2005, fig. 8-10]."""
+    """Unit directions to a light and its strength: attenuation times a spot's cone [Wong2005, fig. 8-10].
+
+    Parameters
+    ----------
+    light
+        A point or spot light.
+    positions
+        (..., 3) of receivers in the light's frame, m.
+
+    Returns
+    -------
+    directions
+        (..., 3) float64 from the receivers to the light; 0 where a receiver is at the light.
+    strength
+        (...) float64, the factor on the light's irradiance.
+
+    Examples
+    --------
+    >>> from srbf.lights import light_vectors
+    >>> directions, strength = light_vectors(PointLight((0.0, 0.0, 2.0)), np.zeros((1, 3), np.float32))
+    >>> directions.tolist(), strength.tolist()
+    ([[0.0, 0.0, 1.0]], [0.5])
+    """
     vectors = np.array(light.position) - positions  # L = S - P, eq. 3
     distance = np.linalg.norm(vectors, axis=-1)
     unit = vectors / np.maximum(distance, 1e-30)[..., None]
@@ -143,10 +312,33 @@ def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tup
 def environment_samples(
     image: Float32[ndarray, "H W 3"], domain: Domain, rotation: Float64[ndarray, "3 3"]
 ) -> tuple[Float64[ndarray, "H W 3"], Float64[ndarray, "H W"]]:
-    """Directions of an equirectangular map's texel centers turned by `rotation`, and the solid angle (sr) of each texel.
+    """Directions of an equirectangular map's texel centers, and the solid angle of each texel.
 
-    On the hemisphere only directions above the horizon count. Without rotation this is exact: a row across the horizon is cut there,
+    On the hemisphere only directions above the horizon count. Where z stays up this is exact: a row across the horizon is cut there,
     and its center moves to the middle of the remaining part.
+
+    Parameters
+    ----------
+    image
+        (H, W, 3), of which the size counts.
+    domain
+        `sphere` or `hemisphere`.
+    rotation
+        (3, 3): turns the directions.
+
+    Returns
+    -------
+    directions
+        (H, W, 3) float64 unit vectors in the world.
+    solid_angle
+        (H, W) float64, sr; 0 below the horizon of a hemisphere.
+
+    Examples
+    --------
+    >>> from srbf.lights import environment_samples
+    >>> _, solid_angle = environment_samples(np.zeros((8, 16, 3), np.float32), "sphere", np.eye(3))
+    >>> bool(np.isclose(solid_angle.sum(), 4 * np.pi))
+    True
     """
     height, width = image.shape[:2]
     elevation = np.pi / 2 - np.arange(height + 1) * (np.pi / height)

@@ -19,7 +19,29 @@ Domain = Literal["sphere", "hemisphere"]
 
 
 def normalize(vectors: Float[ndarray, "*shape 3"]) -> Float64[ndarray, "*shape 3"]:
-    """Unit vectors of `vectors`; InputError on one that is zero or not finite."""
+    """Unit vectors; neither large nor small ones over- or underflow.
+
+    Parameters
+    ----------
+    vectors
+        (..., 3) of any length but 0.
+
+    Returns
+    -------
+    ndarray
+        (..., 3) float64.
+
+    Raises
+    ------
+    InputError
+        On a vector that is zero or not finite.
+
+    Examples
+    --------
+    >>> from srbf.sphere import normalize
+    >>> normalize(np.array([[0.0, 3.0, 4.0], [0.0, 0.0, 1e200]])).tolist()
+    [[0.0, 0.6, 0.8], [0.0, 0.0, 1.0]]
+    """
     v = np.asarray(vectors, np.float64)
     with np.errstate(invalid="ignore"):  # an infinite one becomes NaN, and is refused
         v = v / np.maximum(np.abs(v).max(axis=-1, keepdims=True), 1e-300)  # so that no square over- or underflows
@@ -41,15 +63,48 @@ def van_der_corput(n: int, base: int) -> Float64[ndarray, " n"]:
 
 
 def hammersley(n: int, base: int = 2) -> Float64[ndarray, "n 3"]:
-    """n Hammersley points on the sphere: z = 2 vdC(i) - 1, azimuth = 2 pi (i + 1/2) / n.
+    """Hammersley points on the sphere: z = 2 vdC(i) - 1, azimuth = 2 pi (i + 1/2) / n.
 
-    Base 2 is [Wong1997b]; the code that its authors released with [Wong2005] uses base 3.
+    Parameters
+    ----------
+    n
+        How many.
+    base
+        Of the radical inverse vdC. Base 2 is [Wong1997b]; the code that its authors released with [Wong2005] uses base 3.
+
+    Returns
+    -------
+    ndarray
+        (n, 3) float64 unit vectors, ordered by azimuth.
+
+    Examples
+    --------
+    >>> from srbf.sphere import hammersley
+    >>> hammersley(4)[:, 2].tolist()
+    [-1.0, 0.0, -0.5, 0.5]
     """
     return _from_z_and_azimuth(2 * van_der_corput(n, base) - 1, 2 * np.pi * (np.arange(n) + 0.5) / n)
 
 
 def fibonacci(n: int) -> Float64[ndarray, "n 3"]:
-    """n points of the spherical Fibonacci lattice: z from the top down, azimuth by the golden angle [Gonzalez2010]."""
+    """Points of the spherical Fibonacci lattice: z from the top down, azimuth by the golden angle [Gonzalez2010].
+
+    Parameters
+    ----------
+    n
+        How many.
+
+    Returns
+    -------
+    ndarray
+        (n, 3) float64 unit vectors, ordered by z.
+
+    Examples
+    --------
+    >>> from srbf.sphere import fibonacci
+    >>> fibonacci(4)[:, 2].tolist()
+    [0.75, 0.25, -0.25, -0.75]
+    """
     i = np.arange(n)
     golden_angle = np.pi * (3 - np.sqrt(5))
     return _from_z_and_azimuth(1 - (2 * i + 1) / n, golden_angle * i)
@@ -69,9 +124,35 @@ POINT_SETS: dict[str, Callable[[int], np.ndarray]] = {
 
 
 def point_set(kind: PointSet, k: int, domain: Domain) -> Float64[ndarray, "k 3"]:
-    """Exactly k points of the set `kind` on the sphere or on the open hemisphere z > 0.
+    """Exactly k points of a set on the sphere or on the open hemisphere z > 0.
 
     The hemisphere is the rejection of [Wong2005]'s released code: the smallest n of the sphere set that leaves exactly k.
+
+    Parameters
+    ----------
+    kind
+        `hammersley`, `hammersley3` (base 3) or `fibonacci`.
+    k
+        How many, 1 or more.
+    domain
+        `sphere` or `hemisphere`.
+
+    Returns
+    -------
+    ndarray
+        (k, 3) float64 unit vectors.
+
+    Raises
+    ------
+    InputError
+        On other words, on k below 1, and where no set of the sphere leaves exactly k points on the hemisphere.
+
+    Examples
+    --------
+    >>> from srbf.sphere import point_set
+    >>> points = point_set("hammersley", 25, "hemisphere")
+    >>> points.shape, bool((points[:, 2] > 0).all())
+    ((25, 3), True)
     """
     if kind not in POINT_SETS:
         raise InputError(f"expected a point set of {', '.join(POINT_SETS)}, found {kind!r}")
@@ -91,7 +172,29 @@ def point_set(kind: PointSet, k: int, domain: Domain) -> Float64[ndarray, "k 3"]
 
 
 def random_directions(n: int, domain: Domain, rng: np.random.Generator) -> Float64[ndarray, "n 3"]:
-    """n directions, uniform in solid angle on the domain (z > 0 strictly on the hemisphere)."""
+    """Directions uniform in solid angle.
+
+    Parameters
+    ----------
+    n
+        How many.
+    domain
+        `sphere`, or `hemisphere`: z > 0 strictly.
+    rng
+        Is advanced by 2 n numbers.
+
+    Returns
+    -------
+    ndarray
+        (n, 3) float64 unit vectors.
+
+    Examples
+    --------
+    >>> from srbf.sphere import random_directions
+    >>> z = random_directions(1000, "hemisphere", np.random.default_rng(0))[:, 2]
+    >>> bool(abs(z.mean() - 0.5) < 0.05)  # z is uniform in (0, 1]
+    True
+    """
     u = 1 - rng.random(n)  # (0, 1]
     z = u if domain == "hemisphere" else 2 * u - 1
     return _from_z_and_azimuth(z, 2 * np.pi * rng.random(n))
@@ -131,11 +234,28 @@ def nearest_neighbor_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, "
 
 
 def mean_spacing(points: Float[ndarray, "n 3"]) -> float:
-    """Mean spacing (rad) of a point set: the mean geodesic distance of each point to its four nearest others.
+    """Mean spacing of a point set: the mean geodesic distance of each point to its four nearest others.
 
     The pitch of a square lattice, and within 5 % of sqrt(area / n) for Hammersley and Fibonacci sets of some hundred points: 10.3
-    degrees for 400 on the sphere, 7.4 on the hemisphere. It needs no area, so it also holds for a set on part of the sphere. pi for a
-    single point. Cost: n x n.
+    degrees for 400 on the sphere, 7.4 on the hemisphere. It needs no area, so it also holds for a set on part of the sphere.
+    Cost: n x n.
+
+    Parameters
+    ----------
+    points
+        (n, 3) unit vectors.
+
+    Returns
+    -------
+    float
+        rad; pi for a single point.
+
+    Examples
+    --------
+    >>> from srbf.sphere import mean_spacing, point_set
+    >>> sphere, hemisphere = (mean_spacing(point_set("hammersley", 400, domain)) for domain in ("sphere", "hemisphere"))
+    >>> bool(abs(sphere / hemisphere - 2**0.5) < 0.05)  # half the area
+    True
     """
     points = np.asarray(points, np.float64)
     others = min(4, len(points) - 1)

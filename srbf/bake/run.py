@@ -56,9 +56,38 @@ class Reporter:
 class Bake:
     """One bake of a scene into a folder; `run` starts or resumes it.
 
-    blender: an installed Blender's executable; None: the bpy module of this Python. pool: the workers of this machine.
-    time_limit: seconds after which no further light is begun; None: no limit. keep_accumulation: keep the accumulation folder of a
-    finished bake, so that samples can be added later. dask: address of a scheduler whose workers render, instead of `pool`.
+    Parameters
+    ----------
+    scene
+        A .blend, which is not changed.
+    folder
+        Becomes the capture.
+    settings
+        All that affects its pixels.
+    blender
+        An installed Blender's executable; None: the bpy module of this Python.
+    pool
+        The workers of this machine.
+    time_limit
+        Seconds after which no further light is begun; None: no limit.
+    keep_accumulation
+        Keep the accumulation folder of a finished bake, so that samples can be added later.
+    dask
+        Address of a scheduler whose workers render, instead of `pool`.
+
+    Raises
+    ------
+    InputError
+        On a `time_limit` with denoising.
+
+    Examples
+    --------
+    >>> from srbf.bake.run import Bake
+    >>> from srbf.bake.settings import BakeSettings, Receiver
+    >>> settings = BakeSettings(Receiver.parse("view"), width=64, height=64, samples="auto")
+    >>> bake = Bake(folder / "scene.blend", folder / "baked", settings)
+    >>> bake.is_open_ended
+    True
     """
 
     scene: Path
@@ -85,14 +114,42 @@ class Bake:
         return self.keep_accumulation or self.is_open_ended
 
     def run(self, reporter: Reporter, force: bool = False, restart: bool = False, shard: Shard | None = None) -> bool:
-        """Bake what is not there yet; False where nothing was left to do. A bake killed at any moment is resumed when run again.
+        """Bake what is not there yet. A bake killed at any moment is resumed when run again.
 
-        force: replace a finished capture. restart: discard an unfinished one of other settings. shard: only its lights, while other shards
-        may be baked at the same time; no manifest is written before a bake without a shard.
         Finished passes of lights are kept, and every image and the manifest are bit-identical to those of an uninterrupted bake.
 
-        Raises BakeError where Blender fails, a light cannot be rendered, or another process bakes into the folder, OutputExistsError
-        where the folder holds something else, InputError where the arguments exclude each other.
+        Parameters
+        ----------
+        reporter
+            Receives the progress, and lines for the user.
+        force
+            Replace a finished capture.
+        restart
+            Discard an unfinished bake of other settings.
+        shard
+            Only its lights, while other shards may be baked at the same time; no manifest is written before a bake without a shard.
+
+        Returns
+        -------
+        bool
+            False where nothing was left to do.
+
+        Raises
+        ------
+        BakeError
+            Where Blender fails, a light cannot be rendered, or another process bakes into the folder.
+        OutputExistsError
+            Where the folder holds something else.
+        InputError
+            Where there is no scene, and where the arguments exclude each other.
+
+        Examples
+        --------
+        >>> from srbf.bake.run import Bake, Reporter
+        >>> from srbf.bake.settings import BakeSettings, Receiver
+        >>> Bake(folder / "scene.blend", folder / "baked", BakeSettings(Receiver.parse("view"))).run(Reporter())
+        Traceback (most recent call last):
+        srbf.errors.InputError: expected a .blend at ..., found no such file
         """
         identity = self._identity()
         existed = self.folder.exists()

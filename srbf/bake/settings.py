@@ -25,9 +25,26 @@ LARGEST_SIDE = 16384
 
 @dataclass(frozen=True)
 class Receiver:
-    """`lightmap:OBJECT` (its UV layer, else one that fits), `vertices:OBJECT`, or `view[:CAMERA]` (else the scene's own camera).
+    """What receives the light: a lightmap, a mesh's vertices, or a camera's view.
 
-    also: further objects whose texels share the lightmap. unwrap: how a UV layer is made where none fits.
+    Parameters
+    ----------
+    kind
+        `lightmap`, `vertices` or `view`.
+    name
+        Of the object, or of a view's camera; None: the scene's own camera.
+    uv_layer
+        Of a lightmap; None: one that fits.
+    also
+        Further objects whose texels share the lightmap.
+    unwrap
+        How a UV layer is made where none fits: `smart`, `lightmap-pack` or `keep`.
+
+    Examples
+    --------
+    >>> from srbf.bake.settings import Receiver
+    >>> Receiver.parse("lightmap:Table") == Receiver("lightmap", "Table")
+    True
     """
 
     kind: Kind
@@ -38,7 +55,34 @@ class Receiver:
 
     @staticmethod
     def parse(text: str, uv_layer: str | None = None, unwrap: Unwrap = "smart") -> Receiver:
-        """From the command line's `lightmap:OBJECT`, `vertices:OBJECT` or `view[:CAMERA]`; InputError for others."""
+        """From the command line's `lightmap:OBJECT`, `vertices:OBJECT` or `view[:CAMERA]`.
+
+        Parameters
+        ----------
+        text
+            What the user wrote.
+        uv_layer, unwrap
+            Of a lightmap.
+
+        Returns
+        -------
+        Receiver
+            Of the first object alone: `captures_of` joins several in one lightmap.
+
+        Raises
+        ------
+        InputError
+            On other words, and on a `uv_layer` of another receiver than a lightmap.
+
+        Examples
+        --------
+        >>> from srbf.bake.settings import Receiver
+        >>> Receiver.parse("view:Camera.001").name
+        'Camera.001'
+        >>> Receiver.parse("lightmap:")
+        Traceback (most recent call last):
+        srbf.errors.InputError: expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found 'lightmap:'
+        """
         kind, _, name = text.partition(":")
         if kind == "lightmap" and name:
             return Receiver("lightmap", name, uv_layer, unwrap=unwrap)
@@ -111,7 +155,60 @@ def folder_names(receivers: Sequence[Receiver]) -> list[str]:
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """All settings that affect a capture's pixels, besides the scene and Blender's version. Sizes in texels, angles in radians."""
+    """All settings that affect a capture's pixels, besides the scene and Blender's version.
+
+    Parameters
+    ----------
+    receiver
+        What receives the light.
+    width, height
+        Texels, 1 to 16384.
+    lights
+        How many train lights, on the Hammersley points of `domain`.
+    domain
+        `hemisphere` or `sphere`.
+    samples
+        Per texel and train light, 1 or more; `auto`: doubled until the error on the validation lights stops improving.
+    validation, holdout
+        How many random lights of either role, 0 or more.
+    holdout_samples
+        Per texel of validation and holdout lights.
+    quantity
+        `irradiance` or `radiance`.
+    seed
+        Of the random lights and of Cycles' noise.
+    sun_angle
+        Angular diameter of the light, rad, 0 to pi.
+    keep_scene_lights
+        Leave the scene's own lights on.
+    light_list
+        A .lp file of the train directions, in place of `lights` and `domain`.
+    transport
+        `combined`, or `indirect`: direct light is kept apart.
+    points
+        Point lights instead of directional ones.
+    no_shadow
+        Names of objects that cast no shadow.
+    denoise
+        Denoise a view's train images.
+    scene
+        One of the .blend's scenes; None: the active one.
+
+    Raises
+    ------
+    InputError
+        On a value out of range, and on settings that exclude each other.
+
+    Examples
+    --------
+    >>> from srbf.bake.settings import BakeSettings, Receiver, plan_lights
+    >>> settings = BakeSettings(Receiver.parse("lightmap:Table"), lights=100, holdout=8)
+    >>> [light.role for light in plan_lights(settings)].count("train")
+    100
+    >>> BakeSettings(Receiver.parse("view"), sun_angle=4.0)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected a sun angle of at most pi rad, found 4
+    """
 
     receiver: Receiver
     width: int = 256
@@ -165,7 +262,25 @@ class BakeSettings:
                 )
 
     def with_matched_sun(self) -> BakeSettings:
-        """The settings with a sun angle of the train lights' mean spacing: penumbrae as soft as that many lights can resolve."""
+        """The settings with a sun angle of the train lights' mean spacing: penumbrae as soft as that many lights can resolve.
+
+        Returns
+        -------
+        BakeSettings
+            Of a `sun_angle` in rad, at most pi.
+
+        Raises
+        ------
+        InputError
+            With point lights.
+
+        Examples
+        --------
+        >>> from srbf.bake.settings import BakeSettings, Receiver
+        >>> few, many = (BakeSettings(Receiver.parse("view"), lights=n).with_matched_sun().sun_angle for n in (50, 200))
+        >>> few > many > 0
+        True
+        """
         if self.points is not None:
             raise InputError("expected directional lights for a matched sun, found point lights; leave `sun_angle` out")
         train = [light.place for light in plan_lights(self) if light.role == "train"]

@@ -156,14 +156,45 @@ def evaluate(
     roles: Sequence[Role] = ROLES,
     watch: TrainErrorAccumulator | None = None,
 ) -> dict[str, Any]:
-    """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
+    """Relight every light of a capture and compare with its images: the error by role and by light.
 
-    The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
-    and so are roles not in `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the
-    clamp follows the addition of direct light; with direct light, it is compared with the combined response. A capture under point lights
-    measures the approximation by directional lights, and all its lights are held out. With a `watch` that has accumulated the train images,
-    these are not read again: peak, validation and holdout are the same, and the train error is that of the kept texels, whose number is in
-    `texels` if they are not all. InputError if asset and capture cannot be compared.
+    Parameters
+    ----------
+    asset
+        Of the capture's size in texels.
+    capture
+        The references. A capture under point lights measures the approximation by directional lights; all its lights are held out.
+    progress
+        Called with (lights done, lights in all).
+    direct
+        How direct light is added to an indirect asset. With `none` it is compared with an indirect capture, unclamped, since the clamp
+        follows the addition of direct light; with `ray` or `shadow-map`, with the combined response.
+    roles
+        Which of `train`, `validation` and `holdout` to evaluate.
+    watch
+        Has accumulated the train images during the fit, so that they are not read again. Peak, validation and holdout are the same; the
+        train error is that of the texels it kept, whose number is in `texels` if they are not all.
+
+    Returns
+    -------
+    dict
+        By role a `RoleError` as a dict: `rmse` and `peak` in the capture's unit, `psnr` and `psnr_pooled` in dB. `lights` lists a
+        {file, role, rmse} per light. A role without lights is left out, and so are roles not in `roles`. The peak is the 99.9 %
+        quantile of the combined train references, 1 for 8-bit sources.
+
+    Raises
+    ------
+    InputError
+        On sizes that differ, on a capture without covered texels, on `direct` light of a combined asset, and on an indirect asset without
+        `direct` light beside a combined capture.
+
+    Examples
+    --------
+    >>> errors = evaluate(asset, capture)
+    >>> sorted(errors)
+    ['holdout', 'lights', 'train']
+    >>> errors["holdout"]["psnr"] > 20  # dB
+    True
     """
     reference, peak_source = _references(asset, capture, direct)
     if (asset.width, asset.height) != (capture.width, capture.height):

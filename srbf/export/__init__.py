@@ -52,9 +52,43 @@ def check_target(target: str) -> None:
 def export(
     asset: Asset, target: str, folder: Path, settings: Settings = PLAIN, force: bool = False, min_psnr: float | None = None
 ) -> Report:
-    """Write `folder` atomically; the loss is measured on the files as read back, and recorded in `source.export`.
+    """Write an asset in the form that an engine loads; the loss is measured on the files as read back, and recorded in `source.export`.
 
-    InputError on an unknown target, on settings that the target cannot have, and where the loss leaves less than `min_psnr` (dB).
+    Parameters
+    ----------
+    asset
+        What `srbf.fit` made, or `Asset.open` read.
+    target
+        One of `TARGETS`: `exr`, `png`, `dds`, `ktx2`, `gltf`, `godot`, `unity`, `unreal`, `hlsl`, `metal`, `wgsl` or `web`.
+    folder
+        Written atomically; `Asset.open` reads it.
+    settings
+        Encoding of the layers, mip levels, and a mesh for targets that write one.
+    force
+        Replace an asset that is there.
+    min_psnr
+        The least PSNR (dB) of the exported asset against `asset` that is accepted.
+
+    Returns
+    -------
+    Report
+        PSNR (dB), bytes per texel, bytes in memory and on disk, and the target's notes.
+
+    Raises
+    ------
+    InputError
+        On an unknown target, on settings that the target cannot have, and where the PSNR is below `min_psnr`; nothing is written then.
+    OutputExistsError
+        Where the folder exists and `force` is not set, or it holds something else than an asset.
+
+    Examples
+    --------
+    >>> from srbf.export import export
+    >>> report = export(asset, "dds", folder / "dds")
+    >>> report.target, report.encoding, report.bytes_per_texel
+    ('dds', 'bc7', 9)
+    >>> Asset.open(folder / "dds").k
+    9
     """
     check_target(target)
     check_replaceable(folder, force, MANIFEST)

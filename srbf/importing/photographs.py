@@ -22,12 +22,38 @@ from srbf.io.image import HALF_MAX, write_image
 
 @dataclass(frozen=True)
 class LightListImport:
-    """A .lp list and its images, paired by the name in the list; an optional list of held-out lights.
+    r"""A light list (.lp) and its images, paired by the name in the list, to be written as a capture.
 
-    transfer: `srgb` decodes the sRGB curve, `linear` keeps stored values; profiles and tags in the files come first
-    (`srbf.importing.pictures`). `layer` is a layer of a multilayer EXR. `mask` becomes coverage. `kind`: the lists hold directions, or
-    positions of point lights in meters, which have unit irradiance at 1 m. `images` is a further folder for images, besides the
-    list's own.
+    Parameters
+    ----------
+    lights
+        The list of the train lights.
+    transfer
+        `srgb` decodes the sRGB curve, `linear` keeps stored values; profiles and tags in the files come first (`srbf.importing.pictures`).
+    holdout
+        A list of held-out lights.
+    mask
+        An image that becomes the coverage.
+    quantity
+        `radiance` of photographs and renders, or `irradiance`.
+    kind
+        `directional`: the lists hold directions. `point`: positions in meters of lights that have unit irradiance at 1 m.
+    layer
+        Of a multilayer EXR.
+    images
+        A further folder for images, besides the list's own.
+
+    Examples
+    --------
+    >>> lines = [f"{i}.exr {x} {y} {z}" for i, (x, y, z) in enumerate(capture.directions()[:3])]
+    >>> (folder / "photographs").mkdir()
+    >>> for i in range(3):
+    ...     write_image(folder / "photographs" / f"{i}.exr", capture.image(i), "float")
+    >>> (folder / "photographs" / "dirs.lp").write_text("\n".join(["3", *lines])) > 0
+    True
+    >>> manifest = LightListImport(folder / "photographs" / "dirs.lp", "linear").write(folder / "imported")
+    >>> len(Capture.open(folder / "imported").lights)
+    3
     """
 
     lights: Path
@@ -46,9 +72,36 @@ class LightListImport:
         progress: Callable[[int, int], None] = lambda done, total: None,
         say: Callable[[str], None] = lambda text: None,
     ) -> dict[str, Any]:
-        """Write the capture atomically; returns its manifest. `say` gets one line per kind of conversion.
+        """Write the capture, whole or not at all.
 
-        ManifestError or ImageError if the list or an image is damaged, missing, of another size, or not finite.
+        Parameters
+        ----------
+        folder
+            Made with its parents.
+        force
+            Replace a capture that is there.
+        progress
+            Called with (images done, images in all).
+        say
+            Gets one line per kind of conversion.
+
+        Returns
+        -------
+        dict
+            The content of capture.json.
+
+        Raises
+        ------
+        ManifestError
+            Where a list is missing or damaged, or names an image that is not there.
+        ImageError
+            Where an image is damaged, of another size, or not finite.
+        InputError
+            On another transfer than `srgb` and `linear`.
+        OutputExistsError
+            Where the folder exists and `force` is not set, or it holds something else than a capture.
+        MissingLibraryError
+            Without OpenImageIO.
         """
         if self.transfer not in ("srgb", "linear"):
             raise InputError(f"expected a transfer of srgb, linear, found {self.transfer!r}")

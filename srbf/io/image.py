@@ -24,8 +24,32 @@ NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO would write the time, and equal p
 def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W C"]:
     """All channels of an image as float32: EXR values as stored, integers over their maximum (8 bit: byte / 255).
 
-    With `channels` 3, gray is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned
-    unchanged; `require_finite` rejects them. ImageError on a missing, damaged or truncated file.
+    Parameters
+    ----------
+    path
+        Of any format that OpenImageIO reads.
+    channels
+        How many to return; None: all. With 3, gray is repeated and alpha dropped. Of more channels than asked for, the first are returned.
+
+    Returns
+    -------
+    ndarray
+        (H, W, C) float32, row 0 at the top. Non-finite values are returned unchanged; `require_finite` rejects them.
+
+    Raises
+    ------
+    ImageError
+        On a missing, damaged or truncated file, and on one with too few channels.
+    MissingLibraryError
+        Without OpenImageIO.
+
+    Examples
+    --------
+    >>> write_image(folder / "gray.exr", np.full((2, 4), 0.5, np.float32), "half")
+    >>> read_image(folder / "gray.exr").shape
+    (2, 4, 1)
+    >>> read_image(folder / "gray.exr", channels=3)[0, 0].tolist()
+    [0.5, 0.5, 0.5]
     """
     pixels = read_stored(path, channels)
     if pixels.dtype == np.float32:
@@ -176,9 +200,31 @@ def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:
 
 
 def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
-    """Write (H, W) or (H, W, C) pixels, atomically. `half`, `float`: EXR, ZIP. `uint8`: PNG of bytes given as uint8.
+    """Write an image, atomically.
 
-    ImageError if a value exceeds half floats (65504) or is not finite; nothing is written then.
+    Parameters
+    ----------
+    path
+        Ends in .exr for `half` and `float`, in .png for `uint8`.
+    pixels
+        (H, W) or (H, W, C), row 0 at the top; uint8 for `uint8`.
+    encoding
+        `half` or `float`: an EXR, ZIP-compressed. `uint8`: a PNG of the bytes as given, without a color transform.
+
+    Raises
+    ------
+    ImageError
+        On a value that is not finite or exceeds half floats (65504), on `uint8` of another type than bytes, and where the file cannot be
+        written. Nothing is written then.
+    MissingLibraryError
+        Without OpenImageIO.
+
+    Examples
+    --------
+    >>> image = relight(asset, [DirectionalLight((0.0, 0.0, 1.0))])
+    >>> write_image(folder / "relit.exr", image, "float")
+    >>> bool((read_image(folder / "relit.exr") == image).all())
+    True
     """
     oiio = _oiio()
     pixels = pixels[:, :, None] if pixels.ndim == 2 else pixels

@@ -28,46 +28,192 @@ __all__ = [
 
 
 def method_of(asset: Asset) -> type[Method]:
-    """The class of the asset's method."""
+    """The class of the asset's method.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+
+    Returns
+    -------
+    type
+        `RelightingMap`, `EigenMap`, `ClusteredEigenMap` or another registered method.
+
+    Raises
+    ------
+    InputError
+        On a method that is not registered.
+
+    Examples
+    --------
+    >>> from srbf.methods import method_of
+    >>> method_of(asset) is RelightingMap
+    True
+    """
     return method_named(asset.method)
 
 
 def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
-    """Lights of the world in the frame that the asset was captured in."""
+    """Lights of the world in the frame that the asset was captured in.
+
+    Parameters
+    ----------
+    asset
+        Whose `asset_from_world` moves them.
+    lights
+        Of any kind.
+
+    Returns
+    -------
+    list
+        Of lights, in order.
+
+    Examples
+    --------
+    >>> from srbf.methods import in_asset_frame
+    >>> sun = DirectionalLight((0.0, 0.0, 1.0))
+    >>> in_asset_frame(asset, [sun]) == [sun]
+    True
+    """
     return [moved(light, asset.asset_from_world) for light in lights]
 
 
 def relight(asset: Asset, lights: Sequence[Light], direct: Float32[ndarray, "H W 3"] | None = None) -> Float32[ndarray, "H W 3"]:
     """max(0, sum over lights + direct) + ambient, for any number of lights of any kind at once.
 
-    `direct` is the direct light that an indirect asset leaves out, as `srbf.relighting.direct_light` gives it. InputError on lights that
-    the asset cannot have: point and spot lights without a position map.
+    Parameters
+    ----------
+    asset
+        Of any method.
+    lights
+        Of the world.
+    direct
+        (H, W, 3) float32: the direct light that an indirect asset leaves out, as `srbf.relighting.direct_light` gives it.
+
+    Returns
+    -------
+    ndarray
+        (H, W, 3) float32, linear, row 0 at the top; of the asset's quantity.
+
+    Raises
+    ------
+    InputError
+        On point and spot lights where the asset has no position map.
+
+    Examples
+    --------
+    >>> from srbf.methods import linear_response, relight
+    >>> sun = DirectionalLight((0.3, 0.0, 1.0))
+    >>> bool((relight(asset, [sun]) == np.maximum(linear_response(asset, [sun]), 0)).all())  # of an asset without ambient
+    True
     """
     total = linear_response(asset, lights)
     return finish(asset, total if direct is None else total + direct)
 
 
 def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-    """The sum over lights before the clamp and without ambient: linear in every light's color."""
+    """The sum over lights before the clamp and without ambient: linear in every light's color.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+    lights
+        Of the world, of any kind and number.
+
+    Returns
+    -------
+    ndarray
+        (H, W, 3) float32, which may be negative.
+
+    Raises
+    ------
+    InputError
+        On point and spot lights where the asset has no position map.
+
+    Examples
+    --------
+    >>> from srbf.methods import linear_response
+    >>> red, green = (DirectionalLight((0.0, 0.0, 1.0), color) for color in ((1, 0, 0), (0, 1, 0)))
+    >>> both = linear_response(asset, [red, green])
+    >>> bool(np.allclose(both, linear_response(asset, [red]) + linear_response(asset, [green]), atol=1e-6))
+    True
+    """
     return method_of(asset).linear_response(asset, in_asset_frame(asset, lights))
 
 
 def responses(asset: Asset, coordinates: Float64[ndarray, "b d"]) -> Float32[ndarray, "b H W 3"]:
-    """Responses to a white light at each of many coordinates of the asset's light domain, in the world; unclamped, without ambient.
+    """Responses to a white light at each of many coordinates of the asset's light domain; unclamped, without ambient.
 
-    Coordinates of the domain `directions` are unit vectors from the surface to the light.
+    Parameters
+    ----------
+    asset
+        Of any method.
+    coordinates
+        (b, d) float64 in the world. Of the domain `directions` they are unit vectors from the surface to the light, d = 3.
+
+    Returns
+    -------
+    ndarray
+        (b, H, W, 3) float32.
+
+    Examples
+    --------
+    >>> from srbf.methods import responses
+    >>> responses(asset, capture.directions(capture.indices("holdout"))).shape
+    (8, 6, 8, 3)
     """
     domain = domain_of_asset(asset.manifest)
     return method_of(asset).responses(asset, domain.moved(coordinates, asset.asset_from_world))
 
 
 def projected_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
-    """One weight per map or light function, and color, of all directional and environment lights together."""
+    """One weight per map or light function, and color, of all directional and environment lights together: once per frame.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+    lights
+        Of the world; point and spot lights have no such weight and are left out.
+
+    Returns
+    -------
+    ndarray
+        (F, 3) float64: F = K of relighting maps; per cluster of eigen maps the components and 1 for the mean.
+
+    Examples
+    --------
+    >>> from srbf.methods import projected_weights
+    >>> weights = projected_weights(asset, [DirectionalLight((0.0, 0.0, 1.0), color=(2.0, 1.0, 1.0))])
+    >>> weights.shape, bool(np.allclose(weights[:, 0], 2 * weights[:, 1]))
+    ((9, 3), True)
+    """
     return method_of(asset).projected_weights(asset, in_asset_frame(asset, lights))
 
 
 def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
-    """A line for each light that shines from where nothing was captured; such lights evaluate unchanged."""
+    """A line for each light that shines from where nothing was captured; such lights evaluate unchanged.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+    lights
+        Of the world.
+
+    Returns
+    -------
+    list
+        Of strings, one per light outside; empty where all are inside.
+
+    Examples
+    --------
+    >>> from srbf.methods import outside_domain
+    >>> outside_domain(asset, [DirectionalLight((0.0, 0.0, -1.0))])
+    ['light 0 comes from below the captured hemisphere (z = -1): its response is extrapolated']
+    """
     positions = asset.images.get("position")
     covered = None if positions is None else positions[asset.covered]
     fit = asset.manifest.get("source", {}).get("fit", {})

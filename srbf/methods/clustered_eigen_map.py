@@ -66,8 +66,36 @@ class ClusteredEigenMap(CoefficientMaps):
     T(p, L, c) ~ w_{m,0}(L, c) + sum_j a_j(p) w_{m,j}(L, c), m the cluster of p, j = 1 … `components`     [Sloan2003; Kristensen2005]
 
     Clusters grow axis by axis on a texel sample with texels re-assigned in between; then every texel joins the cluster that holds
-    it best. A cluster's scalars span its own range, so that bytes serve them as well as half floats. Light functions are smooth as those
-    of the eigen map. Planes must not be filtered across clusters: reconstruct, then filter.
+    it best. A cluster's components span its own range, so that bytes serve them as well as half floats. Light functions are smooth as those
+    of the eigen map. Coefficient maps must not be filtered across clusters: reconstruct, then filter.
+
+    Parameters
+    ----------
+    clusters
+        1 to 256: a texel's index is a byte.
+    components
+        How many numbers per texel, at most three per train light.
+    domain
+        `sphere` or `hemisphere`; `auto`: where the lights are.
+    spread
+        Width of the light functions' kernel, rad, above 0; `auto` as of the eigen map.
+    ridge
+        Added to the diagonal of the kernel matrix, above 0; `auto` as of the eigen map.
+    encoding
+        Of the layers on disk: `half`, `float` or `uint8`.
+    seed
+        Of the clustering's random numbers.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> clustered = fit(capture, ClusteredEigenMap(clusters=2, components=4, encoding="uint8"))
+    >>> clustered.clusters, clustered.bytes_per_texel()["directional"]  # with the cluster's index
+    (2, 5)
     """
 
     name: ClassVar[str] = "clustered-eigen-map"
@@ -95,9 +123,30 @@ class ClusteredEigenMap(CoefficientMaps):
 
         Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `components`) + 40 bytes per texel, two blocks of
         `capture.STREAM_BYTES`, twice the sample (12 bytes per light and sampled texel), what `run.on_image` keeps, and some 0.2 GB of
-        libraries. Components of two clusters cannot be compared, so `run.stitch` closes the seams of the images, and what its texels show
-        is read once more: both sides then agree as well as their clusters hold them.
-        InputError where there are no train lights, or more components than captured numbers per texel.
+        libraries.
+
+        Parameters
+        ----------
+        capture
+            With train lights.
+        run
+            `stitch` closes the seams of the images, since components of two clusters cannot be compared, and what its texels show is read
+            once more: both sides then agree as well as their clusters hold them.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where there are no train lights, or more components than captured numbers per texel.
+
+        Examples
+        --------
+        >>> ClusteredEigenMap(clusters=2, components=4).encode(capture).tables["cluster_index"].shape
+        (6, 8)
         """
         train = capture.indices("train")
         if not train:

@@ -53,11 +53,37 @@ class EigenMap(CoefficientMaps):
     T(p, L, c) ~ w_0(L, c) + sum_j a_j(p) w_j(L, c), j = 1 … `components`
 
     The rows of T, (L x 3) numbers per texel, lose their mean w_0 and are projected on the leading axes of a texel sample: a_j is one
-    number per texel for all three colors. What an axis holds at the lights becomes a function of every direction by kernel
-    ridge regression on a dense set of spherical Gaussians. One kernel, of one spread or of two, and one ridge serve all functions: those
-    that predict best the lights left out and the validation lights (`auto`, `light_function_fit.choose_functions`). Columns of T are
-    weighted by the solid angle of their light; `weighting` says how rows are: `plain` gives the least squared error, `relative` divides
-    each by its mean, so that dark texels count as much as bright ones.
+    number per texel for all three colors. What an axis holds at the lights becomes a function of every direction by kernel ridge
+    regression on a dense set of spherical Gaussians. One kernel, of one spread or of two, and one ridge serve all functions. Columns of
+    T are weighted by the solid angle of their light.
+
+    Parameters
+    ----------
+    components
+        How many numbers per texel, at most three per train light.
+    domain
+        `sphere` or `hemisphere`; `auto`: where the lights are.
+    spread
+        Width of the light functions' kernel, rad, above 0.
+    ridge
+        Added to the diagonal of the kernel matrix, above 0. `auto` spread and ridge: those that predict best the lights left out and
+        the validation lights (`light_function_fit.choose_functions`).
+    weighting
+        Of the rows of T. `plain` gives the least squared error, `relative` divides each by its mean, so that dark texels count as much as
+        bright ones.
+    encoding
+        Of the layers on disk: `half`, `float` or `uint8`.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> small = fit(capture, EigenMap(components=4, encoding="uint8"))
+    >>> small.components, small.bytes_per_texel()["directional"]
+    (4, 4)
     """
 
     name: ClassVar[str] = "eigen-map"
@@ -82,7 +108,31 @@ class EigenMap(CoefficientMaps):
 
         Peak memory, whatever the number of lights: about 12 `components` + 40 bytes per texel, two blocks of `capture.STREAM_BYTES`, the
         sample (12 bytes per light and texel of SAMPLE_TEXELS), what `run.on_image` keeps, and some 0.2 GB of libraries.
-        InputError where there are no train lights, or more components than captured numbers per texel.
+
+        Parameters
+        ----------
+        capture
+            With train lights.
+        run
+            `stitch` closes the seams of the coefficient maps.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where there are no train lights, or more components than captured numbers per texel.
+
+        Examples
+        --------
+        >>> EigenMap(components=4).encode(capture).components
+        4
+        >>> EigenMap(components=200).encode(capture)
+        Traceback (most recent call last):
+        srbf.errors.InputError: expected at most 120 components for 40 lights, found 200
         """
         train = capture.indices("train")
         if not train:

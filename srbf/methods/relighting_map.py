@@ -69,10 +69,37 @@ class RelightingMap(Method):
 
     T(p, L) ~ sum_i c_i(p) exp(-acos(L . Q_i)^2 / (2 spread^2))            [Wong2005, eq. 1-2]
 
-    k maps, centers Q_i of a point set on the domain (`auto`: Fibonacci, on the hemisphere where all lights are above it), spread by rule
-    or in rad, `ridge` added to the normal equations' diagonal, and the encoding of the maps on disk. `auto` spread and ridge: the one
-    pair for all texels that predicts the validation lights best, or train lights left out, the encoding's rounding included.
-    `basis`: other functions in the Gaussians' place, as baselines: k = 4, 9, 16 … harmonics, or the 6 of polynomial texture maps.
+    Parameters
+    ----------
+    k
+        How many maps, 1 to 2048: each of C = 3 colors.
+    centers
+        Point set of the Q_i on the domain; `auto`: Fibonacci.
+    domain
+        `sphere` or `hemisphere`; `auto`: the hemisphere where all lights are above it.
+    spread
+        Width of the Gaussians: rad, above 0, or a rule, `mean` or `min`.
+    ridge
+        Added to the diagonal of the normal equations, 0 or more. `auto` spread and ridge: the one pair for all texels that predicts the
+        validation lights best, or train lights left out, the encoding's rounding included.
+    encoding
+        Of the maps on disk: `half`, `float` or `uint8`.
+    basis
+        Other functions in the Gaussians' place, as baselines: k = 4, 9, 16 … harmonics, or the 6 of polynomial texture maps.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> method = RelightingMap(k=9, ridge=1e-3)
+    >>> fit(capture, method).k
+    9
+    >>> RelightingMap(k=0)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected 1 to 2048 maps (the layers of a texture array), found `k=0`
     """
 
     name: ClassVar[str] = "relighting-map"
@@ -106,15 +133,34 @@ class RelightingMap(Method):
             HARMONICS[self.basis](self.k)  # says which k it can have
 
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
-        """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve a texel.
+        """Fit the train lights of a capture: one k x L factorization, each image read once, never a solve per texel.
 
-        `auto` reads a sample of the texels before. `run.stitch` closes the seams of the dilated maps before they are
-        rounded. Peak memory, whatever the number of lights: 18 k + 40 bytes per texel, two
-        blocks of `capture.STREAM_BYTES`, what `run.on_image` keeps, and some 0.2 GB of libraries. With
-        `run.solve_rows` others stream the images and solve.
+        Numerical trouble (condition, rank, residual) is data in the manifest's `source.fit`; coefficients past half's range are kept by a
+        scale and warned of. Peak memory, whatever the number of lights: 18 k + 40 bytes per texel, two blocks of `capture.STREAM_BYTES`,
+        what `run.on_image` keeps, and some 0.2 GB of libraries.
 
-        InputError where the lights are too few for k without a ridge. Numerical trouble (condition, rank, residual) is data in
-        the manifest's `source.fit`; coefficients past half's range are kept by a scale and warned of.
+        Parameters
+        ----------
+        capture
+            With train lights. `auto` reads a sample of its texels before.
+        run
+            `stitch` closes the seams of the dilated maps before they are rounded; with `solve_rows` others stream the images and solve.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where the lights are too few for k without a ridge, and on a domain or basis that the lights cannot have.
+
+        Examples
+        --------
+        >>> fitted = RelightingMap(k=9, ridge=1e-3).encode(capture)
+        >>> fitted.manifest["source"]["fit"]["ridge"]
+        0.001
         """
         train = capture.indices("train")
         if not train:

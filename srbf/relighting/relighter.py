@@ -37,8 +37,30 @@ def relight(
 ) -> Float32[ndarray, "H W 3"]:
     """max(0, sum over lights) + ambient, as `srbf.methods.relight` but by shaders; for many frames keep a `Relighter`.
 
-    Within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half` ones. Raises what `Relighter`
-    raises.
+    Within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half` ones.
+
+    Parameters
+    ----------
+    asset, target
+        Of the `Relighter`.
+    lights, multipass, units
+        Of `Relighter.relight`.
+
+    Returns
+    -------
+    ndarray
+        (H, W, 3) float32, linear, row 0 at the top.
+
+    Raises
+    ------
+    ShaderError, InputError
+        As of `Relighter` and `Relighter.relight`.
+
+    Examples
+    --------
+    >>> from srbf.relighting.relighter import relight
+    >>> relight(asset, [DirectionalLight((0.0, 0.0, 1.0))], target="half").shape
+    (6, 8, 3)
     """
     with Relighter(asset, target=target) as relighter:
         return relighter.relight(lights, multipass=multipass, units=units)
@@ -47,11 +69,36 @@ def relight(
 class Relighter:
     """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
 
-    Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
-    it makes a headless one of its own. `functions`: R of point lights from the asset's table, or by formula. `environments`: where their
-    weights are integrated; by shaders they may change from frame to frame. With a `view` receivers are where its depth buffer says, not
-    where the position map does.
-    Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
+    Lights add up in RGBA32F. Frames are within 1e-5 sum |c_i R_i|, or sum |a_j w_j|, of numpy on `float` targets, two half steps on `half`.
+
+    Parameters
+    ----------
+    asset
+        Of any method that shaders know.
+    target
+        What the frame is kept in: `float` RGBA32F, `half` RGBA16F.
+    context
+        Of moderngl; None: a headless one of its own.
+    functions
+        R of point lights from the asset's `table`, or by `formula`.
+    environments
+        Where the weights of environment lights are integrated: `host`, or `gpu`, where a map may change from frame to frame.
+    view
+        Receivers are where its depth buffer says, not where the position map does.
+
+    Raises
+    ------
+    ShaderError
+        Without OpenGL 3.3, or where the asset exceeds the GPU.
+    InputError
+        On a method that no shader knows, and on other words than these.
+
+    Examples
+    --------
+    >>> with Relighter(asset) as relighter:
+    ...     frames = [relighter.relight([DirectionalLight((x, 0.0, 1.0))]) for x in (0.0, 0.5)]
+    >>> bool(np.allclose(frames[1], relight(asset, [DirectionalLight((0.5, 0.0, 1.0))]), atol=1e-4))
+    True
     """
 
     def __init__(
@@ -98,7 +145,13 @@ class Relighter:
         self.close()
 
     def close(self) -> None:
-        """Release every GL object, and the context where it is our own."""
+        """Release every GL object, and the context where it is the relighter's own. A second call has no effect.
+
+        Examples
+        --------
+        >>> relighter = Relighter(asset)
+        >>> relighter.close()
+        """
         if self._open:
             self._open = False
             with self._context:
@@ -109,12 +162,35 @@ class Relighter:
     def relight(
         self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
     ) -> Float32[ndarray, "H W 3"]:
-        """One frame, read back: row 0 at the top.
+        """One frame, read back: max(0, sum over lights + direct) + ambient.
 
-        `direct` light, of an indirect asset, is added before the clamp.
-        `multipass` is the article's way for GPUs of few texture units: `units` maps, or images of four planes, a pass, added up by
-        blending. Raises InputError on point or spot lights without a position map or, for harmonics, at all, or on units that are
-        not 1 to 8.
+        Parameters
+        ----------
+        lights
+            Of the world, of any kind and number.
+        multipass
+            The article's way for GPUs of few texture units: `units` maps, or images of four planes, per pass, added up by blending.
+        units
+            1 to 8, and at most what the GPU has.
+        direct
+            (H, W, 3) float32: the direct light that an indirect asset leaves out, added before the clamp.
+
+        Returns
+        -------
+        ndarray
+            (H, W, 3) float32, linear, row 0 at the top.
+
+        Raises
+        ------
+        InputError
+            On point or spot lights without a position map or, for harmonics, at all, and on units out of range.
+
+        Examples
+        --------
+        >>> with Relighter(asset) as relighter:
+        ...     whole, by_passes = (relighter.relight([DirectionalLight((0.0, 0.0, 1.0))], multipass=way) for way in (False, True))
+        >>> bool(np.allclose(whole, by_passes, atol=1e-4))
+        True
         """
         self.draw(lights, multipass=multipass, units=units, direct=direct)
         return self.read()
@@ -122,7 +198,15 @@ class Relighter:
     def draw(
         self, lights: Sequence[Light], *, multipass: bool = False, units: int = UNITS, direct: Float32[ndarray, "H W 3"] | None = None
     ) -> None:
-        """Draw one frame and leave it on the GPU."""
+        """Draw one frame and leave it on the GPU; parameters and errors as of `relight`.
+
+        Examples
+        --------
+        >>> with Relighter(asset) as relighter:
+        ...     relighter.draw([DirectionalLight((0.0, 0.0, 1.0))])
+        ...     relighter.read().shape
+        (6, 8, 3)
+        """
         most = min(MAX_UNITS, self._limits.texture_units)
         if not 1 <= units <= most:
             raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
@@ -155,7 +239,20 @@ class Relighter:
             self._finish()
 
     def read(self) -> Float32[ndarray, "H W 3"]:
-        """The frame last drawn."""
+        """The frame last drawn.
+
+        Returns
+        -------
+        ndarray
+            (H, W, 3) float32, linear, row 0 at the top.
+
+        Examples
+        --------
+        >>> with Relighter(asset) as relighter:
+        ...     relighter.draw([])
+        ...     float(relighter.read().max())  # no light, no ambient
+        0.0
+        """
         with self._context:
             data = self._relit_buffer.read(components=4, dtype=self._type)
         pixels = np.frombuffer(data, np.float32 if self._type == "f4" else np.float16)

@@ -61,13 +61,49 @@ def write_report(
     methods: Sequence[Method] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write the figures, report.md and index.html into `folder`; returns the path of index.html, which contains all figures.
+    """Write the report on an asset against its capture: figures, report.md, and index.html, which contains them all.
 
-    `evaluation` is the result of `srbf.evaluation.errors_by_role.evaluate` for this asset and capture. `timings` are seconds by step.
-    `demo_lights` are point and spot lights to show instead of derived ones; other kinds are ignored. `asset_folder` is the saved asset,
-    for its size on disk. `methods` are fitted to a sample of the capture and compared. Replaces the files of an earlier report.
-    If the asset lacks the data of a figure, the page gives the reason. InputError if sizes or lights do not match, MissingLibraryError
-    without matplotlib.
+    Parameters
+    ----------
+    asset
+        Of the capture's size in texels.
+    capture
+        The references.
+    folder
+        Made where it is missing. Files of an earlier report in it are replaced.
+    evaluation
+        The result of `srbf.evaluate` for this asset and capture, of all roles.
+    timings
+        Seconds by step.
+    demo_lights
+        Point and spot lights to show instead of derived ones; other kinds are ignored.
+    asset_folder
+        The saved asset, for its size on disk.
+    methods
+        Are fitted to a sample of the capture and compared. By default those of `compared_methods`.
+    progress
+        Called with (steps done, steps in all).
+
+    Returns
+    -------
+    Path
+        Of index.html. Where the asset lacks the data of a figure, the page gives the reason.
+
+    Raises
+    ------
+    InputError
+        On sizes that differ, and on an evaluation of other lights than the capture's.
+    MissingLibraryError
+        Without matplotlib.
+
+    Examples
+    --------
+    `write_report(asset, capture, folder / "report", evaluation=evaluate(asset, capture))` writes a whole report. The evaluation must be of
+    all lights of the capture:
+
+    >>> write_report(asset, capture, folder / "report", evaluation=evaluate(asset, capture, roles=["holdout"]))
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected an evaluation of the 48 lights of ..., found others; evaluate again
     """
     folder = Path(folder)
     if (asset.width, asset.height) != (capture.width, capture.height):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import inspect
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,34 @@ import pytest
 from made_captures import write_capture
 
 import srbf
+from srbf import lights, methods, sphere
+from srbf.bake.run import Bake
+from srbf.bake.settings import BakeSettings, Receiver
+from srbf.relighting.relighter import relight
 
-PUBLIC = [srbf, *(getattr(srbf, name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light")]
+ROOT = Path(__file__).parents[2]
+BAKING = (Bake, BakeSettings, Receiver)
+LIGHTS = (lights.attenuation, lights.environment_samples, lights.light_vectors, lights.moved, lights.spot_cone)
+METHODS = (
+    *(methods.in_asset_frame, methods.linear_response, methods.method_of, methods.outside_domain),
+    *(methods.projected_weights, methods.relight, methods.responses, relight),
+)
+SPHERE = (sphere.fibonacci, sphere.hammersley, sphere.mean_spacing, sphere.normalize, sphere.point_set, sphere.random_directions)
+NAMED = [srbf.__getattr__(name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light"]
+PUBLIC = [srbf, *NAMED, *BAKING, *LIGHTS, *METHODS, *SPHERE]
 
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
-    """What the examples may name besides srbf's own names: `capture`, `asset`, `np` and an empty `folder`."""
+    """What the examples may name besides srbf's own names: `capture`, `asset`, `np` and a `folder` that holds both."""
     folder = tmp_path_factory.mktemp("examples")
     slopes = np.random.default_rng(0).normal(size=(6, 8, 3, 3))
     position = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0), [0.0]), axis=-1)[:, :, 0].astype(np.float32)
     capture = write_capture(folder / "capture", lambda d: np.maximum(1 + slopes @ d, 0), lights=40, position=position)
     asset = srbf.fit(capture, k=9)
     asset.save(folder / "asset")
-    return {**{name: getattr(srbf, name) for name in srbf.__all__}, "np": np, "capture": capture, "asset": asset, "folder": folder}
+    own = {name: srbf.__getattr__(name) for name in srbf.__all__}
+    return {**own, "np": np, "capture": capture, "asset": asset, "folder": folder}
 
 
 @pytest.mark.parametrize("member", PUBLIC, ids=lambda member: getattr(member, "__name__", str(member)))
@@ -40,6 +55,18 @@ def test_examples_run(member: object, known: dict[str, object], tmp_path: Path, 
 def test_every_public_function_has_an_example() -> None:
     functions = [member for member in PUBLIC if inspect.isfunction(member)]
     assert functions and [f.__name__ for f in functions if ">>> " not in (f.__doc__ or "")] == []
+
+
+def test_the_readme_runs_from_a_capture(
+    known: dict[str, object], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("## From Python\n")[2]
+    shown = re.search("```python\n(.*?)```", section, re.DOTALL)
+    assert shown is not None
+    monkeypatch.chdir(str(known["folder"]))
+    exec(shown[1], {})
+    assert float(capsys.readouterr().out) > 20  # dB
+    assert srbf.read_image(Path("relit.exr")).shape == (6, 8, 3)
 
 
 def test_names_are_imported_when_used() -> None:
