@@ -60,8 +60,8 @@ class Asset:
 
     Examples
     --------
-    >>> asset.method, asset.k, asset.encoding
-    ('relighting-map', 9, 'half')
+    >>> asset.k, asset.encoding
+    (9, 'half')
     >>> asset.stored.shape, asset.basis.centers.shape
     ((9, 6, 8, 3), (9, 3))
     """

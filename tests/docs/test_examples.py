@@ -61,7 +61,8 @@ def test_every_public_function_has_an_example() -> None:
 def test_the_readme_runs_from_a_capture(
     known: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    shown = re.search("```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    section = (ROOT / "README.md").read_text(encoding="utf-8").partition("## From Python\n")[2]
+    shown = re.search("```python\n(.*?)```", section, re.DOTALL)
     assert shown is not None
     shutil.copytree(Path(str(known["folder"])) / "capture", tmp_path / "capture")
     monkeypatch.chdir(tmp_path)
