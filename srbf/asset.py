@@ -419,8 +419,8 @@ class Asset:
 
         Examples
         --------
-        >>> Asset.open(folder / "asset").method
-        'relighting-map'
+        >>> Asset.open(folder / "asset").quantity
+        'irradiance'
         """
         folder = Path(folder)
         path = folder / MANIFEST
