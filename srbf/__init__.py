@@ -6,7 +6,8 @@
 >>> image.shape == (asset.height, asset.width, 3)
 True
 
-Names are imported when they are first used, so that `import srbf` takes no time.
+Names are imported when they are first used, so that `import srbf` takes no time. Exports for engines are `srbf.export.export`, bakes
+`srbf.bake.run.Bake`.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from srbf.capture import Capture
     from srbf.errors import BakeError, ImageError, InputError, ManifestError, MissingLibraryError, OutputExistsError, SrbfError
     from srbf.evaluation.errors_by_role import evaluate
-    from srbf.export import export
     from srbf.fitting.options import fit
     from srbf.importing.photographs import LightListImport
     from srbf.io.image import read_image, write_image
@@ -38,7 +38,6 @@ _MODULES = {
     "srbf.capture": ("Capture",),
     "srbf.errors": ("BakeError", "ImageError", "InputError", "ManifestError", "MissingLibraryError", "OutputExistsError", "SrbfError"),
     "srbf.evaluation.errors_by_role": ("evaluate",),
-    "srbf.export": ("export",),
     "srbf.fitting.options": ("fit",),
     "srbf.importing.photographs": ("LightListImport",),
     "srbf.io.image": ("read_image", "write_image"),
@@ -73,7 +72,6 @@ __all__ = [
     "SpotLight",
     "SrbfError",
     "evaluate",
-    "export",
     "fit",
     "read_image",
     "relight",

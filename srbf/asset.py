@@ -11,16 +11,15 @@ from numpy import ndarray
 
 from srbf import schemas
 from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.asset_reader import ASSET_MANIFEST, AssetReader, read_layers
 from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
-from srbf.captured_light import UNIT_TOLERANCE
-from srbf.errors import ImageError, InputError, ManifestError
+from srbf.errors import InputError, ManifestError
 from srbf.io import files
-from srbf.io.containers import read_texture_array
-from srbf.io.containers.texture_array import TextureArray, level_bytes, level_size
-from srbf.io.image import Encoding, read_image, require_finite, write_images
+from srbf.io.containers.texture_array import level_bytes, level_size
+from srbf.io.image import Encoding, write_images
 from srbf.registry import method_named
 from srbf.sphere import Domain
 
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
-MANIFEST = "asset.json"
+MANIFEST = ASSET_MANIFEST
 GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
 SCENE_FILE = "scene.glb"
 
@@ -438,7 +437,7 @@ class Asset:
         channels = len(layers[0]["scale"])
         tables = method.read_tables(reader)
         if any("layer" in entry for entry in layers) or encoding in ("bc7", "bc1"):
-            stored = _read_layers(reader, layers, channels, path)
+            stored = read_layers(reader, layers, channels, path)
         else:
             stored = np.empty((len(layers), manifest["height"], manifest["width"], channels), _DTYPE[encoding])
             for target, entry in zip(stored, layers, strict=True):
@@ -457,93 +456,6 @@ TEXEL_BITS: dict[LayerEncoding, int] = {"half": 64, "float": 128, "uint8": 32, "
 _DTYPE: dict[str, Any] = {"half": np.float16, "float": np.float32, "uint8": np.uint8}
 _ENCODING: dict[str, Encoding] = {"float16": "half", "float32": "float", "uint8": "uint8"}
 SUFFIX: dict[Encoding, str] = {"half": "exr", "float": "exr", "uint8": "png"}
-
-
-@dataclass(frozen=True)
-class AssetReader:
-    """Reads an asset's files: inside its folder, of the recorded checksum and size, and finite."""
-
-    folder: Path
-    manifest: dict[str, Any]
-
-    @property
-    def path(self) -> Path:
-        """Of the manifest, for messages."""
-        return self.folder / MANIFEST
-
-    def check_unit(self, vectors: list[list[float]]) -> None:
-        """ManifestError where a listed center is not a unit vector."""
-        lengths = np.linalg.norm(np.array(vectors, np.float64), axis=1)
-        if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
-            raise ManifestError(f"expected unit centers in {self.path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
-
-    def image(self, name: str, channels: int) -> np.ndarray:
-        pixels = self._pixels(name, channels)
-        expected = (self.manifest["height"], self.manifest["width"])
-        if pixels.shape[:2] != expected:
-            size = f"{pixels.shape[1]}x{pixels.shape[0]}"
-            raise ImageError(f"expected {expected[1]}x{expected[0]} texels in {self.folder / name}, found {size}")
-        return pixels
-
-    def table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
-        """A table of the manifest's key `name`, (rows, columns, channels) float32."""
-        file = self.manifest[name]["file"]
-        pixels = self._pixels(file, channels)
-        if pixels.shape[:2] != shape:
-            found = f"{pixels.shape[1]}x{pixels.shape[0]}"
-            raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
-        return pixels
-
-    def texture(self, name: str) -> TextureArray:
-        texture = read_texture_array(self._checked(name))
-        expected = (self.manifest["width"], self.manifest["height"])
-        if (texture.width, texture.height) != expected:
-            size = f"{texture.width}x{texture.height}"
-            raise ImageError(f"expected {expected[0]}x{expected[1]} texels in {self.folder / name}, found {size}")
-        return texture
-
-    def bytes(self, name: str) -> bytes:
-        path = self._checked(name)
-        if not path.is_file():
-            raise ManifestError(f"expected {path}, found no such file; fit again")
-        return path.read_bytes()
-
-    def _checked(self, name: str) -> Path:
-        path = files.inside(self.folder, name, self.folder / MANIFEST)
-        expected = self.manifest.get("sha256", {}).get(name)
-        if expected and path.is_file() and files.sha256_of(path) != expected:
-            raise ImageError(f"expected {path} as it was written, found another checksum: damaged or changed since; fit or export again")
-        return path
-
-    def _pixels(self, name: str, channels: int) -> np.ndarray:
-        path = self._checked(name)
-        pixels = read_image(path, channels)
-        require_finite(pixels, path)
-        return pixels
-
-
-def _read_layers(reader: AssetReader, layers: list[dict[str, Any]], channels: int, path: Path) -> ndarray:
-    """The full size of layers in texture arrays, (N, H, W, C); refuses arrays that are not what the entries say."""
-    textures: dict[str, TextureArray] = {}
-    decoded: dict[str, ndarray] = {}
-    stored = []
-    for entry in layers:
-        name = entry["file"]
-        if "layer" not in entry:
-            raise ManifestError(f"expected the layer of {name} in {path}, found none")
-        if name not in textures:
-            textures[name] = reader.texture(name)
-            decoded[name] = textures[name].pixels()
-        texture = textures[name]
-        told = (entry["encoding"], entry.get("levels", 1))
-        if (texture.form, len(texture.levels)) != told or entry["layer"] >= texture.layers:
-            found = f"{texture.layers} layers of {len(texture.levels)} levels of {texture.form}"
-            raise ManifestError(f"expected layer {entry['layer']} of {told[1]} levels of {told[0]} in {name}, found {found}")
-        stored.append(decoded[name][entry["layer"], ..., :channels])
-    pixels = np.stack(stored)
-    if pixels.dtype == np.float16:
-        require_finite(pixels.reshape(1, -1, channels), reader.folder / layers[0]["file"])
-    return pixels
 
 
 def _method(manifest: dict[str, Any], path: Path) -> type[Method]:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.asset import Asset, AssetReader
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.light_function_fit import functions_through
 from srbf.encode.model_selection import TexelSample

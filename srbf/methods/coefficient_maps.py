@@ -13,7 +13,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
-from srbf.asset import Asset, AssetReader, layer_entries
+from srbf.asset import Asset, layer_entries
+from srbf.asset_reader import AssetReader
 from srbf.basis.light_functions import LightFunctions
 from srbf.basis.octahedral_table import lookup, octahedral_table
 from srbf.capture import Capture

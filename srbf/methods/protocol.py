@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, AssetReader
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, OnImage
 from srbf.encode.row_blocks import SolveRows
 from srbf.encode.uv_seams import Stitch

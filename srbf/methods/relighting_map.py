@@ -10,7 +10,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.asset import Asset, AssetReader, layer_entries
+from srbf.asset import Asset, layer_entries
+from srbf.asset_reader import AssetReader
 from srbf.basis.gaussian import GaussianBasis, SpreadRule, lookup, r_table, spread_of, weight
 from srbf.basis.harmonics import HARMONICS, HarmonicKind, PolynomialTextureMap, SphericalHarmonics
 from srbf.capture import Capture

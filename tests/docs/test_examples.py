@@ -16,6 +16,7 @@ import srbf
 from srbf import lights, methods, sphere
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver
+from srbf.export import export
 from srbf.relighting.relighter import relight
 
 ROOT = Path(__file__).parents[2]
@@ -26,8 +27,8 @@ METHODS = (
     *(methods.projected_weights, methods.relight, methods.responses, relight),
 )
 SPHERE = (sphere.fibonacci, sphere.hammersley, sphere.mean_spacing, sphere.normalize, sphere.point_set, sphere.random_directions)
-NAMED = [srbf.__getattr__(name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light"]
-PUBLIC = [srbf, *NAMED, *BAKING, *LIGHTS, *METHODS, *SPHERE]
+NAMED = [getattr(srbf, name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light"]
+PUBLIC = [srbf, export, *NAMED, *BAKING, *LIGHTS, *METHODS, *SPHERE]
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
     capture = write_capture(folder / "capture", lambda d: np.maximum(1 + slopes @ d, 0), lights=40, position=position)
     asset = srbf.fit(capture, k=9)
     asset.save(folder / "asset")
-    own = {name: srbf.__getattr__(name) for name in srbf.__all__}
+    own = {name: getattr(srbf, name) for name in srbf.__all__}
     return {**own, "np": np, "capture": capture, "asset": asset, "folder": folder}
 
 
@@ -72,6 +73,8 @@ def test_the_readme_runs_from_a_capture(
 
 
 def test_names_are_imported_when_used() -> None:
+    for name in srbf.__all__:  # none is hidden by a package of its name
+        assert not inspect.ismodule(getattr(srbf, name)), name
     assert set(srbf.__all__) <= set(dir(srbf)) and srbf.fit.__module__ == "srbf.fitting.options"
     with pytest.raises(AttributeError, match="no attribute 'fti'"):
         srbf.fti  # noqa: B018

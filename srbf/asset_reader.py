@@ -1,0 +1,106 @@
+"""The files of an asset as they are read: inside its folder, of the recorded checksum and size, and finite."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.captured_light import UNIT_TOLERANCE
+from srbf.errors import ImageError, ManifestError
+from srbf.io import files
+from srbf.io.containers import read_texture_array
+from srbf.io.containers.texture_array import TextureArray
+from srbf.io.image import read_image, require_finite
+
+ASSET_MANIFEST = "asset.json"
+
+
+@dataclass(frozen=True)
+class AssetReader:
+    """Reads an asset's files: inside its folder, of the recorded checksum and size, and finite."""
+
+    folder: Path
+    manifest: dict[str, Any]
+
+    @property
+    def path(self) -> Path:
+        """Of the manifest, for messages."""
+        return self.folder / ASSET_MANIFEST
+
+    def check_unit(self, vectors: list[list[float]]) -> None:
+        """ManifestError where a listed center is not a unit vector."""
+        lengths = np.linalg.norm(np.array(vectors, np.float64), axis=1)
+        if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
+            raise ManifestError(f"expected unit centers in {self.path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
+
+    def image(self, name: str, channels: int) -> np.ndarray:
+        pixels = self._pixels(name, channels)
+        expected = (self.manifest["height"], self.manifest["width"])
+        if pixels.shape[:2] != expected:
+            size = f"{pixels.shape[1]}x{pixels.shape[0]}"
+            raise ImageError(f"expected {expected[1]}x{expected[0]} texels in {self.folder / name}, found {size}")
+        return pixels
+
+    def table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
+        """A table of the manifest's key `name`, (rows, columns, channels) float32."""
+        file = self.manifest[name]["file"]
+        pixels = self._pixels(file, channels)
+        if pixels.shape[:2] != shape:
+            found = f"{pixels.shape[1]}x{pixels.shape[0]}"
+            raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
+        return pixels
+
+    def texture(self, name: str) -> TextureArray:
+        texture = read_texture_array(self._checked(name))
+        expected = (self.manifest["width"], self.manifest["height"])
+        if (texture.width, texture.height) != expected:
+            size = f"{texture.width}x{texture.height}"
+            raise ImageError(f"expected {expected[0]}x{expected[1]} texels in {self.folder / name}, found {size}")
+        return texture
+
+    def bytes(self, name: str) -> bytes:
+        path = self._checked(name)
+        if not path.is_file():
+            raise ManifestError(f"expected {path}, found no such file; fit again")
+        return path.read_bytes()
+
+    def _checked(self, name: str) -> Path:
+        path = files.inside(self.folder, name, self.folder / ASSET_MANIFEST)
+        expected = self.manifest.get("sha256", {}).get(name)
+        if expected and path.is_file() and files.sha256_of(path) != expected:
+            raise ImageError(f"expected {path} as it was written, found another checksum: damaged or changed since; fit or export again")
+        return path
+
+    def _pixels(self, name: str, channels: int) -> np.ndarray:
+        path = self._checked(name)
+        pixels = read_image(path, channels)
+        require_finite(pixels, path)
+        return pixels
+
+
+def read_layers(reader: AssetReader, layers: list[dict[str, Any]], channels: int, path: Path) -> ndarray:
+    """The full size of layers in texture arrays, (N, H, W, C); refuses arrays that are not what the entries say."""
+    textures: dict[str, TextureArray] = {}
+    decoded: dict[str, ndarray] = {}
+    stored = []
+    for entry in layers:
+        name = entry["file"]
+        if "layer" not in entry:
+            raise ManifestError(f"expected the layer of {name} in {path}, found none")
+        if name not in textures:
+            textures[name] = reader.texture(name)
+            decoded[name] = textures[name].pixels()
+        texture = textures[name]
+        told = (entry["encoding"], entry.get("levels", 1))
+        if (texture.form, len(texture.levels)) != told or entry["layer"] >= texture.layers:
+            found = f"{texture.layers} layers of {len(texture.levels)} levels of {texture.form}"
+            raise ManifestError(f"expected layer {entry['layer']} of {told[1]} levels of {told[0]} in {name}, found {found}")
+        stored.append(decoded[name][entry["layer"], ..., :channels])
+    pixels = np.stack(stored)
+    if pixels.dtype == np.float16:
+        require_finite(pixels.reshape(1, -1, channels), reader.folder / layers[0]["file"])
+    return pixels
