@@ -9,21 +9,21 @@ MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
 PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.glsl)
 
-.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check torture bench extension web clean
+.PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check docs torture bench extension web clean
 setup: $(VENV)/.installed
 
-$(VENV)/.installed: pyproject.toml scripts/debian-packages scripts/make-venv
+$(VENV)/.installed: pyproject.toml blender_bake/pyproject.toml scripts/debian-packages scripts/make-venv
 	sh scripts/debian-packages
 	sh scripts/make-venv $(PYTHON) $(VENV)
 	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export]'
+	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export]'
 	touch $@
 
 setup-test: $(VENV)/.tested-by
 
 $(VENV)/.tested-by: $(VENV)/.installed
 	sh scripts/debian-packages test
-	$(BIN)/pip install --quiet --editable '.[blender,gl,ray,report,export,test,dev]'
+	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev,docs]'
 	touch $@
 
 demo: setup $(PAGE)
@@ -40,7 +40,7 @@ test: setup-test
 	SRBF_CHECK_ANNOTATIONS=1 $(BIN)/pytest -n 2 --dist loadfile
 
 test-fast: setup-test
-	$(BIN)/pytest -m "not blender and not engines and not slow" -n 2 --dist worksteal
+	$(BIN)/pytest -m "not blender and not engines and not packaging and not slow" -n 2 --dist worksteal
 
 test-godot: setup-test
 	sh scripts/godot-chroot
@@ -61,6 +61,12 @@ check: setup-test
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python scripts/check_words.py
+
+# The pages and the reference of the library as a site, build/site; fails on a broken link.
+docs: export NO_MKDOCS_2_WARNING = 1
+docs: setup-test
+	$(BIN)/mkdocs build --strict --quiet
 
 torture: setup-test
 	$(BIN)/python benchmarks/torture.py --minutes $(MINUTES)

@@ -1,8 +1,8 @@
-"""How many samples a bake needs: few against 32 of every light, error held out and CPU time, in one run: `python benchmarks/bake.py`.
+"""Samples that a bake needs: few against 32 per light, held-out error and CPU time, in one run: `python benchmarks/bake.py`.
 
-Each scene of the demo is baked by `srbf bake` under 400 lights at 256²: at 32 samples, at 2, and by `--samples auto`, its validation lights
-counted as its cost. The 32 lights to be judged by are a bake of their own, at 64 samples. CPU time is that of all processes of a bake.
-`--keep FOLDER` leaves the captures there, with their times, and takes up those that it finds.
+`srbf bake` bakes each scene of the demo under 400 lights at 256²: with 32 samples, with 2, and with `--samples auto`, whose cost includes
+its validation lights. The 32 test lights are a separate bake at 64 samples. CPU time is that of all processes of a bake.
+`--keep FOLDER` stores the captures there with their times, and reuses those that it finds.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from srbf.methods.relighting_map import RelightingMap
 
 METHODS = {
     "25 maps": RelightingMap(k=25),
-    "28 scalars": EigenMap(scalars=28),
-    "64 clusters of 12": ClusteredEigenMap(clusters=64, scalars=12),
+    "28 components": EigenMap(components=28),
+    "64 clusters of 12": ClusteredEigenMap(clusters=64, components=12),
 }
 BAKES = {
     "32 samples": ["--samples", "32", "--validation", "0", "--holdout", "0"],
     "2 samples": ["--samples", "2", "--validation", "0", "--holdout", "0"],
     "auto": ["--samples", "auto", "--validation", "16", "--holdout-samples", "16", "--holdout", "0"],
 }
-JUDGES = ["--lights", "1", "--samples", "1", "--validation", "16", "--holdout", "32", "--holdout-samples", "64"]
+TEST_LIGHTS = ["--lights", "1", "--samples", "1", "--validation", "16", "--holdout", "32", "--holdout-samples", "64"]
 
 
 def cpu_of(command: list[str]) -> tuple[float, float]:
@@ -45,7 +45,7 @@ def cpu_of(command: list[str]) -> tuple[float, float]:
 
 
 def baked(name: str, blend: Path, folder: Path, size: int, flags: list[str]) -> dict[str, float]:
-    """Times of a bake of the demo's scene, made now or by an earlier run."""
+    """Times of a bake of a demo scene, from this or an earlier run."""
     scene, record = SCENES[name], folder.with_suffix(".json")
     if not record.is_file():
         receiver = f"{scene.receiver.kind}:{scene.receiver.name}" if scene.receiver.name else scene.receiver.kind
@@ -70,13 +70,13 @@ def main() -> None:
             blend = folder / f"{name}.blend"
             if not blend.is_file():
                 build_scene(name, blend)
-            baked(name, blend, folder / "judges", asked.size, JUDGES)
-            judges = Capture.open(folder / "judges")
-            compare(name, blend, folder, asked.size, asked.lights, judges)
+            baked(name, blend, folder / "tests", asked.size, TEST_LIGHTS)
+            tests = Capture.open(folder / "tests")
+            compare(name, blend, folder, asked.size, asked.lights, tests)
 
 
-def compare(name: str, blend: Path, folder: Path, size: int, lights: int, judges: Capture) -> None:
-    """One table of a scene."""
+def compare(name: str, blend: Path, folder: Path, size: int, lights: int, tests: Capture) -> None:
+    """Print the table of a scene."""
     print(f"\n{name}, {lights} lights, {size}²; held-out relative RMSE, and as a ratio to that of 32 samples")
     print("| bake | samples | CPU s | ratio | " + " | ".join(METHODS) + " |")
     print("|---|---|---|---|" + "---|" * len(METHODS))
@@ -88,7 +88,7 @@ def compare(name: str, blend: Path, folder: Path, size: int, lights: int, judges
         capture = Capture.open(target)
         cells = []
         for method, settings in METHODS.items():
-            error = evaluate(settings.encode(capture), judges)["holdout"]["relative_rmse"]
+            error = evaluate(settings.encode(capture), tests)["holdout"]["relative_rmse"]
             whole.setdefault(method, error)
             cells.append(f"{error:.4f} ({error / whole[method]:.3f})")
         full = times["cpu"] if label == "32 samples" else full

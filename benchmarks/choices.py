@@ -1,7 +1,7 @@
-"""What the automatic choices lose against the best in hindsight: `python benchmarks/choices.py [CAPTURE | FOLDER]…`.
+"""Loss of the automatic choices against the best ones by the test lights: `python benchmarks/choices.py [CAPTURE | FOLDER]…`.
 
-Without any: nearly flat glossy boards under ring domes, with test lights between the rings. Of a CAPTURE the holdout lights are relit, of a
-FOLDER as SynthRTI has them (`…/Dome/dirs.lp` beside `…/Test/dirs.lp`) those of the second list. The light functions of an eigen map by
+Without arguments: nearly flat glossy boards under ring domes, test lights between the rings. A CAPTURE is tested on its holdout lights,
+a FOLDER in the layout of SynthRTI (`…/Dome/dirs.lp` beside `…/Test/dirs.lp`) on its second list. The light functions of an eigen map by
 `auto` beside the best single (spread, ridge) of a grid, and 25 and 35 maps beside theirs, dB. The table is Markdown.
 """
 
@@ -16,16 +16,17 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.basis.gaussian import spread_of, weight
+from srbf.basis.gaussian import GaussianBasis, spread_of, weight
 from srbf.capture import COVERED, MANIFEST, Capture
 from srbf.encode.light_function_fit import dense_centers, functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.weighted_rows import LightSpace
 from srbf.importing.photographs import LightListImport
+from srbf.light_domain import Directions
 from srbf.methods.relighting_map import RelightingMap
 from srbf.solve.pca import principal_axes
 from srbf.solve.ridge import RidgePath
-from srbf.sphere import domain_of, mean_spacing, normalize, point_set
+from srbf.sphere import domain_of, mean_spacing, normalize
 
 DOMES = {  # lights and elevation (degrees) of each ring
     "3 rings": ((20, 16, 12, 1), (20, 45, 68, 90)),
@@ -35,7 +36,7 @@ DOMES = {  # lights and elevation (degrees) of each ring
 }
 MATERIALS = {"four glosses": (0.1, 0.2, 0.35, 0.6), "two glosses": (0.12, 0.4), "satin": (0.3,), "shiny": (0.15,), "matte": (0.6,)}
 COMPONENTS, TEXELS = 48, 2000
-SPREADS = tuple(np.geomspace(0.5, 5, 12))  # of the lights' spacing, or of the centers' mean distance
+SPREADS = tuple(np.geomspace(0.5, 5, 12))  # light spacings, or mean distances of the centers
 RIDGES = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0)
 
 
@@ -65,7 +66,7 @@ def on_rings(counts: tuple[int, ...], elevations: tuple[float, ...]) -> np.ndarr
 
 
 def between_rings(elevations: tuple[float, ...], rng: np.random.Generator, count: int = 20) -> np.ndarray:
-    """Directions half-way between the rings, at random turns."""
+    """Directions half-way between the rings, at random azimuths."""
     edges = np.radians(elevations)
     elevation = ((edges[1:] + edges[:-1]) / 2)[np.arange(count) % (len(edges) - 1)]
     turn = rng.uniform(0, 2 * np.pi, count)
@@ -97,7 +98,7 @@ def boards(texels: int = 300) -> Iterator[Case]:
 
 
 def case_of(name: str, capture: Capture, peak: float | None = None) -> Case:
-    """A capture's train and holdout lights on a sample of its texels, whatever validation lights it has left out."""
+    """A capture's train and holdout lights on a sample of its texels, without its validation lights."""
     capture = capture.combined()
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TEXELS else np.sort(np.random.default_rng(0).choice(covered, TEXELS, replace=False))
@@ -121,9 +122,9 @@ def given(path: Path) -> Iterator[Case]:
 def light_functions(case: Case) -> tuple[float, float]:
     """(`auto`, the best of the grid) of an eigen map's light functions."""
     lights, asked = case.directions[: case.fitted], case.directions[case.fitted :]
-    domain = domain_of(lights)
+    domain = Directions(domain_of(lights))
     sample = TexelSample(
-        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted
+        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted, domain
     )
     space = LightSpace.of(sample, "plain")
     axes, _ = principal_axes(space.centered, min(COMPONENTS, 3 * case.fitted))
@@ -148,7 +149,8 @@ def light_functions(case: Case) -> tuple[float, float]:
 def maps(case: Case, k: int) -> tuple[float, float]:
     """(`auto`, the best of the grid, a ridge of 0 included) of k relighting maps."""
     lights, asked = case.directions[: case.fitted], case.directions[case.fitted :]
-    centers = point_set("fibonacci", k, domain_of(lights))
+    domain = Directions(domain_of(lights))
+    centers = domain.centers(k, "fibonacci")
     flat = case.images[: case.fitted].reshape(case.fitted, -1).astype(np.float64)
 
     def reached(spread: float, ridge: float) -> float:
@@ -156,9 +158,10 @@ def maps(case: Case, k: int) -> tuple[float, float]:
         return case.psnr(weight(asked @ centers.T, spread) @ (operator @ flat))
 
     sample = TexelSample(
-        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted
+        np.arange(case.images.shape[1]), np.ascontiguousarray(case.images[: case.fitted].transpose(1, 0, 2)), lights, case.fitted, domain
     )
-    basis, ridge, _ = RelightingMap(k, encoding="float").model(lambda: sample, domain_of(lights))
+    basis, ridge, _ = RelightingMap(k, encoding="float").model(lambda: sample, domain)
+    assert isinstance(basis, GaussianBasis)
     mean = spread_of(centers, "mean")
     best = max(reached(min(1.0, float(factor * mean)), r) for factor in (0.6, 0.7, 0.8, 0.9, 1, 1.2, 1.5, 2) for r in (0.0, *RIDGES))
     return reached(basis.spread, ridge), best

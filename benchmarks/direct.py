@@ -1,4 +1,4 @@
-"""How near exact and mapped direct light come: true indirect images plus ours, against combined ones, over the held-out lights.
+"""Error of direct light by rays and by shadow maps: true indirect images plus computed direct light against combined images, held out.
 
 python benchmarks/direct.py INDIRECT_CAPTURE...
 """
@@ -17,7 +17,7 @@ from srbf.relighting.direct_light import Added
 
 
 def main(folders: list[str]) -> None:
-    """A line for each capture and way."""
+    """Print a line per capture and way."""
     for folder in folders:
         capture = Capture.open(Path(folder))
         combined, covered = capture.combined(), capture.coverage() >= COVERED
@@ -35,7 +35,7 @@ def main(folders: list[str]) -> None:
                     relit = np.maximum(capture.image(index) + direct, 0)[covered]
                     difference = relit - np.maximum(combined.image(index), 0)[covered]
                     figures.append(psnr(peak, float(np.sqrt((difference**2).mean()))))
-            print(f"{folder}: {way} {np.mean(figures):.1f} dB, worst {np.min(figures):.1f}, {np.median(seconds):.2f} s a light")
+            print(f"{folder}: {way} {np.mean(figures):.1f} dB, worst {np.min(figures):.1f}, {np.median(seconds):.2f} s per light")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""A worker that speaks as blender_bake does and renders by a formula, at once: `--blender` for what is tried of the host alone.
+"""A worker with the messages of blender_bake that renders by a formula: a `--blender` for tests of the host alone.
 
-It misbehaves as SRBF_FAULT says, KIND:LIGHT, only the first time where the kind ends in -once (SRBF_FAULT_STATE is the file that
-remembers): die, stop (the process stops answering), error, nan, short (a torn file), small (another size), wrong (another light);
-`garbage` talks nonsense between its events, `slow` takes its time.
+SRBF_FAULT is KIND:LIGHT; a kind that ends in -once occurs once (SRBF_FAULT_STATE is a file that records it). Kinds: die, stop (the
+process hangs), error, nan, short (a truncated file), small (another size), wrong (another light). `garbage` prints invalid lines
+between its events, `slow` waits.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-SLOW = 0.03  # seconds a light
+SLOW = 0.03  # seconds per light
 
 
 class FakeBlender:
-    """One job: the scene's facts and geometry, then lights as they are asked for."""
+    """One job: the scene's facts and the receiver's channels, then requests."""
 
     def __init__(self, job: dict[str, Any]) -> None:
         self._job = job
@@ -32,10 +32,10 @@ class FakeBlender:
 
     def serve(self) -> None:
         self._prepare()
-        for light in _requests():
+        for request in _requests():
             if self._kind == "slow":
                 time.sleep(SLOW)
-            self._response(light, self._kind if light["index"] == self._light and self._strikes() else "")
+            self._render(request, self._kind if request["light"]["index"] == self._light and self._strikes() else "")
         self._emit("done")
 
     def _prepare(self) -> None:
@@ -48,40 +48,36 @@ class FakeBlender:
         self._normal /= np.linalg.norm(self._normal, axis=2, keepdims=True)
         hole = ones.copy()
         hole[0, 0] = 0
-        if self._job["geometry"]:
-            images = {"position": plane, "normal": self._normal, "albedo": plane, "coverage": hole, "readable": hole, "hit": hole}
-            for name, array in images.items():
-                self._emit("image", name=name, file=self._hand_over(name, array), seconds=0.0)
+        images = {"position": plane, "normal": self._normal, "albedo": plane, "coverage": hole, "valid": hole, "hit": hole}
+        for name in [name for name in self._job["channels"] if name in images]:
+            self._emit("image", name=name, file=self._hand_over(name, images[name]), seconds=0.0)
         if self._job["ambient"]:
             self._emit("image", name="ambient", file=self._hand_over("ambient", plane), seconds=0.0)
-            self._emit("image", name="left", file=self._hand_over("left", plane * 0.01), seconds=0.0)
-        if self._job["transport"] == "indirect" and self._job.get("tints") is None:
+            self._emit("image", name="residual", file=self._hand_over("residual", plane * 0.01), seconds=0.0)
+        if self._job["transport"] == "indirect" and self._job["transmittances"] is None:
             (Path(self._job["scratch"]) / "scene.glb").write_bytes(b"glTF" + bytes(range(256)))
-            self._emit("file", file="scene.glb", sampling={"footprint": 0.5}, tints={})
+            self._emit("file", file="scene.glb", sampling={"footprint": 0.5}, transmittances={})
         self._emit("ready")
 
-    def _response(self, light: dict[str, Any], fault: str) -> None:
+    def _render(self, request: dict[str, Any], fault: str) -> None:
+        light, samples = request["light"], request["samples"]
         if fault == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         if fault == "stop":
             os.kill(os.getpid(), signal.SIGSTOP)
         if fault == "error":
-            self._emit("error", message="Blender could not bake 'Plane': so it was asked")
+            self._emit("error", message="Blender could not bake 'Plane': as requested")
             sys.exit(1)
-        noise = np.random.default_rng([light["seed"], light["samples"]]).normal(scale=light["samples"] ** -0.5, size=(*self._size, 1))
+        noise = np.random.default_rng([request["seed"], samples]).normal(scale=samples**-0.5, size=(*self._size, 1))
         direct = np.maximum(self._normal @ np.array(light["direction"]), 0)[:, :, None] * np.array([1.0, 0.5, 0.25])
         whole = direct + 0.02 * noise + 0.1
         if fault == "nan":
             whole[1, 1] = np.nan
-        name = f"light_{light['index']}"
-        fields = {"name": name, "light": light["index"], "file": self._hand_over(name, whole[1:] if fault == "small" else whole)}
-        if self._job["transport"] == "indirect":
-            fields["direct"] = self._hand_over(f"direct_{light['index']}", direct)
+        images = {"response": whole[1:] if fault == "small" else whole, "direct": direct}
+        files = {name: self._hand_over(f"light_{light['index']}_{name}", images[name]) for name in request["channels"]}
         if fault == "short":
-            os.truncate(Path(self._job["scratch"]) / fields["file"], 100)
-        if fault == "wrong":
-            fields["light"] += 1
-        self._emit("image", seconds=0.001, **fields)
+            os.truncate(Path(self._job["scratch"]) / files["response"], 100)
+        self._emit("rendered", light=light["index"] + (fault == "wrong"), files=files, seconds=0.001)
 
     def _strikes(self) -> bool:
         if not self._once:
@@ -104,7 +100,7 @@ class FakeBlender:
 
 
 def _requests() -> Iterator[dict[str, Any]]:
-    """Until the host ends it or is no more."""
+    """Requests until the host closes the pipe or exits."""
     for line in iter(sys.stdin.readline, ""):
         request = json.loads(line)
         if request.get("end"):

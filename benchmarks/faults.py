@@ -1,4 +1,4 @@
-"""Faults put into a bake from outside, and the one question after each: does the same command end at the bits of the undisturbed bake?"""
+"""Faults injected into a bake from outside; after each, the same command must give the bits of the undisturbed bake."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ SMALL = ["--size", "8", "--lights", "5", "--samples", "4", "--validation", "1", 
 
 
 class LostError(Exception):
-    """Something was lost: what, and how it was reached."""
+    """Lost or different data: what, and how to reproduce it."""
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Every file of a capture that an undisturbed bake has the same."""
+    """The files of a capture that every undisturbed bake has equal."""
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file() and p.name not in MAY_DIFFER}
 
 
 def compare(found: dict[str, bytes], expected: dict[str, bytes]) -> None:
-    """LostError where they are not the same files with the same bytes."""
+    """LostError unless both have the same files with the same bytes."""
     missing, added = sorted(set(expected) - set(found)), sorted(set(found) - set(expected))
     changed = sorted(name for name in set(found) & set(expected) if found[name] != expected[name])
     if missing or added or changed:
@@ -43,7 +43,7 @@ def compare(found: dict[str, bytes], expected: dict[str, bytes]) -> None:
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: its exit status (minus the signal that killed it) and what it wrote on stderr."""
+    """The end of a command: its exit status (minus the signal that killed it) and its stderr."""
 
     status: int
     said: str
@@ -51,15 +51,15 @@ class Ended:
 
 @dataclass(frozen=True)
 class Strike:
-    """What befalls a process at the `count`-th time (from 1) that its Python makes, opens for writing, renames or removes something
-    below `folder`: `kill` it before that happens, or let the disk be `full` from then on; or `count` how often there is such a time."""
+    """A fault at the `count`-th file operation (from 1) of a process below `folder`: make, open for writing, rename or remove.
+    `kill` the process before it, let the disk be `full` from then on, or only `count` the operations."""
 
     kind: str
     count: int
     folder: Path
 
     def arm(self) -> Callable[[], int]:
-        """Strike from now on, in this process; it cannot be taken back. Returns what tells how many times there were."""
+        """Activate in this process, permanently. Returns a function that gives the number of operations."""
         seen = 0
         root = str(self.folder)
 
@@ -83,7 +83,7 @@ class Strike:
 
 @dataclass
 class Lab:
-    """A scene, a Blender (`blender`, or the bpy module where it is None), the flags of one bake, and what it gives undisturbed."""
+    """A scene, a Blender (`blender`, or the bpy module where it is None), the flags of one bake, and its undisturbed result."""
 
     folder: Path
     scene: Path
@@ -96,7 +96,7 @@ class Lab:
     _used: int = 0
 
     def fresh(self) -> Path:
-        """A capture's folder that is not there yet; those before it are removed."""
+        """A new capture folder; removes earlier ones."""
         shutil.rmtree(self.folder / f"capture{self._used}", ignore_errors=True)
         self._used += 1
         return self.folder / f"capture{self._used}"
@@ -106,7 +106,7 @@ class Lab:
         return ["bake", str(self.scene), "-o", str(folder), "--receiver", self.receiver, *self.flags, *blender, *more]
 
     def measure(self) -> None:
-        """Bake undisturbed, twice: what is not even then the same is no loss of ours."""
+        """Bake undisturbed, twice: files that already differ then are not compared."""
         for _ in range(2):
             folder = self.fresh()
             started = time.monotonic()
@@ -121,7 +121,7 @@ class Lab:
         return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
 
     def run(self, folder: Path, *more: str, strike: Strike | None = None, **environment: str) -> Ended:
-        """The same in a process forked from one that has the libraries loaded."""
+        """The same in a process forked from one with the libraries loaded."""
         said = self.folder / "said"
         child = FORKS.Process(target=_command, args=(self.arguments(folder, *more), said, strike, environment))
         child.start()
@@ -134,20 +134,20 @@ class Lab:
         return Ended(child.exitcode, said.read_text(errors="replace"))
 
     def succeed(self, ended: Ended) -> Ended:
-        """LostError unless it ended well."""
+        """LostError unless it succeeded."""
         if ended.status != 0:
             raise LostError(f"ended as {ended.status}: {ended.said.strip()[-400:]!r}")
         return ended
 
     def refuse(self, ended: Ended, *words: str) -> Ended:
-        """LostError unless it ended as 1, without a traceback, its last line holding `words`."""
+        """LostError unless it exited with 1, without a traceback, with `words` in its last line."""
         last = (ended.said.strip().splitlines() or [""])[-1]
         if ended.status != 1 or "Traceback" in ended.said or not all(word in last for word in words):
             raise LostError(f"expected a line with {words}, found status {ended.status}: {ended.said.strip()[-400:]!r}")
         return ended
 
     def go_on(self, folder: Path, *more: str) -> None:
-        """The same command again, and again where all is done: LostError unless it ends at the undisturbed bits."""
+        """Resume by the same command, then repeat it: LostError unless the bits are those of the undisturbed bake."""
         wait_for_orphans(folder)
         self.succeed(self.run(folder, *more))
         compare(contents(folder), self.whole)
@@ -155,7 +155,7 @@ class Lab:
     def kill(
         self, folder: Path, process: subprocess.Popen[str], after: float, victims: Callable[[int, list[int]], list[int]], how: int
     ) -> Ended:
-        """Send `how` to what `victims` chooses of the command's and its workers' numbers, `after` seconds; then wait for its end."""
+        """Send the signal `how` to the processes that `victims` selects, after `after` seconds; then wait for the end."""
         try:
             process.wait(after)
         except subprocess.TimeoutExpired:
@@ -202,7 +202,7 @@ def workers_of(folder: Path) -> list[int]:
 
 
 def wait_for_orphans(folder: Path) -> None:
-    """LostError where a worker outlives its host by more than twenty seconds; one that is stopped cannot end and is none."""
+    """LostError if a worker outlives its host by more than twenty seconds; stopped workers are ignored."""
     deadline = time.monotonic() + 20
     while workers := workers_of(folder):
         if time.monotonic() > deadline:
@@ -230,4 +230,4 @@ def _command(arguments: list[str], said: Path, strike: Strike | None, environmen
 
 
 FORKS = multiprocessing.get_context("forkserver")
-FORKS.set_forkserver_preload(["srbf.cli", "filelock", "faults"])
+FORKS.set_forkserver_preload(["srbf.cli.bake", "filelock", "faults"])

@@ -1,8 +1,8 @@
-"""`srbf fit` against the bare work of its files, as ratios in one run: `python benchmarks/fit.py [FOLDER]`.
+"""`srbf fit` against raw file input and output, as ratios in one run: `python benchmarks/fit.py [FOLDER]`.
 
 The capture, 400 half ZIP EXRs of 1024² (bumps under moving shadows, noise of a few samples), is made once in FOLDER, or in a
-temporary one. The yardstick reads the same files as half floats and writes k of them again, all cores at it, by OpenImageIO
-alone: nothing converted, nothing kept, nothing flushed. Every fit is a process of its own, start-up and error included.
+temporary one. The baseline reads the same files as half floats and writes k of them, on all cores, by OpenImageIO alone, without
+conversion, storage or flushing. Every fit is a separate process, start-up and error included.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ from srbf.sphere import normalize, point_set
 
 ROOT = Path(__file__).resolve().parent.parent
 NOISE = 0.15  # of a texel's value: a render of a few samples
-BARS = {"relighting-map": 1.5, "eigen-map": 2.5, "clustered-eigen-map": 4.0}  # of the yardstick
+TARGETS = {"relighting-map": 1.5, "eigen-map": 2.5, "clustered-eigen-map": 4.0}  # times the baseline
 FLAGS: dict[str, list[str]] = {
     "relighting-map": [],
-    "eigen-map": ["--method", "eigen-map", "--scalars", "28"],
-    "clustered-eigen-map": ["--method", "clustered-eigen-map", "--clusters", "64", "--scalars", "8"],
+    "eigen-map": ["--method", "eigen-map", "--components", "28"],
+    "clustered-eigen-map": ["--method", "clustered-eigen-map", "--clusters", "64", "--components", "8"],
 }
 
 
 def make_capture(folder: Path, lights: int, side: int) -> Capture:
-    """A bumpy colored floor under discs that cast sharp shadows, every light of the hemisphere its own noise; all of them train."""
+    """A bumpy colored floor under discs that cast sharp shadows, with independent noise per light; all lights are train lights."""
     if (folder / MANIFEST).is_file():
         capture = Capture.open(folder)
         if (len(capture.lights), capture.width) != (lights, side):
@@ -104,13 +104,13 @@ def read_and_write(sources: Sequence[Path], k: int, target: Path, workers: int, 
     return seconds
 
 
-def yardstick(sources: Sequence[Path], k: int, scratch: Path) -> tuple[float, float]:
-    """(wall, processor) seconds of the quicker of two ways to use all cores: a thread an image, or OpenEXR's own threads within each."""
+def baseline(sources: Sequence[Path], k: int, scratch: Path) -> tuple[float, float]:
+    """(wall, CPU) seconds of the faster of two ways to use all cores: one thread per image, or OpenEXR's threads within each."""
     return min(read_and_write(sources, k, scratch / "maps", *way) for way in ((cores(), 1), (1, cores())))
 
 
 def fit(capture: Path, k: int, method: str, scratch: Path) -> tuple[float, float, float] | None:
-    """(wall seconds, processor seconds, peak GB) of `srbf fit` as a process; None where the command does not know the method."""
+    """(wall seconds, processor seconds, peak GB) of `srbf fit` as a process; None if the command does not know the method."""
     asset = scratch / "asset"
     size = ["-k", str(k)] if method == "relighting-map" else []
     command = [sys.executable, "-m", "srbf", "fit", str(capture), "-o", str(asset), *size, *FLAGS[method]]
@@ -133,12 +133,12 @@ def fit(capture: Path, k: int, method: str, scratch: Path) -> tuple[float, float
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path, help="where the capture is, or is made and kept")
+    parser.add_argument("folder", nargs="?", type=Path, help="folder of the capture, made if missing")
     parser.add_argument("--methods", nargs="+", choices=list(FLAGS), default=list(FLAGS))
     parser.add_argument("--lights", type=int, default=400)
     parser.add_argument("--side", type=int, default=1024)
     parser.add_argument("-k", type=int, default=25)
-    parser.add_argument("--rounds", type=int, default=2, help="the best of so many counts, for the yardstick as for the fits")
+    parser.add_argument("--rounds", type=int, default=2, help="repetitions of baseline and fits; the best counts")
     wanted = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         capture = make_capture(wanted.folder or Path(name) / "capture", wanted.lights, wanted.side)
@@ -149,7 +149,7 @@ def main() -> None:
         fits: dict[str, list[tuple[float, float, float]]] = {}
         methods = list(wanted.methods)
         for _ in range(wanted.rounds):
-            bare.append(yardstick(sources, wanted.k, Path(name)))
+            bare.append(baseline(sources, wanted.k, Path(name)))
             for method in list(methods):
                 done = fit(capture.folder, wanted.k, method, Path(name))
                 if done is None:
@@ -158,10 +158,10 @@ def main() -> None:
                     fits.setdefault(method, []).append(done)
         print(f"\n{'':<36}{'seconds':>9}{'ratio':>7}{'bar':>6}{'processor':>11}{'ratio':>7}{'peak GB':>9}")
         wall, busy = min(bare)
-        print(f"{f'read all, write {wanted.k} maps (yardstick)':<36}{wall:>9.2f}{1:>7.2f}{'':>6}{busy:>11.2f}{1:>7.2f}")
+        print(f"{f'read all, write {wanted.k} maps (baseline)':<36}{wall:>9.2f}{1:>7.2f}{'':>6}{busy:>11.2f}{1:>7.2f}")
         for method, runs in fits.items():
             seconds, used, _ = min(runs)
-            ratio = f"{seconds / wall:>7.2f}{BARS[method]:>6.2f}{used:>11.2f}{used / busy:>7.2f}"
+            ratio = f"{seconds / wall:>7.2f}{TARGETS[method]:>6.2f}{used:>11.2f}{used / busy:>7.2f}"
             print(f"{'srbf fit, ' + method:<36}{seconds:>9.2f}{ratio}{max(peak for _, _, peak in runs):>9.2f}")
 
 

@@ -1,4 +1,4 @@
-"""Hostile scenes against the bake command: in a sandbox of its own each, nothing of which may change, and the pixels of a harmless twin."""
+"""Hostile scenes against the bake command: each in a sandbox that must not change, with the pixels of a harmless twin."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from faults import LostError
 SCENE = Path(__file__).resolve().parent.parent / "data" / "scenes" / "hostile.py"
 SMALL = ["--size", "8", "--lights", "4", "--samples", "2", "--validation", "0", "--holdout", "1", "--holdout-samples", "4"]
 
-# Blender refuses these drivers already while the scene is saved, and saves what that leaves: alone they have no twin, together they do.
+# Blender refuses these drivers when it saves the scene, and saves other values: alone they have no twin, together they do.
 SAVED_OTHERWISE = {"object_driver", "shader_driver"}
 
 
 def choices() -> list[tuple[str, ...]]:
-    """Attempts to build a scene with: all together, then each for itself."""
+    """Attempts per scene: all together, then each alone."""
     names = subprocess.run([sys.executable, str(SCENE), "list"], check=True, capture_output=True, text=True).stdout.split()
     return [(), *((name,) for name in names if name not in SAVED_OTHERWISE)]
 
@@ -29,7 +29,7 @@ def harmless_twin(place: Path) -> dict[str, bytes]:
 
 
 def withstand(place: Path, chosen: tuple[str, ...], twin: dict[str, bytes]) -> None:
-    """LostError where a scene with these attempts changes a file outside the capture, or a pixel."""
+    """LostError if a scene with these attempts changes a file outside the capture, or a pixel."""
     if _bake(place, chosen) != twin:
         raise LostError(f"other pixels with {' '.join(chosen) or 'all attempts'}")
 

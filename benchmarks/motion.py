@@ -1,9 +1,9 @@
-"""How relit pictures move, by method: `python benchmarks/motion.py [CAPTURE…] [--fit "-k 25"]…`; without captures, on scenes of its own.
+"""Temporal stability by method: `python benchmarks/motion.py [CAPTURE…] [--fit "-k 25"]…`; without captures, on analytic scenes.
 
 A light sweeps over 240 frames of great circles between the captured directions. Two scenes have a closed form: an unshadowed Lambert
-plane, whose brightness must stay within 2 % of its cosine, and a plane with a pole whose shadow is that of a sun of given size. A capture
-given is compared with all its train images interpolated, which is what it knows of directions between them.
-Every `--fit` is the flags of one `srbf fit`. Exit status 1 where a bar is missed.
+plane, whose brightness must stay within 2 % of its cosine, and a plane with a pole whose shadow is that of a sun of given size. A given
+capture is compared with all its train images interpolated.
+Every `--fit` has the flags of one `srbf fit`. Exit status 1 if a target is missed.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from srbf.io import files
 from srbf.io.image import write_image
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set
 
-SIDE = 48  # texels of our scenes
+SIDE = 48  # texels of the analytic scenes
 LAMBERT_BAR = 0.02
 POLE_RADIUS, POLE_HEIGHT = 0.08, 1.0  # on the square [-1, 1]^2
-Response = Callable[[np.ndarray], np.ndarray]  # (3,) -> (H, W) answers of a white surface
+Response = Callable[[np.ndarray], np.ndarray]  # (3,) -> (H, W) responses of a white surface
 
 
 def lambert(direction: np.ndarray) -> np.ndarray:
@@ -40,9 +40,9 @@ def lambert(direction: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Pole:
-    """A plane facing up around a vertical cylinder, under a sun of angular diameter `sun_angle` (rad); exact but at the shadow's tip.
+    """A plane facing up around a vertical cylinder, under a sun of angular diameter `sun_angle` (rad); exact except at the shadow's tip.
 
-    A vertical edge hides the part of the sun's disc beyond a great circle; the pole's top does the same by elevation, and the two
+    A vertical edge hides the part of the sun's disc beyond a great circle; the pole's top does the same by elevation; both factors
     are multiplied.
     """
 
@@ -62,13 +62,13 @@ class Pole:
         return np.where(distance > POLE_RADIUS, max(0.0, direction[2]) * (1 - hidden), 0.0)
 
     def _beyond(self, angle: np.ndarray) -> np.ndarray:
-        """The part of the disc on the far side of a great circle that is `angle` from its center."""
+        """The part of the disc beyond a great circle at the distance `angle` (rad) from its center."""
         t = np.clip(angle / max(self.sun_angle / 2, 1e-9), -1, 1)
         return 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
 
 
 def make_capture(folder: Path, response: Response, lights: int, domain: Domain) -> Capture:
-    """The answers to the Hammersley directions that a bake takes, as half floats."""
+    """A capture of the responses to the Hammersley directions of a bake, as half floats."""
     (folder / "lights").mkdir(parents=True)
     entries = []
     for i, direction in enumerate(point_set("hammersley", lights, domain)):
@@ -86,7 +86,7 @@ def truth(response: Response, texels: np.ndarray) -> Reference:
 
 
 def fitted(capture: Capture, flags: str, folder: Path) -> Asset | str:
-    """The asset of `srbf fit` with these flags, or the last line that it failed with."""
+    """The asset of `srbf fit` with these flags, or its last line of output on failure."""
     command = [sys.executable, "-m", "srbf", "fit", str(capture.folder), "-o", str(folder), *shlex.split(flags)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -95,7 +95,7 @@ def fitted(capture: Capture, flags: str, folder: Path) -> Asset | str:
 
 
 def nearest_image(capture: Capture, texels: np.ndarray) -> Reference:
-    """Each direction answered by the train image closest to it."""
+    """The response of each direction is that of the nearest train image."""
     train = capture.indices("train")
     images = np.stack([capture.image(i).reshape(-1, 3)[texels] for i in train])
     towards = capture.directions(train).T
@@ -103,7 +103,7 @@ def nearest_image(capture: Capture, texels: np.ndarray) -> Reference:
 
 
 def baselines(capture: Capture, response: Response | None, texels: np.ndarray, reference: Reference) -> Iterator[tuple[str, Motion]]:
-    """What all train images show without any compression: the nearest one, and, where the truth is known, all of them interpolated."""
+    """Motion of the uncompressed train images: the nearest image, and, for analytic scenes, all interpolated."""
     path = great_circles(domain_of(capture.directions(capture.indices("train"))))
     relighters = {"(nearest image)": nearest_image}
     if response is not None:
@@ -115,7 +115,7 @@ def baselines(capture: Capture, response: Response | None, texels: np.ndarray, r
 
 def row(name: str, motion: Motion, bar: str = "") -> None:
     print(
-        f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_ripple:>9.1%}"
+        f"{name:<34}{motion.change_ratio:>9.2f}{motion.largest_step:>9.2f}{motion.brightness_error:>11.1%}{motion.largest_flicker:>9.1%}"
         f"{motion.ghosting:>10.2f}{motion.edge_kept:>7.2f}  {bar}"
     )
 
@@ -123,7 +123,7 @@ def row(name: str, motion: Motion, bar: str = "") -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("captures", nargs="*", type=Path)
-    parser.add_argument("--fit", action="append", help="flags of one srbf fit; repeat for a table of methods")
+    parser.add_argument("--fit", action="append", help="flags of one srbf fit; may be repeated")
     parser.add_argument("--lights", type=int, default=400)
     parser.add_argument("--domain", choices=("hemisphere", "sphere"), default="hemisphere")
     parser.add_argument("--sun-angle", default="auto", help="of the pole's sun: rad, or auto for the spacing of the lights")
@@ -143,7 +143,7 @@ def main() -> int:
                 )
         for number, (title, capture, response) in enumerate(scenes):
             print(f"\n{title}: {shadow_sampling(capture).sentence()}")
-            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'ripple':>9}{'ghosting':>10}{'kept':>7}")
+            print(f"{'srbf fit':<34}{'change':>9}{'step':>9}{'brightness':>11}{'flicker':>9}{'ghosting':>10}{'kept':>7}")
             texels = sampled_texels(capture.coverage() >= COVERED)
             reference = dense_reference(capture, texels) if response is None else truth(response, texels)
             for baseline, motion in baselines(capture, response, texels, reference):

@@ -1,6 +1,6 @@
 """Fit against reading, and relighting by numpy against the shaders, as ratios in one run: `python benchmarks/pipeline.py`.
 
-A synthetic capture of 400 noisy half-float EXRs of 256² texels, or as many as `--lights` and `--side` say, is made in a temporary folder;
+A temporary folder gets a synthetic capture of 400 noisy half-float EXRs of 256² texels (`--lights`, `--side`);
 every row is the best of several runs.
 """
 
@@ -29,7 +29,7 @@ K = 25
 
 
 def make_capture(folder: Path, count: int, side: int) -> Capture:
-    """Noisy cosines: EXR's ZIP finds as little to squeeze in them as in a render of few samples."""
+    """Noisy cosines, which EXR's ZIP compresses as little as a render of few samples."""
     (folder / "lights").mkdir(parents=True)
     rng = np.random.default_rng(0)
     x = np.linspace(-1, 1, side, dtype=np.float32)
@@ -46,7 +46,7 @@ def make_capture(folder: Path, count: int, side: int) -> Capture:
 
 
 def best(work: Callable[[], object], runs: int = 3) -> float:
-    """Seconds of the quickest of several runs."""
+    """Seconds of the fastest of several runs."""
     times = []
     for _ in range(runs):
         started = time.perf_counter()
@@ -79,7 +79,7 @@ def main() -> None:
 
 
 def relighting(asset: Asset) -> None:
-    """A frame of each kind of light, read back into memory."""
+    """Print the time of a frame of each kind of light, read back into memory."""
     kinds: dict[str, list[Light]] = {
         "directional": [DirectionalLight((0.3, 0.2, 0.9))],
         "100 directional": [DirectionalLight((x, 0.2, 0.9)) for x in np.linspace(-1, 1, 100)],

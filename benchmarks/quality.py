@@ -1,9 +1,9 @@
-"""Error, bytes, method: `python benchmarks/quality.py [CAPTURE | FOLDER]…`; without any, on smooth scenes of our own.
+"""Error, bytes, method: `python benchmarks/quality.py [CAPTURE | FOLDER]…`; without any, on smooth analytic scenes.
 
-A CAPTURE with unseen lights gets the held-out PSNR of every method against what it keeps of a texel. A FOLDER of photographs or renders
-with light lists, their values taken as they are stored, gets one of two tables: where `…/Dome/dirs.lp` has a `…/Test/dirs.lp` beside it,
-as in SynthRTI, the first is fitted and the second is asked for, and sets are averaged by their top folder; any other `dirs.lp`, as in
-RealRTI, is tested by leaving out one light after the other. Tables are Markdown. Exit status 1 where a bar is missed.
+A CAPTURE with held-out lights gets the held-out PSNR of every method against its bytes per texel. A FOLDER of photographs or renders
+with light lists, values as stored, gets one of two tables: if `…/Dome/dirs.lp` has a `…/Test/dirs.lp` beside it, as in SynthRTI, the
+first is fitted and the second tested, and sets are averaged by their top folder; any other `dirs.lp`, as in RealRTI, is tested by
+leave-one-out. Tables are Markdown. Exit status 1 if a target is missed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from typing import get_args
 import numpy as np
 
 from srbf.asset import Asset, layer_entries
-from srbf.capture import COVERED, MANIFEST, Capture, Quantity, Role
+from srbf.capture import COVERED, MANIFEST, Capture, Quantity
+from srbf.captured_light import Role
 from srbf.encode.quantization import quantize
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram
 from srbf.evaluation.leave_one_out import leave_one_out
@@ -37,13 +38,13 @@ from srbf.sphere import domain_of, normalize, point_set
 Method = RelightingMap | EigenMap | ClusteredEigenMap
 
 ENCODINGS: tuple[Encoding, ...] = ("float", "half", "uint8")
-KEPT_BYTES = 2 << 30  # answers in memory; of larger captures as many texels, drawn at random
+MEMORY_BYTES = 2 << 30  # of responses; larger captures use a random sample of texels
 BYTE_LOSS = 0.3  # dB that planes of bytes may lose against float ones
 MEAN_SPREAD = "relighting map, k = 25, Hammersley, spread mean"
-SMALL, BELOW_ALL = 20, 0.2  # bytes a texel that must come so near (dB) to all images interpolated, under a hard sun
+SMALL, BELOW_ALL = 20, 0.2  # bytes per texel that must come within so many dB of all images interpolated, under a hard sun
 HARD_SUN_MAPS = 21.0  # dB of the relighting map, k = 25, under a hard sun
-ABOVE_MEAN = 8.0  # dB of 28 scalars above Hammersley centers and the `mean` spread, on the smooth scene
-WORSE = 0.1  # dB that more scalars may lose, by light left out
+ABOVE_MEAN = 8.0  # dB of 28 components above Hammersley centers and the `mean` spread, on the smooth scene
+WORSE = 0.1  # dB that more components may lose in leave-one-out
 SIX = {f"{kind}/Object{i + 1}/material{3 * i + 1 + (kind == 'Multi')}" for kind in ("Single", "Multi") for i in range(3)}
 
 PAPER = {f"relighting map, k = {k}": RelightingMap(k) for k in (25, 35)}
@@ -55,7 +56,7 @@ CLUSTERED = {f"clustered eigen map, {c} × {s}": ClusteredEigenMap(c, s) for c, 
 
 def eigen(*counts: int) -> dict[str, Method]:
     """Eigen maps by name."""
-    return {f"eigen map, {count} scalars": EigenMap(count) for count in counts}
+    return {f"eigen map, {count} components": EigenMap(count) for count in counts}
 
 
 LIGHT_LIST_METHODS: dict[str, Method] = {**eigen(9, 27, 48), **PAPER, **PTM, **HSH}
@@ -69,7 +70,7 @@ LEFT_OUT_ITEMS, LEFT_OUT_MAPS, LEFT_OUT_BEST = 12, 32.1, 32.6  # the mean of so 
 
 @dataclass
 class Bars:
-    """What was asked for, and whether it was reached."""
+    """The targets, and whether they were reached."""
 
     missed: int = 0
 
@@ -100,7 +101,7 @@ class Means:
 
 
 def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, role: Role, peak: float) -> list[Score]:
-    """A score for each encoding. Planes are fitted once and rounded; relighting maps, whose ridge minds the rounding, each time anew."""
+    """A score per encoding. Planes are fitted once and rounded; relighting maps, whose ridge depends on the rounding, once per encoding."""
     scores: list[Score] = []
     asset: Asset | None = None
     for encoding in encodings:
@@ -121,8 +122,8 @@ def scores_of(method: Method, encodings: Sequence[Encoding], capture: Capture, r
 
 
 def components_of(method: Method) -> int:
-    """Numbers a texel."""
-    return 3 * method.k if isinstance(method, RelightingMap) else method.scalars
+    """Numbers per texel."""
+    return 3 * method.k if isinstance(method, RelightingMap) else method.components
 
 
 def row(*cells: object) -> None:
@@ -140,17 +141,17 @@ def note(line: str) -> None:
 
 
 def in_memory(capture: Capture, most: int | None = None) -> tuple[Capture, str]:
-    """The covered texels of a capture, or as many as memory or `most` allows, and what to say of them."""
+    """The covered texels of a capture, or as many as memory or `most` allows, and a text about them."""
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
-    most = min(most or len(covered), max(1, KEPT_BYTES // (12 * len(capture.lights))))
+    most = min(most or len(covered), max(1, MEMORY_BYTES // (12 * len(capture.lights))))
     if len(covered) <= most:
-        return capture.kept(covered), f"{len(covered)} texels"
+        return capture.load(covered), f"{len(covered)} texels"
     chosen = np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
-    return capture.kept(chosen), f"{most} of {len(covered)} texels"
+    return capture.load(chosen), f"{most} of {len(covered)} texels"
 
 
 def peak_of(capture: Capture) -> float:
-    """As `srbf evaluate` has it: 1 for bytes, else the quantile of the combined train answers."""
+    """As in `srbf evaluate`: 1 for bytes, else the quantile of the combined train responses."""
     if capture.source_bits == 8:
         return 1.0
     combined = capture.combined()
@@ -162,14 +163,14 @@ def peak_of(capture: Capture) -> float:
 
 
 def methods_for(capture: Capture, texels: int) -> dict[str, Method]:
-    """The methods of a capture's table: clusters where they have texels enough, what lives on the hemisphere where all lights are above."""
+    """The methods of a capture's table: clusters if there are enough texels, hemispherical functions if all lights are above."""
     clustered = {name: method for name, method in CLUSTERED.items() if method.clusters * TEXELS_PER_CLUSTER <= texels}
     above = {**HSH, **PTM} if domain_of(capture.directions(capture.indices("train"))) == "hemisphere" else {}
     return {**PAPER, **eigen(9, 16, 28, 48), **clustered, **SH, **above}
 
 
 def capture_table(capture: Capture, title: str, bars: Bars, smooth: bool = False) -> None:
-    """Every method at float, half and byte planes, and the images themselves, at the lights least seen."""
+    """Every method at float, half and byte planes, and the images themselves, at the lights of the last role."""
     role: Role = "holdout" if capture.indices("holdout") else "validation"
     if not capture.indices(role):
         left_out_table([(title, capture)], None, bars)
@@ -177,8 +178,19 @@ def capture_table(capture: Capture, title: str, bars: Bars, smooth: bool = False
     peak = peak_of(capture)
     sample, texels = in_memory(capture)
     train, unseen = len(sample.indices("train")), len(sample.indices(role))
-    print(f"\n{title}: {train} lights fitted, {unseen} {role} lights asked for, {texels}, peak {peak:.4g}")
-    head("method", "scalars a texel", "float, dB", "bytes as half", "half, dB", "bytes as uint8", "uint8, dB", "loss, dB", "seconds", "bar")
+    print(f"\n{title}: {train} lights fitted, {unseen} {role} lights tested, {texels}, peak {peak:.4g}")
+    head(
+        "method",
+        "components per texel",
+        "float, dB",
+        "bytes as half",
+        "half, dB",
+        "bytes as uint8",
+        "uint8, dB",
+        "loss, dB",
+        "seconds",
+        "bar",
+    )
     images = {score.name: score for score in baselines(sample, role, peak)}
     hard = _hard_sun(capture)
     small: list[tuple[float, float, str]] = []
@@ -201,12 +213,12 @@ def capture_table(capture: Capture, title: str, bars: Bars, smooth: bool = False
     if small:
         best, bytes_of_best, name = max(small)
         verdict = f": {bars.at_least(best, images[ALL].psnr - BELOW_ALL)}" if hard else ""
-        print(f"\nAt most {SMALL} bytes a texel: {name}, {bytes_of_best:.0f} bytes, {best:.2f} dB{verdict}")
+        print(f"\nAt most {SMALL} bytes per texel: {name}, {bytes_of_best:.0f} bytes, {best:.2f} dB{verdict}")
     if smooth:
-        above = found["eigen map, 28 scalars"] - found[MEAN_SPREAD]
+        above = found["eigen map, 28 components"] - found[MEAN_SPREAD]
         bound = float(planes_bound(spectrum(sample), 3 * train * sample.width, peak)[28])
-        print(f"\n28 scalars above {MEAN_SPREAD}: {above:.2f} dB, {bars.at_least(above, ABOVE_MEAN)}")
-        print(f"The best 28 planes, of the train answers themselves: {bound:.2f} dB")
+        print(f"\n28 components above {MEAN_SPREAD}: {above:.2f} dB, {bars.at_least(above, ABOVE_MEAN)}")
+        print(f"The best 28 components of the train responses themselves: {bound:.2f} dB")
 
 
 def _hard_sun(capture: Capture) -> bool:
@@ -242,9 +254,9 @@ def dome_table(root: Path, domes: Sequence[Path], bars: Bars) -> None:
     wanted = BARS["six"] if names == SIX else BARS["all"] if (counts.get("Single"), counts.get("Multi")) == (24, 27) else {}
     order = sorted(groups, reverse=True)  # Single before Multi, as their bars are
     sets = ", ".join(f"{counts[group]} of {group}" for group in order)
-    print(f"\n{len(domes)} sets ({sets}); lights fitted and asked for: {', '.join(f'{a} and {b}' for a, b in sorted(lights))}")
+    print(f"\n{len(domes)} sets ({sets}); lights fitted and tested: {', '.join(f'{a} and {b}' for a, b in sorted(lights))}")
     columns = [text for group in order for text in (f"{group}, dB", "bytes, dB", "loss, dB", "bar")]
-    head("method", "scalars a pixel", *columns)
+    head("method", "components per pixel", *columns)
     for name, method in LIGHT_LIST_METHODS.items():
         cells = []
         for place, group in enumerate(order):
@@ -258,7 +270,7 @@ def dome_table(root: Path, domes: Sequence[Path], bars: Bars) -> None:
 
 
 def left_out_table(items: Sequence[tuple[str, Capture | Path]], most: int | None, bars: Bars) -> None:
-    """Each light of a capture asked for when the others are fitted; `most` texels of each."""
+    """Leave-one-out over the lights of each capture; `most` texels of each."""
     means = Means()
     titles, said = [], []
     for title, source in items:
@@ -277,7 +289,7 @@ def left_out_table(items: Sequence[tuple[str, Capture | Path]], most: int | None
                     means.add(name, encoding, leave_one_out(sample, fit.encode)["leave_one_out"]["psnr"])
             note(f"{title}, {name}: {means.values[name, 'float'][-1]:.2f}, as bytes {means.values[name, 'uint8'][-1]:.2f}")
     print(f"\nEvery light left out once. {'; '.join(said)}")
-    head("method", "scalars a pixel", *(f"{title}, dB" for title in titles), "mean, dB", "bytes, mean, dB", "loss, dB", "bar")
+    head("method", "components per pixel", *(f"{title}, dB" for title in titles), "mean, dB", "bytes, mean, dB", "loss, dB", "bar")
     whole = len(items) == LEFT_OUT_ITEMS
     for name, method in LEFT_OUT_METHODS.items():
         exact, byte = means.of(name, "float"), means.of(name, "uint8")
@@ -296,7 +308,7 @@ def left_out_table(items: Sequence[tuple[str, Capture | Path]], most: int | None
 
 
 class imported:
-    """A light list, and one of unseen lights, as a capture in a temporary folder; values as stored."""
+    """A light list, and one of held-out lights, as a capture in a temporary folder; values as stored."""
 
     def __init__(self, lights: Path, unseen: Path | None = None) -> None:
         self._settings = LightListImport(lights, "linear", unseen)
@@ -312,9 +324,9 @@ class imported:
 
 
 def smooth_capture(folder: Path, quantity: Quantity, lights: int = 300, unseen: int = 60, side: int = 96) -> Capture:
-    """A bumpy floor under three balls whose shadows have penumbrae of half a radian; unseen lights uniform on the hemisphere.
+    """A bumpy floor under three balls whose shadows have penumbrae of half a radian; held-out lights uniform on the hemisphere.
 
-    Its colors vary from texel to texel: they are in its radiance, of which joint-color planes need the more, not in its irradiance.
+    Its colors vary from texel to texel. They are in its radiance, which needs more joint-color components, not in its irradiance.
     """
     (folder / "lights").mkdir(parents=True)
     rng = np.random.default_rng(0)
@@ -346,14 +358,14 @@ _BALLS = (((0.3, 0.2, 0.5), 0.2), ((-0.4, 0.3, 0.4), 0.15), ((0.0, -0.5, 0.6), 0
 
 
 def _seen_ball(x: np.ndarray, y: np.ndarray, z: np.ndarray, center: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors from points to a ball, and its angular radius (rad) as they see it."""
+    """Unit vectors from points to a ball, and its angular radius (rad) from there."""
     towards = np.stack([center[0] - x, center[1] - y, center[2] - z], axis=2)
     distance = np.linalg.norm(towards, axis=2)
     return towards / distance[:, :, None], np.arcsin(np.clip(radius / distance, 0, 1))
 
 
 def light_lists(root: Path) -> tuple[list[Path], list[Path]]:
-    """(lists of domes that have a test beside them, all others), sorted."""
+    """(lists of domes with a test beside them, all others), sorted."""
     lists = sorted(root.rglob("dirs.lp"))
     domes = [path for path in lists if path.parent.name == "Dome" and (path.parents[1] / "Test" / "dirs.lp").is_file()]
     tests = {path.parents[1] / "Test" / "dirs.lp" for path in domes}

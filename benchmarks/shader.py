@@ -1,10 +1,10 @@
-"""What the shaders of every method cost beside a bare one that only sums as many layers: `python benchmarks/shader.py`.
+"""Time of the shaders of every method against a minimal one that only sums as many layers: `python benchmarks/shader.py`.
 
-`--sides 1024 4096`: texels a side; `--screen`: frames a second of a lightmapped surface that fills 1920 x 1080; `--formula`: lamps by
-formula too. Assets of random numbers in half floats, since a shader's time does not depend on what the numbers are: 25 relighting maps,
-eigen maps of 28 and 16 scalars, 64 clusters of 8 scalars. All draw into one RGBA32F target, blended; milliseconds are medians, the shaders
-taking turns in one run, weights of far lights folded beforehand: `host` is what that takes the processor. GB/s: the texel's own data over
-the time, against copying a buffer on the same device, each byte read and written counted.
+`--sides 1024 4096`: texels per side; `--screen`: frames per second of a lightmapped surface that fills 1920 x 1080; `--formula`: point
+lights also by formula. Assets have random half floats, since values do not change the time: 25 relighting maps, eigen maps of 28 and 16
+components, 64 clusters of 8 components. All draw into one RGBA32F target, blended. Milliseconds are medians of alternating runs, with the
+weights of distant lights projected beforehand; `host` is the CPU time of that. GB/s: the texel data over the time, against copying a
+buffer on the same device, counting reads and writes.
 """
 
 from __future__ import annotations
@@ -27,46 +27,47 @@ from srbf.gl.includes import resolve, resolve_text
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_point_lights, padded
+from srbf.light_domain import Directions
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import projected_weights
 from srbf.relighting.relighter import PASSES
 from srbf.sphere import point_set
 
-LIGHTS = 400  # of the capture that the light functions are as dense as
+LIGHTS = 400  # of a capture, which sets the density of the light functions
 SPREADS = (0.2, 0.4)  # rad
 MAPS = "relighting map, k = 25"
 METHODS: dict[str, dict[str, int]] = {
     MAPS: {"k": 25},
-    "eigen map, 28 scalars": {"scalars": 28},
-    "eigen map, 16 scalars": {"scalars": 16},
-    "clustered, 64 x 8 scalars": {"clusters": 64, "scalars": 8},
+    "eigen map, 28 components": {"components": 28},
+    "eigen map, 16 components": {"components": 16},
+    "clustered, 64 x 8 components": {"clusters": 64, "components": 8},
 }
-BARE = "bare sum of 25 layers"
+MINIMAL = "minimal sum of 25 layers"
 SUN: list[Light] = [DirectionalLight((0.3, 0.2, 0.9), (1.0, 0.9, 0.7))]
 POINT_LIGHTS = [PointLight((0.2 + 0.05 * i, 0.1 - 0.07 * i, 0.7), (0.9, 1.0, 0.8)) for i in range(16)]
 Clock = Callable[[], float]
-PATCH = 16  # texels a side of a patch that is all one cluster
+PATCH = 16  # texels per side of a patch in one cluster
 SCREEN = (1920, 1080)
 COPIED = 256 << 20  # bytes
 
-BARE_SHADER = """#version 330 core
+MINIMAL_SHADER = """#version 330 core
 uniform sampler2DArray maps;
-out vec4 answer;
+out vec4 response;
 void main() {
     vec2 uv = gl_FragCoord.xy / vec2(textureSize(maps, 0).xy);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < 25; ++i) {
         sum += textureLod(maps, vec3(uv, float(i)), 0.0).rgb;
     }
-    answer = vec4(sum, 1.0);
+    response = vec4(sum, 1.0);
 }
 """
 
 
-def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> Asset:
+def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0) -> Asset:
     """Random layers over a plane, in half floats."""
     rng = np.random.default_rng(0)
-    layers, channels = (k, 3) if k else (-(-scalars // 4), 4)
+    layers, channels = (k, 3) if k else (-(-components // 4), 4)
     layer = rng.standard_normal((side, side, channels), np.float32).astype(np.float16)
     stored = np.stack([np.roll(layer, i, axis=0) for i in range(layers)])
     scale, bias = np.ones((layers, channels), np.float32), np.zeros((layers, channels), np.float32)
@@ -80,12 +81,12 @@ def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> As
         manifest |= {"method": "relighting-map", "maps": entries}
         manifest["basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spread": spread}
         return Asset(manifest, stored, scale, bias, {"r_table": r_table(spread)}, images)
-    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), "hemisphere")
-    count = max(clusters, 1) * (scalars + 1)
+    centers = dense_centers(point_set("fibonacci", LIGHTS, "hemisphere"), Directions("hemisphere"))
+    count = max(clusters, 1) * (components + 1)
     coefficients = rng.normal(size=(count, len(centers), 3)).astype(np.float32)
     functions = LightFunctions(centers, rng.choice(SPREADS, count), coefficients)
     table = octahedral_table(functions, "hemisphere")
-    manifest |= {"method": "clustered-eigen-map" if clusters else "eigen-map", "scalars": scalars, "planes": entries}
+    manifest |= {"method": "clustered-eigen-map" if clusters else "eigen-map", "scalars": components, "planes": entries}
     manifest["light_basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spreads": functions.spreads.tolist()}
     manifest["w_table"] = {"size": table.size, "columns": table.columns}
     tables = {"light_coefficients": coefficients, "w_table": table.atlas}
@@ -97,7 +98,7 @@ def make_asset(side: int, k: int = 0, scalars: int = 0, clusters: int = 0) -> As
 
 
 class Bench:
-    """Every shader at one size, ready to draw into one target."""
+    """All shaders at one size, drawing into one target."""
 
     def __init__(self, context: Any, side: int, counts: list[int], formula: bool, clock: Clock, resources: ExitStack) -> None:
         self._context, self._resources, self._clock = context, resources, clock
@@ -117,14 +118,14 @@ class Bench:
                 if not by_formula:
                     self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.far(weights, None)
                 for count in counts:
-                    self.draws[shown, f"{count} lamps"] = lambda passes=passes, none=0 * weights, count=count: passes.point_lights(
+                    self.draws[shown, f"{count} lights"] = lambda passes=passes, none=0 * weights, count=count: passes.point_lights(
                         POINT_LIGHTS[:count], none, None
                     )
             if name == MAPS:
-                self.draws[BARE, "directional"] = self._bare(textures)
+                self.draws[MINIMAL, "directional"] = self._bare(textures)
 
     def run(self, draw: Callable[[], None]) -> float:
-        """Seconds of one shader, to the end of it."""
+        """Seconds of one shader, until it finishes."""
         self._target.use()
         self._context.enable_only(self._context.BLEND)
         self._context.blend_func = self._context.ONE, self._context.ONE
@@ -135,7 +136,7 @@ class Bench:
         return self._clock() - started
 
     def _bare(self, textures: AssetTextures) -> Callable[[], None]:
-        program = compile_program(self._context, resolve("stages/fullscreen.vert"), resolve_text(BARE_SHADER, "bare.frag"))
+        program = compile_program(self._context, resolve("stages/fullscreen.vert"), resolve_text(MINIMAL_SHADER, "bare.frag"))
         corners = self._kept(self._context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
         drawn = self._kept(self._context.vertex_array(self._kept(program), [(corners, "2f", "corner")]))
 
@@ -155,7 +156,7 @@ class Bench:
 
 
 def medians(draws: dict[Any, Callable[[], float]], runs: int) -> dict[Any, float]:
-    """Milliseconds of each, all of them taking turns; the first turn, which compiles and uploads, does not count."""
+    """Milliseconds of each, in alternation; the first round, which compiles and uploads, does not count."""
     times: dict[Any, list[float]] = {}
     for run in range(-1, runs):
         for key, draw in draws.items():
@@ -166,7 +167,7 @@ def medians(draws: dict[Any, Callable[[], float]], runs: int) -> dict[Any, float
 
 
 def copy_rate(context: Any, runs: int) -> float:
-    """GB/s that copying a buffer moves, read and written."""
+    """GB/s of copying a buffer, reads and writes counted."""
     with ExitStack() as resources:
         buffers = [context.buffer(reserve=COPIED) for _ in range(2)]
         for buffer in buffers:
@@ -183,7 +184,7 @@ def copy_rate(context: Any, runs: int) -> float:
 
 
 def host_times(assets: dict[str, Asset], runs: int) -> dict[str, float]:
-    """Milliseconds to fold the weights of one directional light."""
+    """Milliseconds to project the weights of one directional light."""
 
     def fold(asset: Asset) -> float:
         started = time.perf_counter()
@@ -194,13 +195,13 @@ def host_times(assets: dict[str, Asset], runs: int) -> dict[str, float]:
 
 
 def table(context: Any, side: int, runs: int, counts: list[int], formula: bool, clock: Clock, copied: float) -> None:
-    """Print what every shader costs at one size."""
+    """Print the times of all shaders at one size."""
     with ExitStack() as resources:
         bench = Bench(context, side, counts, formula, clock, resources)
         took = medians({key: lambda draw=draw: bench.run(draw) for key, draw in bench.draws.items()}, runs)
         host = host_times(bench.assets, runs)
-        bare = took[BARE, "directional"]
-        kinds = ["directional", *(f"{count} lamps" for count in counts)]
+        bare = took[MINIMAL, "directional"]
+        kinds = ["directional", *(f"{count} lights" for count in counts)]
         print(f"\n{side:<33}{'B / texel':>9}{'host':>7}" + "".join(f"{kind:>18}" for kind in kinds) + f"{'GB/s':>7}{'of a copy':>11}")
         for name in dict.fromkeys(name for name, _ in took):
             size = bench.assets.get(name, bench.assets[MAPS]).bytes_per_texel()["directional"]
@@ -215,9 +216,9 @@ def table(context: Any, side: int, runs: int, counts: list[int], formula: bool, 
 
 
 def screen(context: Any, runs: int, counts: list[int], side: int = 1024) -> None:
-    """Print the frames a second of a surface that fills a screen, a sun and none or so many lamps on it."""
+    """Print the frames per second of a surface that fills a screen, under a directional light and some point lights."""
     counts = [0, *counts]
-    print(f"\nframes a second at {SCREEN[0]} x {SCREEN[1]}, lightmap of {side}" + "".join(f"{count:>9} lamps" for count in counts))
+    print(f"\nframes per second at {SCREEN[0]} x {SCREEN[1]}, lightmap of {side}" + "".join(f"{count:>9} lights" for count in counts))
     with ExitStack() as resources:
         target = context.framebuffer([context.texture(SCREEN, 4, dtype="f2")])
         square = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
@@ -251,7 +252,7 @@ def _surface(context: Any, asset: Asset, textures: AssetTextures, corners: Any, 
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
     places = max(count, 1)
     defines = {"SRBF_POINT_LIGHTS": places, "SRBF_PLAIN": 1} | (
-        {"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars}
+        {"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.components}
     )
     program = compile_program(context, resolve("stages/lightmap.vert"), resolve(f"stages/{stage}", defines=defines))
     drawn = context.vertex_array(program, [(corners, "3f 2f", "position", "lightmapUv")])
@@ -292,15 +293,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sides", type=int, nargs="+", default=[1024])
     parser.add_argument("--runs", type=int, default=15)
-    parser.add_argument("--point-lights", type=int, nargs="*", default=[1, 4, 16], help="how many at once, 16 at most")
-    parser.add_argument("--formula", action="store_true", help="lamps by formula too: which is faster is for a GPU to say")
-    parser.add_argument("--screen", action="store_true", help="frames a second at 1920 x 1080 too")
-    parser.add_argument("--busy", action="store_true", help="a software renderer's processor time, where others use the machine too")
+    parser.add_argument("--point-lights", type=int, nargs="*", default=[1, 4, 16], help="numbers of point lights, at most 16")
+    parser.add_argument("--formula", action="store_true", help="point lights also by formula")
+    parser.add_argument("--screen", action="store_true", help="frames per second at 1920 x 1080 too")
+    parser.add_argument("--busy", action="store_true", help="CPU time of a software renderer, for a shared machine")
     arguments = parser.parse_args()
     clock = time.process_time if arguments.busy else time.perf_counter
     context = create_context()
     copied = copy_rate(context, arguments.runs)
-    print(f"{context.info['GL_RENDERER']}; ms and times the bare shader, medians of {arguments.runs}; copying moves {copied:.1f} GB/s")
+    print(f"{context.info['GL_RENDERER']}; ms and times the minimal shader, medians of {arguments.runs}; copying moves {copied:.1f} GB/s")
     for side in arguments.sides:
         table(context, side, arguments.runs, arguments.point_lights, arguments.formula, clock, copied)
     if arguments.screen:

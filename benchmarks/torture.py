@@ -1,8 +1,8 @@
-"""What befalls a bake at night, tried and counted: `make torture`, or `python benchmarks/torture.py --minutes 10 [--seed N] [--row WORD]`.
+"""Failures that a bake must survive: `make torture`, or `python benchmarks/torture.py --minutes 10 [--seed N] [--row WORD]`.
 
-Kills, full disks, damaged files, hung and lying workers, rivals, hostile scenes. After each the same command runs again, and its
-capture is compared bit for bit with an undisturbed one. Prints one table; exits 1 where anything was lost, with how it was reached.
-Rows marked (fake) run a Blender that renders by a formula: the host is the same.
+Kills, full disks, damaged files, hung and faulty workers, concurrent processes, hostile scenes. After each, the same command runs again,
+and its capture is compared bit for bit with an undisturbed one. Prints one table; exits 1 if anything was lost, with how to reproduce it.
+Rows marked (fake) use a Blender that renders by a formula, with the same host.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from faults import Lab, LostError, Strike, contents, fake_lab, wait_for_orphans
 
 HERE = Path(__file__).resolve().parent
 SCENES = HERE.parent / "data" / "scenes"
-WORKER_TIMEOUT = "2"  # seconds; an answer of the fake takes a thousandth
+WORKER_TIMEOUT = "2"  # seconds; the fake responds in a thousandth of that
 Trials = Iterator[Callable[[], object]]
-KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-sums"), ("--samples", "auto"))
-DAMAGES = ("cut", "emptied", "flipped", "zeroed", "removed")
-LIES = ("nan", "short", "small", "wrong", "error")
+KINDS_OF_BAKE = ((), ("--transport", "indirect", "--keep-accumulation"), ("--samples", "auto"))
+DAMAGES = ("truncated", "emptied", "flipped", "zeroed", "removed")
+FAULTY = ("nan", "short", "small", "wrong", "error")
 
 
 class Labs:
-    """The labs that rows share, made when first asked for."""
+    """The labs that rows share, made on first use."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -151,7 +151,7 @@ def all_killed_at_random(labs: Labs, rng: np.random.Generator) -> Trials:
 
 
 def worker_killed(labs: Labs, rng: np.random.Generator) -> Trials:
-    """kill -9 of the worker at a random moment: replaced, unseen"""
+    """kill -9 of the worker at a random moment: replaced silently"""
 
     def trial(after: float) -> None:
         lab = labs.real()
@@ -177,8 +177,8 @@ def interrupted(labs: Labs, rng: np.random.Generator) -> Trials:
             raise LostError(f"Ctrl-C after {after:.2f} s ended as {ended.status}: {ended.said.strip()[-400:]!r}")
         if ended.status != 0 and (folder / "capture.json").is_file():
             told = {Path(light["file"]).stem for light in json.loads((folder / "capture.json").read_text())["lights"]}
-            if not {path.stem for path in (folder / "sums").glob("[0-9]*")} <= told:  # of a finished bake they are being removed
-                raise LostError(f"Ctrl-C after {after:.2f} s left lights that the manifest does not tell of")
+            if not {path.stem for path in (folder / "accumulation").glob("[0-9]*")} <= told:  # of a finished bake they are being removed
+                raise LostError(f"Ctrl-C after {after:.2f} s left lights that the manifest does not list")
         folder.mkdir(exist_ok=True)
         lab.go_on(folder)
 
@@ -191,7 +191,7 @@ def _moment(lab: Lab, rng: np.random.Generator) -> float:
 
 
 def compare_again(lab: Lab, folder: Path) -> None:
-    """The bits that are there, and those after the command was given once more."""
+    """Compare the bits before and after another run of the command."""
     found = contents(folder)
     lab.go_on(folder)
     if contents(folder) != found:
@@ -199,7 +199,7 @@ def compare_again(lab: Lab, folder: Path) -> None:
 
 
 def disk_filled(labs: Labs, rng: np.random.Generator) -> Trials:
-    """a small disk that another fills up meanwhile, then frees (fake)"""
+    """a small disk that another process fills up and frees (fake)"""
     disk = labs.place("disk")
 
     def trial(after: float) -> None:
@@ -243,7 +243,7 @@ def _wait(until: Callable[[], bool]) -> None:
 
 
 def damaged_files(labs: Labs, rng: np.random.Generator) -> Trials:
-    """a file of a half-done capture cut, emptied, flipped, zeroed or removed (fake)"""
+    """a file of an unfinished capture truncated, emptied, flipped, zeroed or removed (fake)"""
     half = labs.place("half")
     trials = []
     for number, flags in enumerate(KINDS_OF_BAKE):
@@ -261,7 +261,7 @@ def damaged_files(labs: Labs, rng: np.random.Generator) -> Trials:
         shutil.copytree(begun, folder)
         _damage(folder / name, damage, place)
         ended = lab.run(folder)
-        if ended.status != 0:  # the small texts may be refused, never be gone on with wrongly
+        if ended.status != 0:  # the small texts may be refused, never wrongly resumed
             if name.name not in ("bake.json", "capture.json", "curve.json"):
                 raise LostError(f"{name} {damage} at {place:.3f} ended as {ended.status}: {ended.said.strip()[-400:]!r}")
             lab.refuse(ended)
@@ -281,7 +281,7 @@ def _damage(path: Path, how: str, place: float) -> None:
     if how == "removed":
         path.unlink()
         return
-    if how == "cut":
+    if how == "truncated":
         data = data[:at]
     elif how == "emptied":
         data = bytearray()
@@ -293,12 +293,12 @@ def _damage(path: Path, how: str, place: float) -> None:
 
 
 def hung_workers(labs: Labs, rng: np.random.Generator) -> Trials:
-    """a worker that stops answering at one light: replaced (fake)"""
+    """a worker that hangs at one light: replaced (fake)"""
     yield from _once(labs, rng, "stop-once")
 
 
 def dying_workers(labs: Labs, rng: np.random.Generator) -> Trials:
-    """a worker that dies of one light once: tried again (fake)"""
+    """a worker that crashes once at one light: tried again (fake)"""
     yield from _once(labs, rng, "die-once")
 
 
@@ -311,7 +311,7 @@ def _once(labs: Labs, rng: np.random.Generator, kind: str) -> Trials:
         fault = {"SRBF_FAULT": f"{kind}:{light}", "SRBF_FAULT_STATE": str(state), "SRBF_UNCONFINED": "1"}
         lab.succeed(lab.run(folder, "--worker-timeout", WORKER_TIMEOUT, **fault))
         if not state.exists():
-            raise LostError("the fault never struck")
+            raise LostError("the fault did not occur")
         compare_again(lab, folder)
 
     for i in itertools.count():
@@ -319,7 +319,7 @@ def _once(labs: Labs, rng: np.random.Generator, kind: str) -> Trials:
 
 
 def deadly_lights(labs: Labs, rng: np.random.Generator) -> Trials:
-    """a light of which every worker dies, or hangs: reported, the rest goes on (fake)"""
+    """a light at which every worker crashes or hangs: reported, the bake continues (fake)"""
 
     def trial(kind: str, light: int) -> None:
         lab = labs.fake()
@@ -337,7 +337,7 @@ def deadly_lights(labs: Labs, rng: np.random.Generator) -> Trials:
 
 
 def lying_workers(labs: Labs, rng: np.random.Generator) -> Trials:
-    """answers that are NaN, torn, of another size or light, errors; nonsense between them (fake)"""
+    """results that are NaN, truncated, of another size or light, errors; invalid lines between them (fake)"""
 
     def trial(kind: str, light: int) -> None:
         lab = labs.fake()
@@ -349,7 +349,7 @@ def lying_workers(labs: Labs, rng: np.random.Generator) -> Trials:
             lab.refuse(ended)
         lab.go_on(folder)
 
-    for kind in itertools.cycle((*LIES, "garbage")):
+    for kind in itertools.cycle((*FAULTY, "garbage")):
         yield partial(trial, kind, int(rng.integers(7)))
 
 
@@ -373,7 +373,7 @@ def rivals(labs: Labs, rng: np.random.Generator) -> Trials:
 
 
 def stale_leavings(labs: Labs, rng: np.random.Generator) -> Trials:
-    """locks, holders, scratch folders and half-written files of the dead (fake)"""
+    """locks, holders, scratch folders and partial files of killed processes (fake)"""
 
     def trial(lab: Lab, n: int) -> None:
         folder = lab.fresh()
@@ -383,7 +383,7 @@ def stale_leavings(labs: Labs, rng: np.random.Generator) -> Trials:
         (folder / ".holder.json").write_text(json.dumps({"host": "elsewhere", "pid": 1, "since": "2001-01-01 00:00:00"}))
         (folder / ".scratch" / "worker0").mkdir(parents=True, exist_ok=True)
         (folder / ".scratch" / "worker0" / "light_1.npy").write_bytes(b"half an array")
-        for place in ("lights", "sums", "direct"):
+        for place in ("lights", "accumulation", "direct"):
             if (folder / "bake.json").is_file() and (folder / place).is_dir():  # none is written there before that
                 (folder / place / ".0001.4711-dead.partial.exr").write_bytes(b"half an image")
         lab.go_on(folder)
@@ -401,7 +401,7 @@ def hostile_scenes(labs: Labs, rng: np.random.Generator) -> Trials:
 
 
 class Unavailable(Exception):
-    """This machine cannot try it; the reason."""
+    """The reason why this machine cannot run a row."""
 
 
 ROWS: dict[Callable[[Labs, np.random.Generator], Trials], float] = {  # and their share of the time
@@ -427,7 +427,7 @@ BY_BLENDER = {killed_at_random, all_killed_at_random, worker_killed, interrupted
 
 
 def torture(seconds: float, seed: int, words: str = "", say: Callable[[str], None] = print) -> int:
-    """Every row whose name holds `words`, for its share of `seconds`; returns how often something was lost."""
+    """Run every row whose name contains `words`, for its share of `seconds`; returns the number of losses."""
     ends, lost, total = time.monotonic() + seconds, [], 0
     rows = {row: share for row, share in ROWS.items() if words in row.__name__}
     say(f"{'what':<92}{'tried':>7}{'lost':>6}{'seconds':>9}")
@@ -462,11 +462,11 @@ def torture(seconds: float, seed: int, words: str = "", say: Callable[[str], Non
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=9.0, help="all rows together, but for the trial at hand of each")
+    parser.add_argument("--minutes", type=float, default=9.0, help="of all rows together, plus the last trial of each")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--row", default="", help="only rows whose function's name holds this")
+    parser.add_argument("--row", default="", help="only rows whose function's name contains this")
     options = parser.parse_args()
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # or, begun in the background of a script, all would ignore Ctrl-C
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # otherwise, in the background of a script, all would ignore Ctrl-C
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     sys.exit(torture(60 * options.minutes, options.seed, options.row) > 0)
 

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What Python evaluates is the viewport's scene: settings that make it the scene of a render."""
+"""Python evaluates the viewport's scene: settings that make it the scene of a render."""
 
 from __future__ import annotations
 
 import bpy
 
-ALONE = {  # modifiers that look at nothing but their own object
+ALONE = {  # modifiers that read only their own object
     "ARRAY", "BEVEL", "BUILD", "CAST", "DECIMATE", "DISPLACE", "EDGE_SPLIT", "MASK", "MIRROR", "MULTIRES", "PARTICLE_SYSTEM", "REMESH",
     "SCREW", "SIMPLE_DEFORM", "SKIN", "SMOOTH", "SOLIDIFY", "SUBSURF", "TRIANGULATE", "WAVE", "WEIGHTED_NORMAL", "WELD", "WIREFRAME",
 }  # fmt: skip
 
 
 def settle(scene: bpy.types.Scene) -> None:
-    """Simplify and geometry nodes of the whole file as a render has them."""
+    """Set Simplify and geometry nodes of the whole file as in a render."""
     render = scene.render
     render.simplify_subdivision = render.simplify_subdivision_render
     render.simplify_child_particles = render.simplify_child_particles_render
@@ -21,7 +21,7 @@ def settle(scene: bpy.types.Scene) -> None:
 
 
 def for_evaluation(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
-    """The modifiers of `obj` as a render has them, and those of every object where `obj` may look at others."""
+    """Set the modifiers of `obj` as in a render, and those of every object where `obj` may read others."""
     settle_object(obj)
     if any(modifier.show_render and modifier.type not in ALONE for modifier in obj.modifiers):
         for other in scene.objects:
@@ -29,7 +29,7 @@ def for_evaluation(obj: bpy.types.Object, scene: bpy.types.Scene) -> None:
 
 
 def settle_object(obj: bpy.types.Object) -> None:
-    """Which modifiers of `obj` are on, how finely they divide, and whether what scatters is itself seen, as a render has it."""
+    """Set which modifiers of `obj` are on, their subdivision, and whether an instancer is itself visible, as in a render."""
     if obj.library:
         return
     obj.show_instancer_for_viewport = obj.show_instancer_for_render
@@ -48,7 +48,7 @@ def settle_object(obj: bpy.types.Object) -> None:
 
 
 def _never_the_viewport(tree: bpy.types.NodeTree) -> None:
-    """Answer every Is Viewport node with no."""
+    """Replace every Is Viewport node by false."""
     if tree.library:
         return
     for node in [node for node in tree.nodes if node.bl_idname == "GeometryNodeIsViewport"]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an object shows beside its mesh: hair, particles, instances, curves, points, volumes. It stays when its modifiers are applied."""
+"""What an object shows beside its mesh (hair, particles, instances, curves, points, volumes): kept when its modifiers are applied."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AUTHORED = "srbf name"  # property that holds the name that an object had in the
 
 
 def authored_name(obj: bpy.types.Object) -> str:
-    """The name of `obj` as its author knows it."""
+    """The name of `obj` in the file."""
     return str(obj.get(AUTHORED, obj.name))
 
 
@@ -50,9 +50,9 @@ def real_mesh(obj: bpy.types.Object) -> bpy.types.Mesh | None:
 
 
 def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instances_too: bool = True) -> bpy.types.Object:
-    """An object that has `mesh`, the place and the name of `obj`, which stays as "NAME instance" and shows all but its mesh.
+    """An object with `mesh` and the transform and name of `obj`, which is renamed "NAME instance" and shows all except its mesh.
 
-    So hair, particles and what other objects take from it come from the object that its author made. Without `instances_too` those that
+    Hair, particles and whatever other objects read thus come from the original object. Without `instances_too` the instances that
     geometry nodes scatter are left out: `mesh` holds them.
     """
     name, place = obj.name, obj.matrix_world.copy()
@@ -66,7 +66,7 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instanc
         collection.objects.link(receiver)
     obj.name, obj[AUTHORED] = f"{name[:SHORT]} instance", name  # another name than before, whatever Blender cuts off
     receiver.name = name
-    stand(receiver, place)
+    place_at(receiver, place)
     if more.nodes and (more.particles or not instances_too):
         # Where there are particles, what nodes make would be hidden along with the mesh.
         _append(obj, _keeping([*BESIDE_A_MESH, *([INSTANCES] if instances_too else [])]))
@@ -75,8 +75,8 @@ def set_apart(obj: bpy.types.Object, mesh: bpy.types.Mesh, more: Beside, instanc
     return receiver
 
 
-def stand(obj: bpy.types.Object, matrix: Matrix) -> None:
-    """Put `obj` where `matrix` says, shear included, which location, rotation and scale cannot hold: by the inverse of a parent."""
+def place_at(obj: bpy.types.Object, matrix: Matrix) -> None:
+    """Give `obj` the world transform `matrix`, shear included, through a parent's inverse: location, rotation and scale cannot hold it."""
     anchor = bpy.data.objects.new(f"{obj.name} place", None)
     bpy.context.scene.collection.objects.link(anchor)
     obj.parent, obj.parent_type = anchor, "OBJECT"

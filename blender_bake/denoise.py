@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""OpenImageDenoise on arrays, by the compositor's Denoise node: Blender has no other door to it in the background."""
+"""OpenImageDenoise on arrays, by the compositor's Denoise node, Blender's only access to it in the background."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
 FILE = "denoised.exr"
 
@@ -46,7 +46,7 @@ class Denoiser:
         tree.links.new(denoise.outputs["Image"], output)
 
     def denoise(self, noisy: np.ndarray) -> np.ndarray:
-        """(H, W, 3) float32, linear, of any range above 0, freed of its noise; WorkerError where Blender cannot."""
+        """(H, W, 3) float32, linear, of any range above 0, without its noise; WorkerError where Blender cannot."""
         self._fill(self._noisy, noisy)
         self._file.unlink(missing_ok=True)
         try:

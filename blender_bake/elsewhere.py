@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where else in the .blend a thing is that the scene at hand lacks."""
+"""Other scenes of the .blend that have what the current one lacks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import bpy
 
 
 def hint(scene: bpy.types.Scene, name: str) -> str:
-    """How to reach the object or collection `name` of another scene, as the end of an error; empty where no other scene has it."""
+    """The end of an error about the missing object or collection `name`: which other scene has it; empty where none does."""
     others = [other.name for other in bpy.data.scenes if other != scene and (name in other.objects or name in _collections(other))]
     if not others:
         return ""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Emissive materials, switched off while a sun shines: what they emit is ambient, and their noise need not be subtracted."""
+"""Emissive materials, switched off while a light of ours is on: their light is ambient, and its noise need not be subtracted."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ STRENGTHS = {
 }
 
 
-SHINING = {"ShaderNodeBackground", "ShaderNodeEeveeSpecular", "ShaderNodeScript"}  # emit, or may, by no strength of the above
+SHINING = {"ShaderNodeBackground", "ShaderNodeEeveeSpecular", "ShaderNodeScript"}  # emit, or may, without such a strength
 BLACKBODY = "Blackbody Intensity"
 
 
 def may_shine() -> bool:
-    """Whether any material holds a node that emits, at a strength that is not 0 or that something drives: else ambient is exactly 0."""
+    """Whether any material has a node that emits, with a strength that is not 0 or is driven; otherwise ambient is exactly 0."""
     for tree in _trees():
         for node in tree.nodes:
             sockets = [_strength(node), node.inputs.get(BLACKBODY)]
@@ -30,7 +30,7 @@ def may_shine() -> bool:
 def switch_off() -> None:
     """Set every emission strength of every material and node group to 0, drivers and animation included.
 
-    What emits by other means (a blackbody in a volume, say) is left, and the host subtracts its image.
+    What emits by other means, such as a blackbody in a volume, remains, and the host subtracts its image (the residual).
     """
     for tree in _trees():
         for node in tree.nodes:

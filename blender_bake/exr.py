@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 
 
 def read_passes(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     """The passes `names` as (H, W, 3 or 4) float32, row 0 at the top.
 
-    Blender 4 writes one part with channels `ViewLayer.DiffCol.R`, Blender 5 a part a pass; both read alike here.
+    Blender 4 writes one part with channels `ViewLayer.DiffCol.R`, Blender 5 one part per pass; both are read the same way.
     """
     try:
         import OpenImageIO as oiio  # comes with Blender

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The frame that a camera's picture has in the scene's own render settings, and what of them a view leaves out."""
+"""The frame of a camera's picture by the scene's render settings, and which of these a view does not follow."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Frame:
 
     @staticmethod
     def of(scene: bpy.types.Scene) -> Frame:
-        """To be read before `scene.configure`."""
+        """Of a scene before `scene.configure`."""
         render = scene.render
         bounds = (render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y)
         return Frame(
@@ -39,26 +39,26 @@ class Frame:
 
     @property
     def aspect(self) -> float:
-        """Width over height as the picture is looked at."""
+        """Width over height of the displayed picture."""
         return self.width * self.pixel_aspect[0] / (self.height * self.pixel_aspect[1])
 
     def record(self) -> dict[str, Any]:
-        """For a survey: `aspect`, and `text`, where it comes from."""
+        """For scene queries: `aspect`, and `text`, the settings that it comes from."""
         return {"aspect": self.aspect, "text": self._text()}
 
     def left_out(self, width: int, height: int) -> Iterator[str]:
-        """A line for each thing that a view of so many pixels has otherwise than a render of the scene."""
+        """A line for each setting in which a view of so many pixels differs from a render of the scene."""
         fitting = fitted(self.aspect, max(width, height))
         if max(abs(width - fitting[0]), abs(height - fitting[1])) > 1:
             yield (
                 f"the picture is {width / height:.3g} times as wide as high, the camera's frame {self.aspect:.3g} times ({self._text()}); "
-                f"--size {fitting[0]}x{fitting[1]} has its shape"
+                f"`size={fitting[0]}x{fitting[1]}` has its shape"
             )
         if self.border is not None:
             left, right, bottom, top = (round(100 * edge) for edge in self.border)
             yield f"the render region ({left}-{right} % across, {bottom}-{top} % up) is not followed: the camera's whole frame is baked"
         if self.motion_blur:
-            yield f"motion blur is left out: the scene stands as at frame {self.at}"
+            yield f"motion blur is left out: the scene is that of frame {self.at}"
         if self.stereoscopy:
             yield "stereoscopy is left out: the camera's own view is baked, once"
 

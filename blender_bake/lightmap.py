@@ -10,55 +10,62 @@ import bpy
 import numpy as np
 
 from blender_bake import materials, precision, sample_spread, soundness, unwrap, world_normals
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.channels import chosen
+from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
+from blender_bake.request import RenderRequest
 from blender_bake.seam_edges import seam_edges
-from blender_bake.translucency import Switch
+from blender_bake.translucency import Switch, switched
 
-NOT_DIFFUSE = 1e-3  # an albedo below this everywhere on a slot leaves Cycles nothing to divide irradiance by
+NOT_DIFFUSE = 1e-3  # albedo below which a slot is not diffuse: Cycles divides irradiance by it
 NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
 
 
 class LightmapReceiver:
-    """Mesh objects, their modifiers applied, whose texels in one atlas answer lights; arrays are (H, W, C) float32, row 0 at the top."""
+    """Mesh objects, their modifiers applied, whose texels share one atlas; arrays are (H, W, C) float32, row 0 at the top."""
 
-    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
+    kind = "lightmap"
+    renders = frozenset({"response", "direct"})
+
+    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
-        self._channel = channel
+        self._events = events
         self._irradiance = job["quantity"] == "irradiance"
         scene.render.bake.view_from = "ABOVE_SURFACE"
         self._height, self._width = job["height"], job["width"]
         wanted = job["receiver"]
         self._objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
         for obj in self._objects:
-            soundness.require_visible(obj, channel)
-        soundness.warn_of_occluders(scene, {obj.name for obj in self._objects}, channel)
+            soundness.require_visible(obj, events)
+        soundness.warn_of_occluders(scene, {obj.name for obj in self._objects}, events)
         self._image = bpy.data.images.new("srbf bake", self._width, self._height, alpha=True, float_buffer=True)
         self._material_names = [[s.material.name if s.material else "(none)" for s in obj.material_slots] for obj in self._objects]
         for obj in self._objects:
             materials.bakeable_slots(obj, self._image)
         texels, method = min(self._width, self._height), wanted.get("unwrap", "smart")
-        layers, self._made = unwrap.choose_layers(self._objects, wanted.get("uv_layer"), texels, method, channel)
+        layers, self._made = unwrap.choose_layers(self._objects, wanted.get("uv_layer"), texels, method, events)
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
-        self._owner = np.zeros((self._height, self._width), np.int32)  # which object a covered texel belongs to: the last to take it
+        self._owner = np.zeros(
+            (self._height, self._width), np.int32
+        )  # which object a covered texel belongs to: the last one that covers it
         self._albedo = np.zeros((self._height, self._width, 4), np.float32)
         for i, obj in enumerate(self._objects):
             self._take_texels(i, obj)
         self._coverage = self._albedo[:, :, 3:]
         self._check_overlap(self._made or wanted.get("uv_layer") is not None)
-        precision.warn_of_objects(self._objects, int((self._coverage > 0).sum()), "texel", channel)
-        self._readable, self._albedo_read = self._coverage, self._albedo
+        precision.warn_of_objects(self._objects, int((self._coverage > 0).sum()), "texel", events)
+        self._valid, self._albedo_read = self._coverage, self._albedo
         if self._irradiance:
             self._whiten_what_is_not_diffuse()
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of each object."""
+        """The manifest's entry of each object."""
         return [{"kind": "lightmap", "object": name, "uv_layer": layer} for name, layer in self._layers.items()]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log; where layers were made, their names and coordinates per loop, to carry into one's own scene."""
+        """For dry run and log; where layers were made, their names and coordinates per loop, so that users can copy them into the scene."""
         facts: dict[str, Any] = {
             "polygons": sum(len(obj.data.polygons) for obj in self._objects),
             "covered_texels": int((self._coverage > 0).sum()),
@@ -73,30 +80,48 @@ class LightmapReceiver:
         return facts
 
     def sampling(self) -> dict[str, Any]:
-        """The side of the square within a texel that its samples spread over."""
+        """`footprint`: side of the square within a texel that its samples are spread over, texels."""
         return {"footprint": 0.5 if bpy.app.version < (5, 0) else 1.0}
 
-    def geometry(self) -> dict[str, np.ndarray]:
-        """World position at texel centers, world normal, albedo and coverage; (1, E, 8) `seams` where the layers have any."""
-        position = self._bake("POSITION", self._objects, 1, 0)[:, :, :3].copy()  # one sample lies at the texel's center
+    def channels(self, names: list[str]) -> dict[str, np.ndarray]:
+        """Those named of `position` (at texel centers), `normal`, `albedo`, `coverage`, masks `hit` and `valid`, `seams` (1, E, 8)."""
+        makers = {
+            "position": self._position,
+            "normal": self._normal,
+            "albedo": lambda: self._albedo[:, :, :3],
+            "coverage": lambda: self._coverage,
+            "hit": lambda: self._coverage,
+            "valid": lambda: self._valid,
+            "seams": self._seams,
+        }
+        return chosen(names, makers, self.kind)
+
+    def _position(self) -> np.ndarray:
+        return self._bake("POSITION", self._objects, 1, 0)[:, :, :3] * self._coverage  # one sample lies at the texel's center
+
+    def _normal(self) -> np.ndarray:
         encoded = self._bake("NORMAL", self._objects, 1, 0, normal_space="OBJECT")[:, :, :3]
         of_object = 2 * (encoded - NORMAL_OFFSET) - 1
         normal = np.empty_like(of_object)
         for i, obj in enumerate(self._objects):
             mine = self._owner == i
             normal[mine] = world_normals.of_bake(of_object[mine], obj)
-        covered = self._coverage
-        of_each = [seam_edges(obj.data, self._layers[obj.name], within_material=not self._irradiance) for obj in self._objects]
-        seams = np.concatenate(of_each)
-        return {
-            "position": position * covered,
-            "normal": normal * covered,
-            "albedo": self._albedo[:, :, :3],
-            "coverage": covered,
-            "readable": self._readable,
-            "hit": covered,
-            **({"seams": seams[None]} if len(seams) else {}),
-        }
+        return normal * self._coverage
+
+    def _seams(self) -> np.ndarray | None:
+        edges = [seam_edges(obj.data, self._layers[obj.name], within_material=not self._irradiance) for obj in self._objects]
+        seams = np.concatenate(edges)
+        return seams[None] if len(seams) else None
+
+    def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
+        """`response` and `direct` of the same seed: one is exactly part of the other. See `RenderRequest`."""
+        images = {}
+        if "response" in request.channels:
+            images["response"] = self.response(request.samples, request.seed)
+        if "direct" in request.channels:
+            with switched(switch):
+                images["direct"] = self.direct(request.samples, request.seed)
+        return images
 
     def response(self, samples: int, seed: int) -> np.ndarray:
         """Irradiance E = pi x Cycles' DIFFUSE without color, or radiance seen from straight above each texel."""
@@ -105,16 +130,8 @@ class LightmapReceiver:
         every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
         return self._light("COMBINED", samples, seed, every)
 
-    def responses(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
-        """(`answer`, the direct diffuse light in it with `translucent` on): same seed, so that one is exactly part of the other."""
-        whole = self.response(samples, seed)
-        translucent.on()
-        part = self.direct(samples, seed)
-        translucent.off()
-        return whole, part
-
     def direct(self, samples: int, seed: int) -> np.ndarray:
-        """The direct diffuse light alone, in the units of `answer`."""
+        """The direct diffuse light alone, in the units of `response`."""
         parts = {"DIRECT"} if self._irradiance else {"DIRECT", "COLOR"}
         scale = math.pi if self._irradiance else 1.0
         return self._light("DIFFUSE", samples, seed, parts) * np.float32(scale)
@@ -132,7 +149,7 @@ class LightmapReceiver:
             result = bpy.ops.object.bake(
                 type=kind,
                 margin=0,
-                use_clear=True,  # of several objects Blender clears none: what no object covers stays as its last bake alone left it
+                use_clear=True,  # of several objects Blender clears none: uncovered texels keep the values of its last bake alone
                 target="IMAGE_TEXTURES",
                 save_mode="INTERNAL",
                 use_selected_to_active=False,
@@ -169,7 +186,7 @@ class LightmapReceiver:
         overlap = unwrap.overlap([(obj.data, self._layers[obj.name]) for obj in self._objects], self._coverage[:, :, 0])
         if overlap > unwrap.OVERLAP_LIMIT and made_or_named:
             layers = ", ".join(repr(layer) for layer in sorted(set(self._layers.values())))
-            self._channel.warn(f"UV layer {layers}: about {overlap:.0%} of its area overlaps, and overlapping faces share light")
+            self._events.warn(f"UV layer {layers}: about {overlap:.0%} of its area overlaps, and overlapping faces share light")
 
     def _whiten_what_is_not_diffuse(self) -> None:
         """Replace each slot with no diffuse reflection (metal, glass, black) by white Lambert, so that its irradiance can be read."""
@@ -181,13 +198,13 @@ class LightmapReceiver:
                     obj.material_slots[i].material = materials.lambert((1, 1, 1))
                     materials.add_target(obj.material_slots[i].material, self._image)
         if names:
-            self._channel.warn(
+            self._events.warn(
                 f"nothing is diffuse in {', '.join(dict.fromkeys(names))}: its irradiance is taken on a white Lambert surface instead"
             )
             self._albedo_read = self._bake("DIFFUSE", self._objects, 1, 0, pass_filter={"COLOR"})
         black = (self._albedo_read[:, :, :3].max(axis=2) < NOT_DIFFUSE) & (self._coverage[:, :, 0] > 0)
         if black.any():
-            self._readable = self._coverage * ~black[:, :, None]
-            self._channel.warn(
+            self._valid = self._coverage * ~black[:, :, None]
+            self._events.warn(
                 f"{int(black.sum())} texels are black between diffuse ones: they take the irradiance of the nearest that is not"
             )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials of a baked receiver: copies that hold the bake's image node, and the white Lambert that stands in where nothing is diffuse."""
+"""Materials of a baked receiver: copies with the bake's image node, and the white Lambert that replaces what is not diffuse."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import bpy
 
 
 def bakeable_slots(obj: bpy.types.Object, image: bpy.types.Image) -> None:
-    """Give every slot of `obj` a material of its own with `image` as the active node, which is where a bake goes.
+    """Give every slot of `obj` a material of its own with `image` as the active node, which a bake writes to.
 
-    Copies leave other objects that share a material alone. An empty slot becomes what Cycles shows for it: 80 % gray.
+    Being copies, they leave other objects that share a material unchanged. An empty slot becomes what Cycles shows for it: 80 % gray.
     """
     if not obj.material_slots:
         obj.data.materials.append(None)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the sockets of a material's nodes hold for a camera's ray that meets the surface straight on, where that is one value."""
+"""Values of the sockets of a material's nodes, for a camera ray along the normal, where they are constant over the surface."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OPERATIONS: dict[str, Callable[..., float]] = {
 
 @dataclass(frozen=True)
 class Place:
-    """A socket, and the nodes of the groups that it lies in, from the outside inwards."""
+    """A socket, and the nodes of the groups that it lies in, the outermost first."""
 
     socket: bpy.types.NodeSocket
     groups: tuple[bpy.types.Node, ...] = ()
@@ -67,7 +67,7 @@ def source(place: Place) -> tuple[Place, Place | None]:
 
 
 def value(place: Place | None) -> np.ndarray | None:
-    """(1,) or (3,) where a socket holds one value all over the surface; None where there is no such socket, or it varies."""
+    """(1,) or (3,) value of a socket that is constant over the surface; None where there is no such socket, or it varies."""
     if place is None:
         return None
     deciding, output = source(place)
@@ -75,7 +75,7 @@ def value(place: Place | None) -> np.ndarray | None:
 
 
 def number(place: Place | None, otherwise: float) -> float:
-    """The value as a number; of what varies the mean of its color ramp, else what the socket holds itself, else `otherwise`."""
+    """The value as a number; where it varies the mean of its color ramp, else the unlinked value, else `otherwise`."""
     found = guess(place)
     return otherwise if found is None else float(found.mean())
 
@@ -87,7 +87,7 @@ def color(place: Place | None, otherwise: tuple[float, float, float]) -> np.ndar
 
 
 def guess(place: Place | None) -> np.ndarray | None:
-    """`value`, or for what varies the mean of the color ramp behind it, or what the socket would hold unlinked."""
+    """`value`; where it varies the mean of the color ramp that feeds it, else the unlinked value."""
     found = value(place)
     if found is not None or place is None:
         return found

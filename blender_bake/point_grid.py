@@ -12,13 +12,13 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 from blender_bake.scene_file import SOLID, show_as_rendered
 from blender_bake.seam_edges import mesh_corners, paired
 
-CLEARANCE = 0.1  # of the spacing: a lamp nearer to a surface lights little else
+CLEARANCE = 0.1  # of the spacing: a light nearer to a surface lights little else
 MOST_LIGHTS = 20000
-TRIES = 200  # random points for each one wanted, before there is said to be no room
+TRIES = 200  # random points per one wanted, before giving up
 STEP = 1e-5  # of a solid's size: how far behind a hit the next ray begins
 MOST_HITS = 200
 DIRECTIONS = [  # unlike any axis or diagonal, since meshes like those: an edge hit along one is not hit along the others
@@ -40,11 +40,11 @@ class Solid:
     closed: bool
 
 
-def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
+def free_points(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     """{box, grid, random, skipped}: free points `asked["spacing"]` meters apart in `asked["box"]`, and `asked["random"]` free random ones.
 
-    The box is by default that of all that is rendered. The grid stands in its middle, half a spacing or more from its sides. WorkerError
-    where no point is free.
+    The box is by default that of all that renders. The grid is centered in it, half a spacing or more from its sides. WorkerError where
+    no point is free.
     """
     show_as_rendered(scene)
     solids = list(_solids())
@@ -59,8 +59,8 @@ def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     free = [point for point in points if is_free(point, solids, clearance)]
     if not free:
         raise WorkerError(
-            f"expected room for point lights in the box {_shown(low)} to {_shown(high)} m, found all {len(points)} in or at geometry; "
-            "choose another --light-box or a smaller spacing, or turn the normals of a closed room inwards"
+            f"expected room for point lights in the box {_shown(low)} to {_shown(high)} m, found all {len(points)} in or near geometry; "
+            "choose another `light_bounds` or a smaller spacing, or turn the normals of a closed room inwards"
         )
     rng = np.random.default_rng(asked["seed"])
     random: list[np.ndarray] = []
@@ -71,7 +71,7 @@ def survey(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
         if is_free(point, solids, clearance):
             random.append(point)
     if len(random) < asked["random"]:
-        raise WorkerError(f"expected {asked['random']} random free places in the box, found {len(random)}; choose another --light-box")
+        raise WorkerError(f"expected {asked['random']} random free places in the box, found {len(random)}; choose another `light_bounds`")
     return {
         "box": [*low.tolist(), *high.tolist()],
         "grid": [point.tolist() for point in free],
@@ -104,10 +104,10 @@ def is_free(point: np.ndarray, solids: list[Solid], clearance: float) -> bool:
 
 
 def is_inside(place: Vector, solid: Solid) -> bool:
-    """Most of several rays leave the solid more often than they enter it.
+    """Whether most of several rays leave the solid more often than they enter it.
 
-    Parity would do for one simple shell. Counting the sign tells overlapping shells of one mesh, and a room, whose faces look inwards
-    and whose air is free, from a block.
+    Parity would do for one simple shell. Signed counts also handle overlapping shells of one mesh, and rooms, whose faces point inwards
+    and whose air is free.
     """
     size = float((solid.high - solid.low).max())
     votes = 0
@@ -146,7 +146,7 @@ def _solid(mesh: bpy.types.Mesh, matrix: np.ndarray) -> Solid:
     triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles)
     triangles = triangles.reshape(-1, 3)
-    if np.linalg.det(matrix[:3, :3]) < 0:  # mirrored: what looked out looks in
+    if np.linalg.det(matrix[:3, :3]) < 0:  # mirrored: outward normals point inward
         triangles = triangles[:, ::-1]
     used = points[np.unique(triangles)]
     vertices, following, _ = mesh_corners(mesh)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The mesh objects that a receiver names: found, made local and real, their modifiers applied."""
+"""The mesh objects of a receiver: found by name, made local and real, their modifiers applied."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ import numpy as np
 from mathutils import Matrix
 
 from blender_bake import as_rendered, beside, elsewhere, soundness
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 
 NO_MESHES = {"CURVE", "SURFACE", "FONT", "META"}
-SHEARED = 1e-5  # of an object's scale, that its matrix is off by where location, rotation and scale cannot hold it
+SHEARED = 1e-5  # relative error of an object's matrix above which it has shear
 
 
 def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
-    """The meshes that `names` stand for, in order, each with data of its own: modifiers applied, instances made real, once.
+    """The mesh objects of `names`, in order, each with its own data: modifiers applied, instances made real, once.
 
-    A name is a mesh object's, or that of an empty that shows a collection, which stands for its renderable meshes.
+    A name is a mesh object's, or that of an empty that shows a collection, which means its renderable meshes.
     """
     objects: list[bpy.types.Object] = []
     for name in names:
@@ -34,10 +34,10 @@ def prepare(scene: bpy.types.Scene, names: list[str]) -> list[bpy.types.Object]:
     return ready
 
 
-def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list[str]:
+def meshes_of(scene: bpy.types.Scene, collection: str, events: Events) -> list[str]:
     """Names of a collection's receivers, children included: renderable meshes, and empties that show a collection; WorkerError if none.
 
-    What has faces and is no mesh is named: it casts shadows alone.
+    A warning names objects with faces that are no meshes: they only cast shadows.
     """
     found = {c.name: c for c in [scene.collection, *scene.collection.children_recursive]}
     if collection not in found:
@@ -52,7 +52,7 @@ def meshes_of(scene: bpy.types.Scene, collection: str, channel: Channel) -> list
     names = [o.name for o in shown if o.type == "MESH" or _shows_collection(o)]
     if others := sorted(repr(o.name) for o in shown if o.type in NO_MESHES):
         listed = ", ".join(others[:12]) + (", …" if len(others) > 12 else "")
-        channel.warn(f"no receivers, since they are no meshes (Object > Convert > Mesh makes them some): {listed}")
+        events.warn(f"not receivers, because they are not meshes (use Object > Convert > Mesh): {listed}")
     if not names:
         raise WorkerError(f"expected renderable meshes in collection {collection!r}, found none")
     return sorted(set(names))
@@ -84,7 +84,7 @@ def _made_real(scene: bpy.types.Scene, empty: bpy.types.Object) -> list[bpy.type
         raise WorkerError(f"Blender could not make the instances of {empty.name!r} real")
     made = sorted((obj for obj in scene.objects if obj not in before), key=lambda obj: obj.name)
     for obj in made:
-        _stand_exactly(obj, places)
+        _place_exactly(obj, places)
         stem, _, number = obj.name.rpartition(".")
         obj.name = f"{empty.name}/{stem if number.isdecimal() and stem else obj.name}"
     meshes = [find_mesh_object(scene, obj.name) for obj in made if obj.type == "MESH" and not obj.hide_render]
@@ -102,15 +102,15 @@ def _places_of_instances(empty: bpy.types.Object) -> list[tuple[bpy.types.ID | N
     ]
 
 
-def _stand_exactly(obj: bpy.types.Object, places: list[tuple[bpy.types.ID | None, Matrix]]) -> None:
-    """Put an object made real where its instance stood: Blender gives it a location, a rotation and a scale, which hold no shear."""
+def _place_exactly(obj: bpy.types.Object, places: list[tuple[bpy.types.ID | None, Matrix]]) -> None:
+    """Give an object made real its instance's transform, shear included: Blender gives it only a location, a rotation and a scale."""
     bpy.context.view_layer.update()
     own = np.array(obj.matrix_world)
     errors = [(float(np.abs(np.array(place) - own).max()), place) for data, place in places if data == obj.data]
     if errors:
         error, place = min(errors, key=lambda pair: pair[0])
         if error > SHEARED * float(np.abs(own[:3, :3]).max()):
-            beside.stand(obj, place)
+            beside.place_at(obj, place)
 
 
 def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
@@ -137,7 +137,7 @@ def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
 
 
 def _local(scene: bpy.types.Scene, obj: bpy.types.Object) -> bpy.types.Object:
-    """The object, out of its library: its linked collections first, or it would stay there beside its copy."""
+    """The object made local: its linked collections first, or the original would remain beside its copy."""
     if not (obj.library or obj.override_library):
         return obj
     for collection in scene.collection.children_recursive:
@@ -153,10 +153,10 @@ def _show(obj: bpy.types.Object) -> None:
 
 
 def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
-    """The object with its evaluated mesh, at render settings, for its data: every bake would evaluate it again.
+    """The object with its evaluated mesh, at render settings, as data: otherwise every bake would evaluate it again.
 
-    That mesh is the object's own, so objects that shared one each get their own texels. What it shows beside its mesh stays on another
-    object, see `beside`. One that is nothing but instances of geometry nodes becomes their mesh.
+    Objects that shared a mesh each get their own texels. What an object shows beside its mesh is kept on another object, see `beside`.
+    An object that consists of instances of geometry nodes alone becomes their mesh.
     """
     scene = bpy.context.scene
     soundness.require_finite(obj, obj.data)
@@ -177,7 +177,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
 
 
 def select(objects: list[bpy.types.Object]) -> None:
-    """These and no others, the first of them active: what Blender's operators work on."""
+    """Select these objects alone, for Blender's operators; the first is the active one."""
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
     for obj in objects:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which samples of Cycles' sequence a render takes: the first lies at the center of its texel or pixel, whatever the seed."""
+"""Which samples of Cycles' sequence a render takes: the first is at the center of its texel or pixel, for any seed."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import bpy
 
 
 def take(scene: bpy.types.Scene, samples: int, seed: int, *, spread: bool) -> None:
-    """Let the next render take `samples`: the first ones of the sequence, or, `spread`, as many after a power of two that holds them.
+    """Let the next render use `samples` samples: the first of the sequence, or with `spread` those from the next power of two on.
 
-    Sample 0 lies at the center, every other one is jittered within the footprint (`integrator_init_from_bake`, `integrate_camera_sample`
-    in Cycles), so without it passes of any size have one distribution and their mean is that of one long render. From a power of two on,
-    so many samples are as well stratified as the first ones are.
+    Sample 0 is at the center, every other one is jittered within the footprint (`integrator_init_from_bake`, `integrate_camera_sample`
+    in Cycles). Without sample 0, passes of any size have the same distribution, and their mean is that of one long render. From a power
+    of two on, that many samples are as well stratified as the first ones.
     """
     cycles = scene.cycles
     offset = 1 << (samples - 1).bit_length() if spread else 0
@@ -20,5 +20,5 @@ def take(scene: bpy.types.Scene, samples: int, seed: int, *, spread: bool) -> No
     if hasattr(cycles, "use_sample_subset"):
         cycles.use_sample_subset, cycles.sample_subset_length = spread, samples
         cycles.samples = offset + samples
-    else:  # before 4.5 the offset alone
+    else:  # before 4.5 there is only the offset
         cycles.samples = samples

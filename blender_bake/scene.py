@@ -7,8 +7,9 @@ from pathlib import Path
 
 import bpy
 
-from blender_bake import as_rendered, hardening
-from blender_bake.channel import Channel, WorkerError, leave
+from blender_bake import as_rendered
+from blender_bake.ipc import Events, WorkerError, leave
+from blender_bake.sanitize import sanitize
 
 WORKING_SPACE = "Linear Rec.709"
 
@@ -18,38 +19,40 @@ def version() -> str:
     return ".".join(str(n) for n in bpy.app.version)
 
 
-def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.types.Scene:
-    """The .blend's scene `name`, else its active one, disarmed (see `hardening`): nothing in it runs or writes; what is left out or
-    missing is named, and no object is in another mode than Object Mode."""
+def open_scene(path: str, events: Events, name: str | None = None) -> bpy.types.Scene:
+    """The .blend's scene `name`, else its active one, sanitized (see `sanitize`), all objects in Object Mode.
+
+    Warnings name what is left out or missing. WorkerError where it cannot be opened.
+    """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.preferences.filepaths.use_scripts_auto_execute = False
     said: list[str] = []
     read = False
 
     @bpy.app.handlers.persistent
-    def disarm(*_: object) -> None:
+    def clean(*_: object) -> None:
         nonlocal read
         read = True
         try:
-            said.extend(hardening.disarm())
-        except Exception as error:  # noqa: BLE001 - Blender would print it and go on to evaluate what is still armed
-            channel.emit("error", message=str(error) if isinstance(error, WorkerError) else f"Blender's worker failed: {error!r}")
+            said.extend(sanitize())
+        except Exception as error:  # noqa: BLE001 - Blender would print it and evaluate the rest
+            events.emit("error", message=str(error) if isinstance(error, WorkerError) else f"Blender's worker failed: {error!r}")
             leave(1)
 
-    bpy.app.handlers.load_post.insert(0, disarm)
+    bpy.app.handlers.load_post.insert(0, clean)
     try:
         bpy.ops.wm.open_mainfile(filepath=path, load_ui=False, use_scripts=False)
     except RuntimeError as error:
         reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
         raise WorkerError(f"expected a .blend that Blender {version()} can open, found {path}: {reason}") from error
     finally:
-        bpy.app.handlers.load_post.remove(disarm)
+        bpy.app.handlers.load_post.remove(clean)
     if not read:
         raise WorkerError(f"expected Blender {version()} to say that it has read {path}, found it silent; use another Blender")
     for line in said:
-        channel.warn(line)
+        events.warn(line)
     for missing in missing_files():
-        channel.warn(missing)
+        events.warn(missing)
     space = getattr(getattr(bpy.data, "colorspace", None), "working_space", WORKING_SPACE)
     if space != WORKING_SPACE:
         raise WorkerError(f"expected the working color space {WORKING_SPACE}, found {space}; set it in the .blend's render properties")
@@ -58,9 +61,9 @@ def open_scene(path: str, channel: Channel, name: str | None = None) -> bpy.type
 
 
 def leave_modes() -> None:
-    """Object Mode for every object that was saved in another: in Edit Mode its data is the editor's, and operators refuse."""
+    """Set Object Mode for every object saved in another: in Edit Mode its data is the editor's, and operators refuse."""
     for obj in [obj for obj in bpy.context.view_layer.objects if obj.mode != "OBJECT"]:
-        if obj.mode != "OBJECT":  # another's leaving may have taken it along
+        if obj.mode != "OBJECT":  # it may have left together with another
             bpy.context.view_layer.objects.active = obj
             try:
                 bpy.ops.object.mode_set(mode="OBJECT")
@@ -82,11 +85,11 @@ def _chosen(name: str | None) -> bpy.types.Scene:
 
 
 def left_out(scene: bpy.types.Scene) -> list[str]:
-    """A line where the world holds a volume: it is black and empty while our light shines."""
+    """A line where the world has a volume, which is left out while a light of ours is on."""
     world = scene.world
     output = world.node_tree.get_output_node("CYCLES") if world is not None and world.use_nodes and world.node_tree else None
     if output is not None and output.inputs["Volume"].links:
-        return [f"the volume of world {world.name!r} is left out of every light; fog in a box that is a mesh is followed"]
+        return [f"the volume of world {world.name!r} is left out of every image; fog in a mesh is rendered"]
     return []
 
 
@@ -96,7 +99,7 @@ def missing_files() -> list[str]:
     for library in bpy.data.libraries:
         path = bpy.path.abspath(library.filepath)
         if not Path(path).is_file():
-            lines.append(f"missing library {path}: what it holds is not in the picture")
+            lines.append(f"missing library {path}: its content is not rendered")
     for image in bpy.data.images:
         if image.source not in {"FILE", "SEQUENCE", "MOVIE", "TILED"} or image.packed_file or image.users == 0:
             continue
@@ -140,7 +143,7 @@ def configure(scene: bpy.types.Scene) -> None:
             setattr(cycles, name, value)
     render = scene.render
     bake = render.bake
-    bake.normal_r, bake.normal_g, bake.normal_b = "POS_X", "POS_Y", "POS_Z"  # what the operator takes from here, told or not
+    bake.normal_r, bake.normal_g, bake.normal_b = "POS_X", "POS_Y", "POS_Z"  # the operator reads these in any case
     bake.use_cage, bake.cage_object, bake.cage_extrusion, bake.max_ray_distance = False, None, 0.0, 0.0
     render.use_compositing = False
     render.use_sequencer = False
@@ -160,11 +163,11 @@ def configure(scene: bpy.types.Scene) -> None:
     render.threads_mode = "AUTO"
     as_rendered.settle(scene)
     for layer in scene.view_layers:
-        layer.samples = 0  # a layer's own count would win over ours
+        layer.samples = 0  # a layer's own count would override ours
 
 
 class OwnLight:
-    """The scene's own lamps and world, switched off when this is made, and on again for `--keep-scene-lights`."""
+    """The scene's own lights and world: switched off when this is made, and on again for `keep_scene_lights`."""
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene
@@ -177,7 +180,7 @@ class OwnLight:
         self.off()
 
     def off(self) -> None:
-        """No lamp, a black world."""
+        """No light, a black world."""
         self._scene.world = self._black
         for layer, _ in self._overrides:
             layer.world_override = None
@@ -185,7 +188,7 @@ class OwnLight:
             data.energy = 0.0
 
     def restore(self) -> None:
-        """The scene as its author lit it."""
+        """The scene's own lighting."""
         self._scene.world = self._world
         for layer, world in self._overrides:
             layer.world_override = world

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Receivers and occluders as a binary glTF: triangles in the world's frame, instances and modifiers applied, no lamps, no cameras.
+"""Receivers and occluders as a binary glTF: triangles in the world's frame, instances and modifiers applied, no lights, no cameras.
 
 glTF is y-up: the one root node turns Blender's z-up frame into it, and its meshes hold Blender's world coordinates as they are.
 """
@@ -30,7 +30,7 @@ TRIANGLES = 4
 class Part:
     """Triangles of one object and material: corners (V, 3), their normals (V, 3), and V / 3 triangles in order.
 
-    `lightmap` (V, 2): where a receiver's corners lie in the lightmap, (0, 0) at the top left of its image; None of anything else.
+    `lightmap` (V, 2): lightmap coordinates of a receiver's corners, (0, 0) at the top left of the image; None for other objects.
     """
 
     object: str
@@ -42,7 +42,7 @@ class Part:
 
 
 def show_as_rendered(scene: bpy.types.Scene) -> None:
-    """Make the viewport's scene that of a render: what is shown, and how finely it is divided, so that it can be read from Python."""
+    """Make the viewport's scene that of a render, visibility and subdivision, so that it can be read from Python."""
     for collection in bpy.data.collections:
         collection.hide_viewport = collection.hide_render
     layers = [bpy.context.view_layer.layer_collection]
@@ -78,7 +78,7 @@ def parts(receivers: Mapping[str, str] | None) -> Iterator[Part]:
 
 @dataclass(frozen=True)
 class Shown:
-    """An evaluated object with faces, or an instance of one, where it stands: named for the object that shows it."""
+    """An evaluated object with faces, or an instance of one: name of the object that shows it, world matrix (4, 4)."""
 
     object: bpy.types.Object
     name: str
@@ -87,7 +87,7 @@ class Shown:
 
 
 def rendered() -> Iterator[Shown]:
-    """All that renders of the scene, see `show_as_rendered`; each is good until the next is asked for."""
+    """All that renders of the scene, see `show_as_rendered`; each is valid until the next iteration."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for instance in depsgraph.object_instances:
         obj = instance.object
@@ -142,12 +142,12 @@ def _by_material(shown: Shown, casts: bool, mesh: bpy.types.Mesh, layer: bpy.typ
         yield Part(shown.name, slot.name if slot else None, casts, places, normals, None if lightmap is None else lightmap[chosen])
 
 
-def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
-    """The parts as one .glb; `tints` names the materials that light passes straight, and what one wall of them lets through.
+def write_glb(parts: list[Part], transmittances: Mapping[str, Curve]) -> bytes:
+    """The parts as one .glb. transmittances: of one wall of the materials that light passes without scattering, by name.
 
-    That is told twice: to any reader as a transmission of the mean tint, to ours by the extras `tint_by_cosine`.
-    An object that does not cast shadows at all is told by its node's extras, `casts_shadow: false`. A receiver's lightmap coordinates
-    are the attribute `_LIGHTMAP`.
+    They are written twice: the mean, as a transmission that any reader understands, and by cosine in the extras `tint_by_cosine`.
+    An object that casts no shadow has `casts_shadow: false` in its node's extras. A receiver's lightmap coordinates are the attribute
+    `_LIGHTMAP`.
     """
     names = sorted({part.material for part in parts if part.material is not None})
     meshes: list[dict[str, Any]] = []
@@ -182,7 +182,7 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         meshes.append({"name": part.object, "primitives": [primitive]})
         nodes.append({"name": part.object, "mesh": len(meshes) - 1, **({} if part.casts else {"extras": {"casts_shadow": False}})})
     root = {"name": "z-up to y-up", "rotation": Z_UP_TO_Y_UP, "children": list(range(len(nodes)))}
-    passing = any(name in tints for name in names)
+    passing = any(name in transmittances for name in names)
     document = {
         "asset": {"version": "2.0", "generator": "srbf"},
         **({"extensionsUsed": ["KHR_materials_transmission"]} if passing else {}),
@@ -190,7 +190,7 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
         "scenes": [{"nodes": [len(nodes)]}],
         "nodes": [*nodes, root],
         "meshes": meshes,
-        **({"materials": [_material(name, tints.get(name)) for name in names]} if names else {}),
+        **({"materials": [_material(name, transmittances.get(name)) for name in names]} if names else {}),
         "accessors": accessors,
         "bufferViews": views,
         "buffers": [{"byteLength": len(body)}],
@@ -202,14 +202,14 @@ def write_glb(parts: list[Part], tints: Mapping[str, Curve]) -> bytes:
     return head + text + struct.pack("<II", len(body), 0x004E4942) + bytes(body)
 
 
-def _material(name: str, tint: Curve | None) -> dict[str, Any]:
-    if tint is None:
+def _material(name: str, transmittance: Curve | None) -> dict[str, Any]:
+    if transmittance is None:
         return {"name": name, "doubleSided": True}
-    mean = np.clip(np.mean(tint, axis=0), 0, 1)
+    mean = np.clip(np.mean(transmittance, axis=0), 0, 1)
     return {
         "name": name,
         "doubleSided": True,
         "pbrMetallicRoughness": {"baseColorFactor": [*(round(float(m), 5) for m in mean), 1.0], "metallicFactor": 0.0},
         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0}},
-        "extras": {"tint_by_cosine": tint},
+        "extras": {"tint_by_cosine": transmittance},
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The scene as it is rendered, for a glTF of it: triangles with their UVs and colors by object and material, looks, the camera."""
+"""The scene as it is rendered, for a glTF of it: triangles with their UVs and colors by object and material, materials, the camera."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import bpy
 import numpy as np
 
 from blender_bake import scene_file
-from blender_bake.channel import WorkerError, hand_over
-from blender_bake.looks import Look, look_of
+from blender_bake.ipc import WorkerError, hand_over
+from blender_bake.pbr_material import PbrMaterial, pbr_material_of
 from blender_bake.receiver_objects import prepare
 from blender_bake.unwrap import layer_coordinates
 from blender_bake.vertex_albedo import AlbedoBakes
@@ -23,12 +23,12 @@ SHORTEST = 1e-12
 
 
 def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
-    """What `job["mesh"]` asks for: `parts`, `looks` and `camera`.
+    """What `job["mesh"]` asks for: `parts`, `materials` and `camera`.
 
     mesh.receivers: those of a capture, {object, uv_layer, per_loop: a file of (loops, 2) coordinates where the bake made the layer}
-    parts: {object, look (index), file, columns: [[name, width], ...]}: float32 rows for every corner, three to a triangle; the columns are
-        position, normal, uv (of the layer that renders), lightmap (a receiver's), color (baked albedo), of which the last three may lack
-    looks: see `Look.record`
+    parts: {object, material (index), file, columns: [[name, width], ...]}: float32 rows of every corner, three per triangle; columns are
+        position, normal, uv (of the layer that renders), lightmap (a receiver's), color (baked albedo), the last three optional
+    materials: see `PbrMaterial.record`
     camera: {name, pose (4 x 4, rows), ...} or null, see `_camera`
     Objects that the camera cannot see are left out, unless they are receivers.
     """
@@ -40,7 +40,7 @@ def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
     if not pieces:
         raise WorkerError(f"expected objects that render in scene {scene.name!r}, found none; enable them in renders and save the .blend")
     albedo = bakes.bake(scene)
-    looks = list(dict.fromkeys(piece.look for piece in pieces))
+    surfaces = list(dict.fromkeys(piece.surface for piece in pieces))
     parts = []
     for i, piece in enumerate(pieces):
         columns = dict(piece.columns)
@@ -50,20 +50,20 @@ def response(scene: bpy.types.Scene, job: dict[str, Any]) -> dict[str, Any]:
         parts.append(
             {
                 "object": piece.object,
-                "look": looks.index(piece.look),
+                "material": surfaces.index(piece.surface),
                 "file": file,
                 "columns": [[name, values.shape[1]] for name, values in columns.items()],
             }
         )
-    return {"parts": parts, "looks": [look.record() for look in looks], "camera": _camera(scene)}
+    return {"parts": parts, "materials": [surface.record() for surface in surfaces], "camera": _camera(scene)}
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """An object's triangles of one look: values at the corners by column, the loops of these, and which bake has their colors."""
+    """An object's triangles of one surface: values at the corners by column, the loops of these, and which bake has their colors."""
 
     object: str
-    look: Look
+    surface: PbrMaterial
     loops: np.ndarray
     columns: dict[str, np.ndarray]
     bake: str | None
@@ -115,20 +115,20 @@ def _of_mesh(shown: scene_file.Shown, mesh: bpy.types.Mesh, lightmap: np.ndarray
     if lightmap is not None:
         columns["lightmap"] = lightmap[corners.loops]
     order = np.arange(len(corners.loops)).reshape(-1, 3)
-    if np.linalg.det(shown.matrix[:3, :3]) < 0:  # a mirror turns the triangles over
+    if np.linalg.det(shown.matrix[:3, :3]) < 0:  # a mirror flips the triangles
         order = order[:, ::-1]
     sound = np.isfinite(corners.places).all(axis=1).reshape(-1, 3).all(axis=1)
     materials = _materials(shown.object, mesh)
     slots = np.minimum(corners.materials, len(materials) - 1)
-    looks = [look_of(material) for material in materials]
+    surfaces = [pbr_material_of(material) for material in materials]
     key = f"{shown.object.name_full}\n{mesh.name}\n{len(mesh.loops)}"
     for slot in np.unique(slots[sound]):
-        look = looks[slot]
+        surface = surfaces[slot]
         chosen = order[sound & (slots == slot)].ravel()
-        baked = key if look.varies and look.is_diffuse else None
+        baked = key if surface.varies and surface.is_diffuse else None
         if baked is not None:
             bakes.add(key, shown.object, shown.matrix, materials)
-        yield _Piece(shown.name, look, corners.loops[chosen], {name: values[chosen] for name, values in columns.items()}, baked)
+        yield _Piece(shown.name, surface, corners.loops[chosen], {name: values[chosen] for name, values in columns.items()}, baked)
 
 
 def _unit_normals(corners: scene_file.Corners) -> np.ndarray:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edges where a UV layer is cut but the surface is not: what lies on either side of one ought to look alike."""
+"""Edges where a UV layer is cut but the surface is not: both sides should look the same."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 SAME_UV = 1e-6  # of the unit square: closer corners are one
-SMOOTH = math.cos(math.radians(2))  # of the angle between corner normals: past it light really jumps, by its sine at most
+SMOOTH = math.cos(math.radians(2))  # of the angle between corner normals, above which the shading is discontinuous
 
 
 def seam_edges(mesh: bpy.types.Mesh, layer: str, within_material: bool) -> np.ndarray:
@@ -17,7 +17,7 @@ def seam_edges(mesh: bpy.types.Mesh, layer: str, within_material: bool) -> np.nd
 
     Edges of two faces whose coordinates differ there, whose corner normals do not, and, if `within_material`, of one material. Vertices at
     one place are one vertex, as meshes from files that split them at seams need. Edges of more than two faces, or outside [0, 1],
-    are left out. One sort of the corners: a million take half a second.
+    are left out.
     """
     corners = len(mesh.loops)
     uv = np.empty(corners * 2, np.float32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Objects that would spoil a bake without a word: vertices or places that are no numbers, settings that hide a receiver."""
+"""Objects that would silently corrupt a bake: vertices or transforms with NaN, settings that hide a receiver."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 
 SHOWN = 6  # names in a warning
 LARGEST = 1e18  # of a coordinate, m
@@ -16,7 +16,7 @@ RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow
 
 
 def require_finite(obj: bpy.types.Object, mesh: bpy.types.Mesh, after: str = "") -> None:
-    """WorkerError where a receiver's vertex, or the object's place, is NaN or infinite; `after` says of what step the mesh is."""
+    """WorkerError where a receiver's vertex or transform has NaN or infinity; `after` names the step that made the mesh."""
     if not np.isfinite(np.array(obj.matrix_world)).all():
         raise WorkerError(f"expected a place in the world for {obj.name!r}, found NaN or infinity in its transform; clear it (Alt+G, R, S)")
     bad = spoiled_vertices(mesh)
@@ -29,17 +29,17 @@ def require_finite(obj: bpy.types.Object, mesh: bpy.types.Mesh, after: str = "")
         )
 
 
-def require_visible(obj: bpy.types.Object, channel: Channel) -> None:
-    """WorkerError that names the setting by which Cycles leaves a receiver black or empty; a line for parts of it that stay empty."""
+def require_visible(obj: bpy.types.Object, events: Events) -> None:
+    """WorkerError, naming the setting, where Cycles leaves a receiver black or empty; a warning for parts of it that stay empty."""
     setting = hidden_by(obj)
     if setting is not None:
         raise WorkerError(f"expected a receiver that light can be read from, found that {obj.name!r} {setting}, and save the .blend")
     if held := _held_out(obj):
-        channel.warn(f"what has material {held[0]!r} of {obj.name!r}, a Holdout, stays empty")
+        events.warn(f"faces of {obj.name!r} with material {held[0]!r}, a Holdout, stay empty")
 
 
 def hidden_by(obj: bpy.types.Object) -> str | None:
-    """What hides `obj` from a bake, and where it is switched off; None where nothing does."""
+    """What hides `obj` from a bake, and how to switch it off; None where nothing does."""
     if obj.is_shadow_catcher:
         return "is a shadow catcher, which shows no light of its own; switch Object > Visibility > Shadow Catcher off"
     if obj.is_holdout:
@@ -65,8 +65,8 @@ def _is_holdout(material: bpy.types.Material) -> bool:
     return bool(links) and links[0].from_node.bl_idname == "ShaderNodeHoldout"
 
 
-def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], channel: Channel) -> None:
-    """Name the meshes other than `receivers` whose vertices or places are no numbers: Cycles makes of them what it can."""
+def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], events: Events) -> None:
+    """Warn of meshes other than `receivers` with NaN or infinity in vertices or transform."""
     found = []
     for obj in scene.objects:
         if obj.type != "MESH" or obj.hide_render or obj.name in receivers:
@@ -78,19 +78,17 @@ def warn_of_occluders(scene: bpy.types.Scene, receivers: set[str], channel: Chan
             found.append(f"{obj.name!r} in its transform")
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        channel.warn(
-            f"NaN, infinite or immense coordinates, whose shadows and bounces are left to chance: {', '.join(found[:SHOWN])}{more}"
-        )
+        events.warn(f"NaN, infinite or immense coordinates, whose shadows and reflections are unreliable: {', '.join(found[:SHOWN])}{more}")
 
 
-def warn_of_hidden(scene: bpy.types.Scene, channel: Channel) -> None:
-    """Name what a view leaves out of its picture: shadow catchers and holdouts."""
+def warn_of_hidden(scene: bpy.types.Scene, events: Events) -> None:
+    """Warn of what a view does not show: shadow catchers and holdouts."""
     layer = bpy.context.view_layer
     shown = [obj for obj in scene.objects if obj.type == "MESH" and not obj.hide_render and obj.name in layer.objects]
     found = [f"{obj.name!r} {setting.partition(',')[0]}" for obj in shown if (setting := _leaves_no_picture(obj)) is not None]
     if found:
         more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
-        channel.warn(f"pixels without a picture: {', '.join(found[:SHOWN])}{more}")
+        events.warn(f"pixels without a picture: {', '.join(found[:SHOWN])}{more}")
 
 
 def spoiled_vertices(mesh: bpy.types.Mesh) -> np.ndarray:

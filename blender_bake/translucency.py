@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Materials that shadow rays pass: each may be traded for walls of a plain tint by angle, which an engine can cast a shadow of."""
+"""Materials that shadow rays pass: each can be switched to walls of a transmittance by angle, whose shadows an engine can cast."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
 
-Curve = list[tuple[float, float, float]]  # what one wall passes, at KNOTS cosines from 0 to 1
+Curve = list[tuple[float, float, float]]  # transmittance of one wall, at KNOTS cosines from 0 to 1
 KNOTS = 8
 CLEAR: Curve = [(1.0, 1.0, 1.0)] * KNOTS
 FINE = 4  # ramp stops between two knots of a probe
 GAUSS_NEWTON = 12
-SMOOTH = 1e-3  # weight of a curve's bends against the light that tells of it
-BRIGHTEST = 8.0  # a wall may gather light, not beyond this
+SMOOTH = 1e-3  # weight of a curve's second differences
+BRIGHTEST = 8.0  # a wall may concentrate light, up to this
 
 
 class Translucent:
-    """A material with a switch: off, it is as its author made it; on, shadow rays pass it times a tint that their angle decides."""
+    """A material with a switch: off, it is unchanged; on, shadow rays are multiplied by a transmittance that depends on their angle."""
 
     def __init__(self, material: bpy.types.Material) -> None:
         tree = material.node_tree
@@ -32,78 +33,90 @@ class Translucent:
         tree.links.new(facing.outputs["Facing"], cosine.inputs[1])
         self._ramp = tree.nodes.new("ShaderNodeValToRGB")
         tree.links.new(cosine.outputs[0], self._ramp.inputs[0])
-        tint = tree.nodes.new("ShaderNodeBsdfTransparent")
-        tree.links.new(self._ramp.outputs["Color"], tint.inputs["Color"])
+        clear = tree.nodes.new("ShaderNodeBsdfTransparent")
+        tree.links.new(self._ramp.outputs["Color"], clear.inputs["Color"])
         self._switch = tree.nodes.new("ShaderNodeMath")
         self._switch.operation = "MULTIPLY"
         tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Shadow Ray"], self._switch.inputs[0])
         mix = tree.nodes.new("ShaderNodeMixShader")
         tree.links.new(self._switch.outputs[0], mix.inputs[0])
         tree.links.new(surface.links[0].from_socket, mix.inputs[1])
-        tree.links.new(tint.outputs[0], mix.inputs[2])
+        tree.links.new(clear.outputs[0], mix.inputs[2])
         tree.links.new(mix.outputs[0], surface)
         self.off()
 
     def on(self, curve: Curve) -> None:
-        """One wall passes `curve`, linear between even steps of the cosine at which it is met."""
+        """Switch to the transmittance `curve` of one wall, linear between even steps of the cosine of incidence."""
         stops = self._ramp.color_ramp.elements
         while len(stops) > 1:
             stops.remove(stops[-1])
-        for i, tint in enumerate(curve):
+        for i, color in enumerate(curve):
             stop = stops[0] if i == 0 else stops.new(i / (len(curve) - 1))
             stop.position = i / (len(curve) - 1)
-            stop.color = (*tint, 1)
+            stop.color = (*color, 1)
         self._switch.inputs[1].default_value = 1.0
 
     def off(self) -> None:
-        """As the scene has it."""
+        """The material of the scene."""
         self._switch.inputs[1].default_value = 0.0
 
 
 class Switch:
-    """All translucent materials of a scene together; false where there is none."""
+    """All translucent materials of a scene; false where there is none."""
 
-    def __init__(self, translucent: list[Translucent], tints: Mapping[str, Curve]) -> None:
+    def __init__(self, translucent: list[Translucent], transmittances: Mapping[str, Curve]) -> None:
         self._translucent = translucent
-        self._tints = tints
+        self._transmittances = transmittances
 
     def __bool__(self) -> bool:
         return bool(self._translucent)
 
     def on(self) -> None:
-        """Shadow rays meet tints by angle."""
+        """Switch all to their transmittances."""
         for one in self._translucent:
-            one.on(self._tints[one.name])
+            one.on(self._transmittances[one.name])
 
     def off(self) -> None:
-        """The scene as its author made it."""
+        """The materials of the scene."""
         for one in self._translucent:
             one.off()
 
 
+@contextmanager
+def switched(switch: Switch | None) -> Iterator[None]:
+    """The translucent materials, if any, switched on inside."""
+    if switch is not None:
+        switch.on()
+    yield
+    if switch is not None:
+        switch.off()
+
+
 def find(scene: bpy.types.Scene) -> list[Translucent]:
-    """The scene's materials that let shadow rays through, in order of name, each with a switch now."""
+    """The scene's materials that let shadow rays through, in order of name, each given a switch."""
     used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
     used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}  # of instances
     return [Translucent(m) for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
 
 
 def cut_out(scene: bpy.types.Scene) -> list[str]:
-    """Names of materials whose transparency a texture or an attribute decides, such as leaves on cards: no tint holds their outline."""
+    """Names of materials whose transparency depends on a texture or an attribute, such as leaves on cards: their outline is lost."""
     used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
     used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}
     return sorted(m.name for m in used if m.use_nodes and m.node_tree and _passes(m) and _varies(m.node_tree))
 
 
-def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]) -> dict[str, Curve]:
-    """The tint of each material that comes nearest, in least squares, to the direct light behind it.
+def fit_transmittances(
+    translucent: list[Translucent], aims: Iterable[Callable[[], None]], direct: Callable[[], np.ndarray]
+) -> dict[str, Curve]:
+    """The transmittance of each material that reproduces the direct light behind it best, in least squares; by name.
 
-    Seen with every other such material clear, under each light that `aims` turn on: a texel whose light d met walls at the cosines c
+    Fitted with every other such material clear, under each light that `aims` turn on: a texel whose light d passed walls at the cosines c
     gets d prod m(c). With ln m = sum_k theta_k hat_k(c) that is d exp(sum_k theta_k F_k), where F_k = sum over walls of hat_k(c) is
-    read off a bake whose walls pass 2^-hat_k.
+    read off a bake whose walls have the transmittance 2^-hat_k.
     """
     lights = list(aims)
-    tints: dict[str, Curve] = {}
+    transmittances: dict[str, Curve] = {}
     for one in translucent:
         for other in translucent:
             other.on(CLEAR)
@@ -126,11 +139,11 @@ def fit_tints(translucent: list[Translucent], aims: Iterable[Callable[[], None]]
             walls.append(stacked[met])
             whole.append(clear[lit][met])
             passed.append(true[lit][met])
-        tints[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
+        transmittances[one.name] = _curve(np.concatenate(walls), np.concatenate(whole), np.concatenate(passed)) if lights else CLEAR
         one.off()
     for one in translucent:
         one.off()
-    return tints
+    return transmittances
 
 
 def _probe(first: int) -> Curve:
@@ -141,7 +154,7 @@ def _probe(first: int) -> Curve:
 
 
 def _curve(walls: np.ndarray, whole: np.ndarray, passed: np.ndarray) -> Curve:
-    """Gauss-Newton, a channel at a time, from the constant that fits best; bends are held down where no light tells of them."""
+    """Gauss-Newton per color, from the constant that fits best; second differences are damped where no light constrains them."""
     if not len(walls):
         return CLEAR
     bends = np.diff(np.eye(KNOTS), 2, axis=0)
@@ -202,7 +215,7 @@ def _is_transparent(socket: bpy.types.NodeSocket) -> bool:
 
 
 def _is_textured(socket: bpy.types.NodeSocket) -> bool:
-    """Whether a texture or an attribute of the mesh stands behind a socket."""
+    """Whether a texture or an attribute of the mesh feeds a socket."""
     waiting, seen = [link.from_node for link in socket.links], set()
     while waiting:
         node = waiting.pop()

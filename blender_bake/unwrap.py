@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""UV layers for lightmaps: do they fit (inside [0, 1], not degenerate, no overlap, side by side), and making them where they do not."""
+"""UV layers for lightmaps: whether they fit (inside [0, 1], not degenerate, no overlap, side by side), and making those that do not."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import select, world_area
 
 MAX_UV_LAYERS = 8  # Blender's own limit
@@ -22,18 +22,18 @@ OVERLAP_GRID = 512
 NO_AREA = "has no area"
 NOT_NUMBERS = "holds NaN or infinite coordinates"
 GUTTER_TEXELS = 4
-LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be all gutter
+LARGEST_GUTTER = 0.03  # of the layer: small lightmaps would otherwise be mostly gutter
 
 
-def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int, method: str, channel: Channel) -> tuple[list[str], bool]:
+def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int, method: str, events: Events) -> tuple[list[str], bool]:
     """(a layer for each object, whether they were made). Several objects share one atlas, so theirs must lie side by side.
 
     name: the layer asked for, else the active one if it fits, else another that fits; where none does, or where those of several objects
     overlap, a layer of our own on every object, by `method`: `smart` (Smart UV Project) or `lightmap-pack` for objects without a layer
-    that fits, then all charts together by Blender's packer at one density; `keep` makes none. WorkerError where nothing can serve.
+    that fits, then all charts together by Blender's packer at one density; `keep` makes none. WorkerError where none fits or can be made.
     """
     if len(objects) == 1:
-        layer, made = choose_layer(objects[0], name, texels, method, channel)
+        layer, made = choose_layer(objects[0], name, texels, method, events)
         return [layer], made
     if name not in (None, MADE_LAYER):
         for obj in objects:
@@ -57,42 +57,42 @@ def choose_layers(objects: list[bpy.types.Object], name: str | None, texels: int
     if method == "keep":
         raise WorkerError(
             f"expected UV layers of {len(objects)} objects that share one atlas, found {reason}; lay them out side by side, "
-            "or let --unwrap smart pack them"
+            "or let `unwrap=smart` pack them"
         )
     pack(objects, own, texels, method)
-    channel.warn(
+    events.warn(
         f"packed a lightmap UV layer for {len(objects)} objects ({reason}); its coordinates are written to uv.json beside the capture"
     )
     return [MADE_LAYER] * len(objects), True
 
 
-def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: str, channel: Channel) -> tuple[str, bool]:
+def choose_layer(obj: bpy.types.Object, name: str | None, texels: int, method: str, events: Events) -> tuple[str, bool]:
     """(layer, whether it was made) of a single object, see `choose_layers`."""
     mesh = obj.data
     layers = mesh.uv_layers
-    if name == MADE_LAYER and name not in layers:  # an earlier bake made it: the same layer comes out again
+    if name == MADE_LAYER and name not in layers:  # an earlier bake made it: the same layer is made again
         make_layer(obj, texels, method)
         return name, True
     if name is not None:
         _require_layer(obj, name)
         problem = misfit(mesh, name)
         if problem:
-            channel.warn(f"UV layer {name!r} {problem}; it is used because it was asked for")
+            events.warn(f"UV layer {name!r} {problem}; it is used as requested")
         return name, False
     active = layers.active.name if layers.active else None
     layer = fitting_layer(mesh)
     if layer is not None:
         if layer != active:
-            channel.warn(f"the active UV layer {active!r} {misfit(mesh, active)}; using {layer!r}")
+            events.warn(f"the active UV layer {active!r} {misfit(mesh, active)}; using {layer!r}")
         return layer, False
     problem = misfit(mesh, active) if active else None
     reason = f"the active one {problem}" if active else "it has none"
     if method == "keep":
         raise WorkerError(
-            f"expected a UV layer of {obj.name!r} that fits a lightmap, found that {reason}; mend it, or let --unwrap smart make one"
+            f"expected a UV layer of {obj.name!r} that fits a lightmap, found that {reason}; fix it, or let `unwrap=smart` make one"
         )
     make_layer(obj, texels, method)
-    channel.warn(f"made a lightmap UV layer for {obj.name!r} ({reason}); its coordinates are written to uv.json beside the capture")
+    events.warn(f"made a lightmap UV layer for {obj.name!r} ({reason}); its coordinates are written to uv.json beside the capture")
     return MADE_LAYER, True
 
 
@@ -114,7 +114,7 @@ def _require_layer(obj: bpy.types.Object, name: str) -> None:
         vertex = obj.data.loops[bad].vertex_index
         raise WorkerError(
             f"expected numbers in UV layer {name!r} of {obj.name!r}, found NaN or infinity at vertex {vertex} (face corner {bad}); "
-            "mend it, or name another layer"
+            "fix it, or name another layer"
         )
     if problem == NO_AREA:
         raise WorkerError(f"expected UV layer {name!r} of {obj.name!r} to cover texels, found that it {problem}")
@@ -176,7 +176,7 @@ def pack(objects: list[bpy.types.Object], own: list[str | None], texels: int, me
     bpy.ops.mesh.reveal()
     bpy.ops.mesh.select_all(action="SELECT")
     bpy.ops.uv.select_all(action="SELECT")
-    result = bpy.ops.uv.pack_islands(  # by boxes: outlines pack closer, but take seconds, and every worker packs anew
+    result = bpy.ops.uv.pack_islands(  # by boxes: packing by outlines takes seconds, in every worker
         rotate=True, rotate_method="CARDINAL", scale=True, margin_method="FRACTION", margin=_gutter(texels), shape_method="AABB"
     )
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -194,7 +194,7 @@ def _layer_for_us(obj: bpy.types.Object) -> Iterator[None]:
     if len(layers) >= MAX_UV_LAYERS:
         raise WorkerError(
             f"expected a UV layer of {obj.name!r} that fits a lightmap or room for one, found {len(layers)} layers of which none fits "
-            f"({layers.active.name!r} {misfit(obj.data, layers.active.name)}); remove one, or name one with --uv-layer"
+            f"({layers.active.name!r} {misfit(obj.data, layers.active.name)}); remove one, or name one with `uv_layer`"
         )
     if layers.new(name=MADE_LAYER, do_init=False) is None:
         raise WorkerError(f"Blender refused another UV layer on {obj.name!r}")

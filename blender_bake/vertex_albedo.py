@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from blender_bake.channel import WorkerError
+from blender_bake.ipc import WorkerError
 from blender_bake.receiver_objects import select
 
 ATTRIBUTE = "srbf albedo"
@@ -15,7 +15,7 @@ ATTRIBUTE = "srbf albedo"
 class AlbedoBakes:
     """Copies of evaluated objects, gathered while the scene is read and then baked together.
 
-    Textures that go by the object's coordinates see its pose, generated ones the bounds of its mesh as its modifiers leave it.
+    Textures in object coordinates use its transform, generated ones the bounds of its mesh after modifiers.
     """
 
     def __init__(self) -> None:

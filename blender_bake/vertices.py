@@ -10,12 +10,15 @@ import bpy
 import numpy as np
 
 from blender_bake import materials, precision, soundness, world_normals
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.channels import chosen
+from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
+from blender_bake.request import RenderRequest
+from blender_bake.translucency import Switch
 
 NOT_DIFFUSE = 1e-3
 ATTRIBUTE = "srbf bake"
-ROW = 1024  # points a row of the images, at most
+ROW = 1024  # points per row of the images, at most
 
 
 def image_size(count: int) -> tuple[int, int]:
@@ -27,23 +30,26 @@ def image_size(count: int) -> tuple[int, int]:
 class VertexReceiver:
     """The vertices of one mesh object, its modifiers applied, in vertex order along the rows; arrays are (H, W, C) float32.
 
-    Cycles answers at every corner of every face, just inside it; a vertex takes the mean of its corners, each by its angle, as its normal
-    does: it does not depend on how its faces are divided. Corners with nothing diffuse do not count towards irradiance. A vertex
-    without a face, and what fills up the last row, has coverage 0.
+    Cycles bakes every corner of every face, just inside it; a vertex has the mean of its corners weighted by their angles, as its normal
+    does, which does not depend on how its faces are divided. Corners with nothing diffuse do not count towards irradiance. Vertices
+    without a face, and the padding of the last row, have coverage 0.
     """
 
-    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
+    kind = "vertices"
+    renders = frozenset({"response"})
+
+    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
-        self._channel = channel
+        self._events = events
         self._irradiance = job["quantity"] == "irradiance"
         scene.render.bake.view_from = "ABOVE_SURFACE"
         objects = prepare(scene, [job["receiver"]["object"]])
         if len(objects) > 1:
             raise WorkerError(f"expected one object's vertices, found {len(objects)} objects in {job['receiver']['object']!r}; name one")
         self._object = objects[0]
-        soundness.require_visible(self._object, channel)
-        soundness.warn_of_occluders(scene, {self._object.name}, channel)
-        precision.warn_of_objects(objects, len(self._object.data.vertices), "vertex's share", channel)
+        soundness.require_visible(self._object, events)
+        soundness.warn_of_occluders(scene, {self._object.name}, events)
+        precision.warn_of_objects(objects, len(self._object.data.vertices), "vertex's share", events)
         mesh = self._object.data
         self._count = len(mesh.vertices)
         self._width, self._height = job["width"], job["height"]
@@ -51,7 +57,7 @@ class VertexReceiver:
             width, height = image_size(self._count)
             raise WorkerError(
                 f"expected a size of {width}x{height} for the {self._count} vertices of {self._object.name!r}, found "
-                f"{self._width}x{self._height}; let the bake survey the scene"
+                f"{self._width}x{self._height}; let the bake query the scene"
             )
         for attribute in [a for a in mesh.color_attributes if a.name == ATTRIBUTE]:
             mesh.color_attributes.remove(attribute)
@@ -61,43 +67,52 @@ class VertexReceiver:
         self._corners = np.empty(len(mesh.loops), np.int32)  # (C,) vertex of each corner
         mesh.loops.foreach_get("vertex_index", self._corners)
         self._angles = corner_angles(mesh, self._object.matrix_world)
-        self._readable = np.ones(len(self._corners), bool)
+        self._valid = np.ones(len(self._corners), bool)
         albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
         self._albedo = self._of_vertices(albedo)
         if self._irradiance:
             self._whiten_what_is_not_diffuse(albedo)
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of this receiver."""
+        """The manifest's entry of this receiver."""
         return [{"kind": "vertices", "object": self._object.name, "count": self._count}]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run and the log."""
+        """For dry run and log."""
         return {"polygons": len(self._object.data.polygons), "vertices": self._count}
 
     def sampling(self) -> dict[str, Any]:
         """Nothing: points have no footprint for rays to spread over."""
         return {}
 
-    def geometry(self) -> dict[str, np.ndarray]:
-        """World position and normal of the vertices as the mesh has them, albedo and coverage."""
-        mesh, matrix = self._object.data, np.array(self._object.matrix_world)
-        points, normals = np.empty(self._count * 3, np.float32), np.empty(self._count * 3, np.float32)
-        mesh.vertices.foreach_get("co", points)
-        mesh.vertex_normals.foreach_get("vector", normals)
-        position = points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
-        normal = world_normals.of_mesh(normals.reshape(-1, 3), matrix[:3, :3])
-        faced = np.bincount(self._corners, minlength=self._count) > 0
-        lit = np.bincount(self._corners, self._readable, self._count) > 0
-        coverage = self._image(faced[:, None])
-        return {
-            "position": self._image(position * faced[:, None]),
-            "normal": self._image(normal * faced[:, None]),
-            "albedo": self._image(self._albedo),
-            "coverage": coverage,
-            "readable": self._image(lit[:, None]),
-            "hit": coverage,
+    def channels(self, names: list[str]) -> dict[str, np.ndarray]:
+        """Those named of `position`, `normal` (as the mesh has them), `albedo`, `coverage` and the masks `hit` and `valid`."""
+        faced = (np.bincount(self._corners, minlength=self._count) > 0)[:, None]
+        makers = {
+            "position": lambda: self._image(self._position() * faced),
+            "normal": lambda: self._image(self._normal() * faced),
+            "albedo": lambda: self._image(self._albedo),
+            "coverage": lambda: self._image(faced),
+            "hit": lambda: self._image(faced),
+            "valid": lambda: self._image((np.bincount(self._corners, self._valid, self._count) > 0)[:, None]),
+            "seams": lambda: None,
         }
+        return chosen(names, makers, self.kind)
+
+    def _position(self) -> np.ndarray:
+        points = np.empty(self._count * 3, np.float32)
+        self._object.data.vertices.foreach_get("co", points)
+        matrix = np.array(self._object.matrix_world)
+        return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+    def _normal(self) -> np.ndarray:
+        normals = np.empty(self._count * 3, np.float32)
+        self._object.data.vertex_normals.foreach_get("vector", normals)
+        return world_normals.of_mesh(normals.reshape(-1, 3), np.array(self._object.matrix_world)[:3, :3])
+
+    def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
+        """The `response`; see `RenderRequest`."""
+        return {"response": self.response(request.samples, request.seed)}
 
     def response(self, samples: int, seed: int) -> np.ndarray:
         """Irradiance E = pi x Cycles' DIFFUSE without color, or radiance seen from straight above each face."""
@@ -109,8 +124,8 @@ class VertexReceiver:
         return self._image(self._of_vertices(corners))
 
     def _of_vertices(self, corners: np.ndarray) -> np.ndarray:
-        """(V, 3) means over each vertex's readable corners (C, 3), by angle."""
-        weight = self._angles * self._readable
+        """(V, 3) means over each vertex's valid corners (C, 3), by angle."""
+        weight = self._angles * self._valid
         total = np.maximum(np.bincount(self._corners, weight, self._count), 1e-20)
         return np.stack([np.bincount(self._corners, weight * corners[:, c], self._count) / total for c in range(3)], axis=1)
 
@@ -151,12 +166,12 @@ class VertexReceiver:
                     names.append(repr(slots[i].material.name if slots[i].material else "(none)"))
                     slots[i].material = materials.lambert((1, 1, 1))
             if names:
-                self._channel.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
+                self._events.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
                 albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})
-        self._readable = albedo.max(axis=1) >= NOT_DIFFUSE
-        dark = int((np.bincount(self._corners, self._readable, self._count) == 0).sum())
+        self._valid = albedo.max(axis=1) >= NOT_DIFFUSE
+        dark = int((np.bincount(self._corners, self._valid, self._count) == 0).sum())
         if dark:
-            self._channel.warn(f"{dark} vertices have nothing diffuse around them: they take the irradiance of the nearest in the list")
+            self._events.warn(f"{dark} vertices have nothing diffuse around them: they take the irradiance of the nearest in the list")
 
 
 def corner_angles(mesh: bpy.types.Mesh, matrix: Any) -> np.ndarray:

@@ -11,10 +11,12 @@ import bpy
 import numpy as np
 
 from blender_bake import elsewhere, materials, precision, sample_spread, soundness
-from blender_bake.channel import Channel, WorkerError
+from blender_bake.channels import chosen
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
-from blender_bake.translucency import Switch
+from blender_bake.ipc import Events, WorkerError
+from blender_bake.request import RenderRequest
+from blender_bake.translucency import Switch, switched
 
 GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the center that its position reprojects onto it
 NOT_DIFFUSE = 1e-3
@@ -24,32 +26,34 @@ LIGHT_PASSES = ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color
 class ViewReceiver:
     """The pixels of one camera; arrays are (H, W, C) float32, row 0 at the top, unpremultiplied."""
 
-    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], channel: Channel) -> None:
+    kind = "view"
+    renders = frozenset({"response", "direct", "denoised"})
+
+    def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
-        self._channel = channel
+        self._events = events
         self._irradiance = job["quantity"] == "irradiance"
         self._file = Path(job["scratch"]) / "view.exr"
         self._camera = find_camera(scene, job["receiver"].get("camera"))
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
-        self._coverage: np.ndarray | None = None
-        self._diffuse: np.ndarray | None = None  # of the same samples: diffuse color times coverage
+        self._coverage: tuple[np.ndarray, np.ndarray] | None = None  # and diffuse color times coverage, of the same samples
         self._last: dict[str, np.ndarray] = {}
-        self._guides: tuple[np.ndarray, np.ndarray] | None = None  # albedo and normal
+        self._centers: dict[str, np.ndarray] | None = None  # position, normal and hit
         self._denoiser: Denoiser | None = None
         self._scratch = Path(job["scratch"])
-        soundness.warn_of_occluders(scene, set(), channel)
-        soundness.warn_of_hidden(scene, channel)
+        soundness.warn_of_occluders(scene, set(), events)
+        soundness.warn_of_hidden(scene, events)
         self._prepare(job["width"], job["height"])
         if self._irradiance:
-            self._whiten_if_nothing_is_diffuse(channel)
+            self._whiten_if_nothing_is_diffuse(events)
 
     def descriptions(self) -> list[dict[str, Any]]:
-        """What the manifest says of this receiver."""
+        """The manifest's entry of this receiver."""
         return [{"kind": "view", "camera": self._camera.name}]
 
     def facts(self) -> dict[str, Any]:
-        """For the dry run, the log and depth-based shaders: the camera's kind and pose."""
+        """For dry run, log and depth-based shaders: the camera's kind and pose."""
         data = self._camera.data
         return {
             "camera": {
@@ -63,7 +67,7 @@ class ViewReceiver:
         }
 
     def sampling(self) -> dict[str, Any]:
-        """How a pixel looks at the scene, where rays of others can do the same: not through a lens, nor a panorama."""
+        """`camera`: what rays need to sample the pixels as Cycles does; empty for depth of field and panoramas."""
         data = self._camera.data
         if data.type not in {"PERSP", "ORTHO"} or data.dof.use_dof:
             return {}
@@ -77,35 +81,62 @@ class ViewReceiver:
             }
         }
 
-    def geometry(self) -> dict[str, np.ndarray]:
-        """World position and normal at pixel centers, with `hit` where there is one; albedo and coverage over the whole pixel."""
-        cycles = self._scene.cycles
-        filter_type, filter_width = cycles.pixel_filter_type, cycles.filter_width
-        lens = self._camera.data.dof
-        blurred = lens.use_dof
-        cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
-        center = self._render(1, 0, ("Combined", "Position", "Normal"), spread=False)
-        cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = filter_type, filter_width, blurred
-        self._measure_coverage()
-        hit = (center["Combined"][:, :, 3:] > 0).astype(np.float32)
-        coverage = self._coverage
-        normal = center["Normal"] / np.maximum(np.linalg.norm(center["Normal"], axis=2, keepdims=True), 1e-20)
-        albedo = self._diffuse / np.where(coverage > 0, coverage, 1)
-        self._guides = (albedo, normal * hit)
-        precision.warn_of_pixels(center["Position"], hit, self._channel)
-        return {
-            "position": center["Position"] * hit,
-            "normal": normal * hit,
-            "albedo": albedo,
-            "coverage": coverage,
-            "readable": coverage,
-            "hit": hit,
+    def channels(self, names: list[str]) -> dict[str, np.ndarray]:
+        """Those named of `position` and `normal` (at pixel centers, with the mask `hit`), `albedo`, `coverage` and the mask `valid`."""
+        makers = {
+            "position": self._position,
+            "normal": lambda: self._at_centers()["normal"],
+            "albedo": self._albedo,
+            "coverage": lambda: self._measured_coverage()[0],
+            "hit": lambda: self._at_centers()["hit"],
+            "valid": lambda: self._measured_coverage()[0],
+            "seams": lambda: None,
         }
+        return chosen(names, makers, self.kind)
+
+    def _position(self) -> np.ndarray:
+        center = self._at_centers()
+        precision.warn_of_pixels(center["position"], center["hit"], self._events)
+        return center["position"]
+
+    def _albedo(self) -> np.ndarray:
+        coverage, diffuse = self._measured_coverage()
+        return diffuse / np.where(coverage > 0, coverage, 1)
+
+    def _at_centers(self) -> dict[str, np.ndarray]:
+        """`position` (m), unit `normal` and `hit` (1 or 0) at pixel centers, all 0 where there is no hit; rendered once."""
+        if self._centers is None:
+            cycles, lens = self._scene.cycles, self._camera.data.dof
+            before = cycles.pixel_filter_type, cycles.filter_width, lens.use_dof
+            cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = "BLACKMAN_HARRIS", GEOMETRY_FILTER, False
+            center = self._render(1, 0, ("Combined", "Position", "Normal"), spread=False)
+            cycles.pixel_filter_type, cycles.filter_width, lens.use_dof = before
+            hit = (center["Combined"][:, :, 3:] > 0).astype(np.float32)
+            normal = center["Normal"] / np.maximum(np.linalg.norm(center["Normal"], axis=2, keepdims=True), 1e-20)
+            self._centers = {"position": center["Position"] * hit, "normal": normal * hit, "hit": hit}
+        return self._centers
+
+    def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
+        """`response`, `direct` and `denoised`, see `RenderRequest`: of one render where nothing is translucent, else of two."""
+        samples, seed = request.samples, request.seed
+        images = {}
+        if {"response", "denoised"} & set(request.channels):
+            response = self.response(samples, seed)
+            images = {"response": response, "denoised": response}
+            if "denoised" in request.channels:
+                images["denoised"] = self.denoised(response)
+        if "direct" in request.channels:
+            if images and not switch:
+                images["direct"] = self._direct_of(self._last)
+            else:
+                with switched(switch):
+                    images["direct"] = self.direct(samples, seed)
+        return {name: images[name] for name in request.channels}
 
     def response(self, samples: int, seed: int) -> np.ndarray:
         """Radiance (COMBINED over coverage), or irradiance E = pi x (diffuse direct + indirect, without color).
 
-        Coverage and color are of many samples: divided by its own few, a pixel that they all miss would be dark, and its mean with it.
+        Divided by coverage and color of many samples: by its own few, a pixel that they all miss would be dark, and so would the mean.
         """
         passes = self._last = self._render(samples, seed, LIGHT_PASSES)
         if self._irradiance:
@@ -113,28 +144,16 @@ class ViewReceiver:
         return self._over_coverage(passes["Combined"][:, :, :3])
 
     def denoised(self, image: np.ndarray) -> np.ndarray:
-        """An image in the units of `answer`, or a mean of several, freed of its noise by OpenImageDenoise: biased, so never to be summed.
+        """An image in the units of `response` without its noise, by OpenImageDenoise: biased, so never to be summed.
 
-        Guided by albedo and normal of the geometry pass; what no sample of that pass met stays 0.
+        Guided by the albedo and normal channels; pixels without coverage stay 0.
         """
         if self._denoiser is None:
-            if self._guides is None:
-                self.geometry()
-            self._denoiser = Denoiser(self._scratch, *self._guides)
-        return self._denoiser.denoise(image) * (self._coverage > 0)
-
-    def responses(self, samples: int, seed: int, translucent: Switch) -> tuple[np.ndarray, np.ndarray]:
-        """(`answer`, the direct diffuse light in it with `translucent` on): of one render where nothing is translucent, else of two."""
-        whole = self.response(samples, seed)
-        if not translucent:
-            return whole, self._direct_of(self._last)
-        translucent.on()
-        part = self.direct(samples, seed)
-        translucent.off()
-        return whole, part
+            self._denoiser = Denoiser(self._scratch, self._albedo(), self._at_centers()["normal"])
+        return self._denoiser.denoise(image) * (self._measured_coverage()[0] > 0)
 
     def direct(self, samples: int, seed: int) -> np.ndarray:
-        """The direct diffuse light alone, in the units of `answer`."""
+        """The direct diffuse light alone, in the units of `response`."""
         return self._direct_of(self._render(samples, seed, ("Diffuse Direct", "Diffuse Color")))
 
     def _direct_of(self, passes: dict[str, np.ndarray]) -> np.ndarray:
@@ -148,22 +167,23 @@ class ViewReceiver:
         Where a pixel is covered in part, that color is multiplied back and the color of many samples divided by, so that the mean over
         passes is right; elsewhere the ratio is kept, which has less noise on textures.
         """
-        self._measure_coverage()
+        coverage, diffuse = self._measured_coverage()
         ratio = light[:, :, :3]
-        partial = (self._coverage < 1) & (self._diffuse > 0)
-        expected = ratio * passes["Diffuse Color"][:, :, :3] / np.where(partial, self._diffuse, 1)
+        partial = (coverage < 1) & (diffuse > 0)
+        expected = ratio * passes["Diffuse Color"][:, :, :3] / np.where(partial, diffuse, 1)
         return np.where(partial, expected, ratio) * np.float32(math.pi)
 
-    def _measure_coverage(self) -> None:
-        """Coverage and diffuse color by many samples, once."""
+    def _measured_coverage(self) -> tuple[np.ndarray, np.ndarray]:
+        """(coverage (H, W, 1), diffuse color times coverage (H, W, 3)) by many samples; rendered once."""
         if self._coverage is None:
             whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
-            self._coverage, self._diffuse = np.clip(whole["Combined"][:, :, 3:], 0, 1), whole["Diffuse Color"][:, :, :3]
+            self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1), whole["Diffuse Color"][:, :, :3]
+        return self._coverage
 
     def _over_coverage(self, image: np.ndarray) -> np.ndarray:
-        self._measure_coverage()
-        seen = self._coverage > 0
-        return np.where(seen, image / np.where(seen, self._coverage, 1), 0)
+        coverage, _ = self._measured_coverage()
+        seen = coverage > 0
+        return np.where(seen, image / np.where(seen, coverage, 1), 0)
 
     def _prepare(self, width: int, height: int) -> None:
         render = self._scene.render
@@ -195,19 +215,19 @@ class ViewReceiver:
             raise WorkerError(f"Blender's render of camera {self._camera.name!r} ended as {', '.join(result)} without an image")
         return read_passes(self._file, passes)
 
-    def _whiten_if_nothing_is_diffuse(self, channel: Channel) -> None:
+    def _whiten_if_nothing_is_diffuse(self, events: Events) -> None:
         passes = self._render(1, 0, ("Combined", "Diffuse Color"))
         seen = passes["Combined"][:, :, 3] > 0
         dark = (passes["Diffuse Color"][:, :, :3].max(axis=2) < NOT_DIFFUSE) & seen
         if seen.any() and dark[seen].all():
             self._layer.material_override = materials.lambert((1, 1, 1))
-            channel.warn("nothing in view is diffuse: irradiance is taken with every surface white Lambert instead")
+            events.warn("nothing in view is diffuse: irradiance is taken with every surface white Lambert instead")
         elif dark.any():
-            channel.warn(f"{int(dark.sum())} pixels show nothing diffuse (metal, glass, black): they have no irradiance and hold 0")
+            events.warn(f"{int(dark.sum())} pixels show nothing diffuse (metal, glass, black): they have no irradiance and hold 0")
 
 
 def find_camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:
-    """The camera named, or the scene's own; WorkerError says what there is."""
+    """The camera `name`, or the scene's own; WorkerError, naming those there are, where there is none."""
     cameras = sorted(o.name for o in scene.objects if o.type == "CAMERA")
     shown = ", ".join(repr(n) for n in cameras) or "none"
     if name is None:

@@ -9,11 +9,11 @@ import numpy as np
 from blender_bake.beside import authored_name
 
 KINDS = {"CURVES": "hair curves", "POINTCLOUD": "point clouds", "VOLUME": "volumes"}
-SHOWN = 4  # names of a kind
+SHOWN = 4  # names per kind
 
 
 def line(scene: bpy.types.Scene) -> str | None:
-    """What direct light by rays or shadow maps will miss, for the user; None where that is nothing."""
+    """A warning of what direct light by rays or shadow maps will miss; None where that is nothing."""
     found: dict[str, dict[str, None]] = {}
     for instance in bpy.context.evaluated_depsgraph_get().object_instances:
         obj = instance.object

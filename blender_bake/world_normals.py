@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""World normals of objects whose place in the world scales unevenly, shears, mirrors or flattens them."""
+"""World normals of objects whose transform scales unevenly, shears, mirrors or flattens them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FLAT = 1e-5  # smallest singular value of a matrix over its largest, below which
 def of_mesh(normals: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """(n, 3) unit normals in the world of a mesh's own (n, 3), moved by `matrix` (3, 3).
 
-    By its cofactors, which are det(M) M^-T and exist where M has no inverse; outwards stays outwards where M mirrors.
+    By its cofactors, which are det(M) M^-T and exist where M has no inverse; outward stays outward where M mirrors.
     """
     x, y, z = matrix.astype(np.float64)
     cofactors = np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])

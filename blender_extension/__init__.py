@@ -22,7 +22,7 @@ HANDLERS = (bpy.app.handlers.depsgraph_update_post, bpy.app.handlers.frame_chang
 
 
 def register() -> None:
-    """Called by Blender when the extension is switched on."""
+    """Called by Blender when the extension is enabled."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.srbf = bpy.props.PointerProperty(type=settings.SrbfSettings)
@@ -32,7 +32,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Called by Blender when it is switched off, or ends: nothing of it stays, and a running bake is stopped."""
+    """Called by Blender when the extension is disabled, or Blender ends: removes everything, and stops a running bake."""
     running.end()
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())

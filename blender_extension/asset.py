@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An asset's folder as Blender can show it: relighting maps of Gaussians over a lightmap. Reads asset.json alone, no pixel."""
+"""An asset's folder as Blender can show it: relighting maps of Gaussians over a lightmap. Reads asset.json only, no images."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ IDENTITY_TOLERANCE = 1e-6
 
 
 class AssetError(Exception):
-    """An asset that cannot be shown, in one line: expected, found, what to do."""
+    """An asset that cannot be shown: one line with what was expected, what was found, and what to do."""
 
 
 @dataclass(frozen=True, eq=False)
 class RelightingMaps:
     """k maps with value = stored scale + bias (K, 3), their Gaussians' centers (K, 3) and spread (rad), and what they light.
 
-    quantity is irradiance or radiance; uv_layer and object those of the bake, None where the asset does not say.
+    quantity is irradiance or radiance; uv_layer and object are those of the bake, None where the asset does not say.
     """
 
     folder: Path
@@ -49,7 +49,7 @@ class RelightingMaps:
 
 
 def read(folder: Path) -> RelightingMaps:
-    """AssetError where there is no asset, or one that is shown otherwise or not at all."""
+    """The asset in `folder`. AssetError where there is none, or one that nodes cannot show."""
     path = folder / "asset.json"
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
@@ -72,8 +72,8 @@ def _maps(folder: Path, manifest: dict[str, Any]) -> RelightingMaps:
     if manifest["basis"]["kind"] != "gaussian":
         raise AssetError(f"expected Gaussians to show, found {manifest['basis']['kind']}; fit with --basis gaussian")
     if manifest.get("transport", "combined") != "combined":
-        raise AssetError("expected all light in the maps, found an indirect asset, whose direct light Blender's nodes cannot add")
-    receiver = manifest.get("source", {}).get("receiver", {})
+        raise AssetError("expected combined transport in the maps, found an indirect asset, whose direct light Blender's nodes cannot add")
+    receiver = _receiver(manifest)
     if receiver.get("kind") == "view":
         raise AssetError("expected a lightmap to show on an object, found a view; bake with an object as receiver")
     placed = np.array(manifest.get("asset_from_world", np.eye(4)), np.float64)
@@ -97,6 +97,14 @@ def _maps(folder: Path, manifest: dict[str, Any]) -> RelightingMaps:
         receiver.get("object"),
         receiver.get("uv_layer"),
     )
+
+
+def _receiver(manifest: dict[str, Any]) -> dict[str, Any]:
+    """What is lit, the first of several; empty where the asset does not say. Assets of older versions say so in `source`."""
+    for place in (manifest, manifest.get("source", {})):
+        if "receiver" in place or place.get("receivers"):
+            return place["receiver"] if "receiver" in place else place["receivers"][0]
+    return {}
 
 
 def _inside(folder: Path, name: str) -> Path:

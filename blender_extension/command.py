@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`blender -b x.blend --command srbf …`: the library's command line; it bakes the open file by this Blender unless told otherwise."""
+"""`blender -b x.blend --command srbf …`: the library's command line; it bakes the open file with this Blender by default."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .process import no_extensions
 
 
 def run(arguments: list[str]) -> int:
-    """The exit status of `srbf` with these arguments."""
+    """Run `srbf` with these arguments; its exit status."""
     try:
         from typer.main import get_command
 
@@ -22,7 +22,7 @@ def run(arguments: list[str]) -> int:
     except ImportError as error:
         print(f"srbf: expected the library beside this extension, found {error}; install the extension's zip again", file=sys.stderr)  # noqa: T201
         return 1
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender's own would only ask it to end a render
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # Blender's own handler would only end a render
     commands = get_command(app)
     full = completed(arguments, commands, bpy.data.filepath, bpy.app.binary_path)
     with no_extensions() as folder:
@@ -35,9 +35,9 @@ def run(arguments: list[str]) -> int:
 
 
 def completed(arguments: list[str], commands: Any, opened: str, blender: str) -> list[str]:
-    """The arguments with what only Blender knows: the open file where `bake` names no scene, this Blender where none is named.
+    """The arguments completed by Blender: the open file where `bake` names no scene, this Blender where none is named.
 
-    What the command line would refuse is left to it.
+    Invalid arguments are left for the command line to refuse.
     """
     name, given = (arguments or [""])[0], arguments[1:]
     command = commands.commands.get(name)
@@ -54,7 +54,7 @@ def completed(arguments: list[str], commands: Any, opened: str, blender: str) ->
 
 
 def _names_a_file(given: list[str], with_value: set[str]) -> bool:
-    """Whether any of the words is neither an option nor the value of one."""
+    """Whether any word is neither an option nor an option's value."""
     words = iter(given)
     for word in words:
         if word == "--":

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Run as a script: `srbf` as a command that a stop reaches, however Blender was started and on whatever system."""
+"""Run as a script: `srbf` as a command that Stop can interrupt, however Blender was started and on every system."""
 
 import signal
 
-# A Blender begun in the background of a shell's script has Ctrl-C ignored, and its children inherit that.
+# Blender started in the background of a shell script ignores Ctrl-C, and its child processes inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-if hasattr(signal, "SIGBREAK"):  # Windows' other Ctrl-C, the only one that a process can send to another there
+if hasattr(signal, "SIGBREAK"):  # on Windows the only interrupt that one process can send to another
     signal.signal(signal.SIGBREAK, lambda *_: signal.raise_signal(signal.SIGINT))
 
 if __name__ == "__main__":

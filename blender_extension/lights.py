@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's lamps as lights to relight by: suns as directions and irradiance, points as positions and irradiance at a distance a0."""
+"""Blender's lights to relight by: suns as directions and irradiance, point lights as positions and irradiance at a distance a0."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Sun:
 
 @dataclass(frozen=True)
 class PointLight:
-    """A point lamp; `color` is its irradiance at the distance a0."""
+    """A point light; `color` is its irradiance at the distance a0."""
 
     position: tuple[float, float, float]
     color: tuple[float, float, float]
@@ -29,9 +29,9 @@ class PointLight:
 def lights_of(
     scene: bpy.types.Scene, a0: float, depsgraph: bpy.types.Depsgraph | None = None
 ) -> tuple[list[Sun], list[PointLight], list[str]]:
-    """(suns, points, names of lamps of other kinds, which are not shown) of what a render of the scene would light by.
+    """(suns, point lights, names of other lights, which are not shown) that would light a render of the scene.
 
-    A sun of strength 1 has unit irradiance; a point of P watts has P / (4 pi a0^2) at a0 meters.
+    A sun of strength 1 has unit irradiance; a point light of P watts has P / (4 pi a0^2) at a0 meters.
     """
     suns, point_lights, others = [], [], []
     for obj in sorted((o for o in scene.objects if o.type == "LIGHT" and not o.hide_render), key=lambda o: o.name):
@@ -48,7 +48,7 @@ def lights_of(
 
 
 def _color(light: bpy.types.Light, scale: float) -> tuple[float, float, float]:
-    """Color times power, and what later Blenders multiply by: exposure (stops) and the color of a temperature."""
+    """Color times power, and in later Blenders times exposure (stops) and the color of a temperature."""
     color = np.array(light.color) * light.energy * 2.0 ** getattr(light, "exposure", 0.0) * scale
     if getattr(light, "use_temperature", False):
         color *= np.array(light.temperature_color)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Relighting maps as shader nodes: max(0, sum_i c_i w_i) + ambient, with weights w_i set for suns and computed a point for lamps.
+"""Relighting maps as shader nodes: max(0, sum_i c_i w_i) + ambient, with weights w_i set for suns and computed per point for point lights.
 
 The chain is that of glsl/methods/relighting_map.glsl, with R by arccosine and exponential in place of its table.
 """
@@ -18,13 +18,13 @@ from .lights import PointLight, Sun
 Layout = Literal["IMAGES", "ATLAS"]
 Falloff = Literal["LINEAR", "INVERSE_SQUARE"]
 
-RADIUS = 1e-4  # meters: a receiver no nearer to a lamp than this, as the library has it
+RADIUS = 1e-4  # meters: least distance of a receiver from a point light, as in the library
 POINT_LIGHT_SOCKETS = {"Position": "NodeSocketVector", "Color": "NodeSocketVector", "a0": "NodeSocketFloat", "Power": "NodeSocketFloat"}
-WIDTH, HEIGHT = 180, 160  # of a node's place on the sheet
+WIDTH, HEIGHT = 180, 160  # spacing of nodes on the sheet
 
 
 class Sheet:
-    """Nodes of one tree, put down in columns as they come."""
+    """Nodes of one tree, placed in columns in order of creation."""
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
@@ -48,7 +48,7 @@ class Sheet:
     def _operate(self, kind: str, operation: str, column: float, row: float, inputs: Any, name: str) -> bpy.types.NodeSocket:
         node = self.node(kind, column, row, name, operation=operation)
         sockets = list(node.inputs)
-        if operation == "SCALE":  # its factor is the last of its sockets
+        if operation == "SCALE":  # its factor is the last socket
             sockets = [sockets[0], sockets[3]]
         for socket, value in zip(sockets, inputs, strict=False):
             self.put(value, socket)
@@ -63,16 +63,16 @@ class Sheet:
 
 
 def build(maps: RelightingMaps, name: str, point_lights: int, uv_layer: str, layout: Layout) -> bpy.types.NodeTree:
-    """A group `name` with one output, Color: the asset under far lights, whose weights `set_lights` writes, and `lamps` point lamps."""
+    """A group `name` with one output, Color: the asset under suns, whose weights `set_lights` writes, and `point_lights` point lights."""
     tree = _empty_tree(name)
     tree.interface.new_socket("Color", in_out="OUTPUT", socket_type="NodeSocketVector")
     sheet = Sheet(tree)
     coordinates = sheet.node("ShaderNodeUVMap", 0, 0, uv_map=uv_layer).outputs["UV"]
     groups = []
     if point_lights:
-        point_light_tree = _point_light_tree(maps, f"{name} lamp")
+        point_light_tree = _point_light_tree(maps, f"{name} point light")
         groups = [
-            sheet.node("ShaderNodeGroup", 0, 2 + point_light, f"lamp {point_light}", node_tree=point_light_tree)
+            sheet.node("ShaderNodeGroup", 0, 2 + point_light, f"point light {point_light}", node_tree=point_light_tree)
             for point_light in range(point_lights)
         ]
     textures = _images(sheet, maps, coordinates) if layout == "IMAGES" else _atlas(sheet, maps, coordinates, name)
@@ -95,14 +95,14 @@ def build(maps: RelightingMaps, name: str, point_lights: int, uv_layer: str, lay
 def set_lights(
     tree: bpy.types.NodeTree, maps: RelightingMaps, suns: list[Sun], point_lights: list[PointLight], a0: float, falloff: Falloff
 ) -> None:
-    """Write the k weights of all suns together, and each lamp's place and color, where they have changed."""
+    """Write the k weights of all suns together, and each point light's position and color, where they have changed."""
     weights = np.zeros((maps.k, 3))
     for sun in suns:
         weights += np.outer(maps.weights(np.array(sun.direction)), sun.color)
     for i, weight in enumerate(weights):
         _set(tree.nodes[_far(i)].inputs[1], weight)
     for index, point_light in enumerate(point_lights):
-        inputs = tree.nodes[f"lamp {index}"].inputs
+        inputs = tree.nodes[f"point light {index}"].inputs
         _set(inputs["Position"], point_light.position)
         _set(inputs["Color"], point_light.color)
         _set(inputs["a0"], a0)
@@ -110,12 +110,12 @@ def set_lights(
 
 
 def point_lights_in(tree: bpy.types.NodeTree) -> int:
-    """For how many lamps a group was built."""
+    """How many point lights a group was built for."""
     return sum(node.bl_idname == "ShaderNodeGroup" for node in tree.nodes)
 
 
 def remove(tree: bpy.types.NodeTree) -> None:
-    """Remove a group, its lamp's group and its atlas; images read from files stay, others may use them."""
+    """Remove a group, its point lights' group and its atlas; images from files stay, since others may use them."""
     inner = {node.node_tree for node in tree.nodes if node.bl_idname == "ShaderNodeGroup"}
     atlas = bpy.data.images.get(_atlas_name(tree.name))
     bpy.data.node_groups.remove(tree)
@@ -126,7 +126,7 @@ def remove(tree: bpy.types.NodeTree) -> None:
 
 
 def _point_light_tree(maps: RelightingMaps, name: str) -> bpy.types.NodeTree:
-    """Of a lamp at Position: w_i = Color (a0 / |L|)^Power R_i(L / |L|), L = Position - the point shaded [Wong2005, fig. 8-10]."""
+    """Weights under a point light: w_i = Color (a0 / |L|)^Power R_i(L / |L|), L = Position - the point shaded [Wong2005, fig. 8-10]."""
     tree = _empty_tree(name)
     for socket, kind in POINT_LIGHT_SOCKETS.items():
         tree.interface.new_socket(socket, in_out="INPUT", socket_type=kind)
@@ -151,7 +151,7 @@ def _point_light_tree(maps: RelightingMaps, name: str) -> bpy.types.NodeTree:
 
 
 def _images(sheet: Sheet, maps: RelightingMaps, coordinates: bpy.types.NodeSocket) -> list[bpy.types.NodeSocket]:
-    """An image texture a map, decoded."""
+    """One image texture per map, decoded."""
     decoded = []
     for i, path in enumerate(maps.files):
         stored = _texture(sheet, _load(path), coordinates, 2, i)
@@ -163,9 +163,9 @@ def _images(sheet: Sheet, maps: RelightingMaps, coordinates: bpy.types.NodeSocke
 
 
 def _atlas(sheet: Sheet, maps: RelightingMaps, coordinates: bpy.types.NodeSocket, name: str) -> list[bpy.types.NodeSocket]:
-    """All maps, decoded, as tiles of one float image: one texture slot of the graphics card, however many maps.
+    """All maps, decoded, as tiles of one float image: one texture slot of the graphics card for any number of maps.
 
-    Coordinates stay half a texel away from a tile's border, so that no tile runs into the next.
+    Coordinates stay half a texel away from a tile's border, so that tiles do not bleed into each other.
     """
     columns = math.ceil(math.sqrt(maps.k))
     rows = math.ceil(maps.k / columns)
@@ -178,7 +178,7 @@ def _atlas(sheet: Sheet, maps: RelightingMaps, coordinates: bpy.types.NodeSocket
     atlas = bpy.data.images.new(_atlas_name(name), pixels.shape[1], pixels.shape[0], float_buffer=True, is_data=True)
     atlas.pixels.foreach_set(pixels.ravel())
     atlas.update()
-    atlas.pack()  # else it would not be saved with the .blend
+    atlas.pack()  # otherwise it is not saved with the .blend
     half = (0.5 / maps.width, 0.5 / maps.height, 0.0)
     inner = sheet.vector("MAXIMUM", 0.5, 0, coordinates, half)
     inner = sheet.vector("MINIMUM", 1, 0, inner, (1 - half[0], 1 - half[1], 1.0))
@@ -205,12 +205,12 @@ def _load(path: Any) -> bpy.types.Image:
     if image.colorspace_settings.name != "Non-Color":
         image.colorspace_settings.name = "Non-Color"
         image.alpha_mode = "NONE"
-        image.reload()  # another asset may have been fitted to the same file since
+        image.reload()  # the file may hold another asset by now
     return image
 
 
 def _pixels(image: bpy.types.Image) -> np.ndarray:
-    """(H, W, 4) as Blender holds it, bottom row first."""
+    """(H, W, 4) in Blender's order, bottom row first."""
     width, height = image.size
     if not width:
         raise AssetError(f"Blender cannot read {image.filepath}; fit again")
@@ -235,7 +235,7 @@ def _far(i: int) -> str:
 
 
 def _set(socket: bpy.types.NodeSocket, value: Any) -> None:
-    """Only where it differs: every write makes Blender evaluate the scene again."""
+    """Set a value only where it differs, since every write makes Blender re-evaluate the scene."""
     new = np.asarray(value, np.float32)
     if not np.array_equal(np.asarray(socket.default_value, np.float32), new):
         socket.default_value = new.tolist()

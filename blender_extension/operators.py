@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bake, stop, fit, show, hide: each checks, starts or asks, and reports; none waits."""
+"""The operators bake, stop, fit, show and hide. They start work and return at once."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .asset import AssetError
 
 
 class SRBF_OT_bake(bpy.types.Operator):
-    """Bake the receiver under many lights, in a process of its own; go on with a bake that was stopped"""
+    """Bake the receiver under many lights in a separate process; resume a stopped bake"""
 
     bl_idname = "srbf.bake"
     bl_label = "Bake Relighting"
-    anew: bpy.props.BoolProperty(  # type: ignore[valid-type]
-        name="Anew", options={"SKIP_SAVE"}, description="Drop what is baked already, and bake the scene as it is now"
+    again: bpy.props.BoolProperty(  # type: ignore[valid-type]
+        name="Again", options={"SKIP_SAVE"}, description="Delete the previous bake, and bake the current scene"
     )
 
     @classmethod
@@ -25,9 +25,9 @@ class SRBF_OT_bake(bpy.types.Operator):
         return _can_start(cls, settings.problem(context.scene.srbf))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if self.anew and settings.state_of(settings.folder_of(context.scene.srbf) / "capture") != "nothing":
-            message = "What is baked already is dropped, and the scene baked as it is now"
-            return context.window_manager.invoke_confirm(self, event, title="Bake anew?", message=message, confirm_text="Bake Anew")
+        if self.again and settings.state_of(settings.folder_of(context.scene.srbf) / "capture") != "nothing":
+            message = "The previous bake is deleted, and the current scene is baked"
+            return context.window_manager.invoke_confirm(self, event, title="Bake again?", message=message, confirm_text="Bake Again")
         return self.execute(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -36,11 +36,11 @@ class SRBF_OT_bake(bpy.types.Operator):
         state = settings.state_of(folder / "capture")
         copy = folder / settings.SCENE_COPY
         try:
-            if state == "nothing" or self.anew or not copy.is_file():
+            if state == "nothing" or self.again or not copy.is_file():
                 folder.mkdir(parents=True, exist_ok=True)
                 with show.own_materials():
                     bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=True, compress=False)
-            arguments = settings.bake_arguments(asked, folder, state, self.anew, bpy.app.binary_path)
+            arguments = settings.bake_arguments(asked, folder, state, self.again, bpy.app.binary_path)
             running.start(process.Job("Bake", process.host_command(arguments), folder / "bake.progress"))
         except (OSError, RuntimeError, AssetError, process.MissingHostError) as error:
             return _failed(self, error)
@@ -48,7 +48,7 @@ class SRBF_OT_bake(bpy.types.Operator):
 
 
 class SRBF_OT_stop(bpy.types.Operator):
-    """End the running job; what is baked is kept, and Resume goes on"""
+    """Stop the running job; finished images are kept, and Resume continues"""
 
     bl_idname = "srbf.stop"
     bl_label = "Stop"
@@ -89,7 +89,7 @@ class SRBF_OT_fit(bpy.types.Operator):
 
 
 class SRBF_OT_show(bpy.types.Operator):
-    """Show the fitted asset on its object, lit by the scene's suns and point lamps"""
+    """Show the fitted asset on its object, lit by the scene's suns and point lights"""
 
     bl_idname = "srbf.show"
     bl_label = "Show Relit"
@@ -120,7 +120,7 @@ class SRBF_OT_show(bpy.types.Operator):
 
 
 class SRBF_OT_hide(bpy.types.Operator):
-    """Put the object's own materials back"""
+    """Restore the object's own materials"""
 
     bl_idname = "srbf.hide"
     bl_label = "Show Own Materials"

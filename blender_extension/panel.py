@@ -10,7 +10,7 @@ from .progress import duration
 
 
 class SRBF_PT_panel(bpy.types.Panel):
-    """Relighting maps: what to bake, and how far it is."""
+    """Relighting maps: what to bake, and its progress."""
 
     bl_idname = "SRBF_PT_panel"
     bl_label = "Relighting Maps"
@@ -69,7 +69,7 @@ def _draw_bake(layout: bpy.types.UILayout, asked: settings.SrbfSettings) -> None
     else:
         if state == "half done":
             row.operator("srbf.bake", text="Resume", icon="PLAY")
-        row.operator("srbf.bake", text="Bake Anew", icon="FILE_REFRESH").anew = True
+        row.operator("srbf.bake", text="Bake Again", icon="FILE_REFRESH").again = True
     if running.last():
         _wrapped(layout, running.last())
 
@@ -93,7 +93,7 @@ def _draw_asset(layout: bpy.types.UILayout, asked: settings.SrbfSettings) -> Non
 
 
 def _wrapped(layout: bpy.types.UILayout, text: str, width: int = 48) -> None:
-    """A label of several lines: Blender's own cut off what does not fit."""
+    """A label of several lines, since Blender truncates long ones."""
     lines = [""]
     for word in text.split():
         if lines[-1] and len(lines[-1]) + 1 + len(word) > width:

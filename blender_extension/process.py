@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""`srbf` in a process of its own: started, listened to through a file, and asked to stop. Nothing here waits."""
+"""Run `srbf` in a separate process: start it, read its output from a file, and stop it. Nothing here blocks."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ HOST = Path(__file__).parent / "host.py"
 
 
 class MissingHostError(Exception):
-    """The library `srbf` is not where this Python looks."""
+    """This Python cannot import the library `srbf`."""
 
 
 class Job:
-    """A running `srbf` command. Its words go through the file `log`, which no end of Blender can break as it would a pipe."""
+    """A running `srbf` command. It writes to the file `log`, which survives the end of Blender, unlike a pipe."""
 
     def __init__(self, what: str, command: list[str], log: Path) -> None:
         self.what = what
@@ -48,10 +48,10 @@ class Job:
         return self.status is None
 
     def poll(self) -> bool:
-        """Read what has been said since; True as long as it runs."""
+        """Read new output; True while the process runs."""
         if self.status is not None:
             return False
-        status = self._process.poll()  # before reading: what an ended process said is in the file
+        status = self._process.poll()  # before reading: the output of an ended process is complete
         self.reader.feed(self._log.read())
         if status is not None:
             self.reader.close()
@@ -61,13 +61,13 @@ class Job:
         return self.running
 
     def stop(self) -> None:
-        """Ask it to end, as Ctrl-C does: a bake keeps its finished lights, and the same command goes on with it."""
+        """Interrupt it like Ctrl-C: a bake keeps its finished lights, and the same command resumes it."""
         if self._process.poll() is None:
             self.stopping = True
             self._process.send_signal(getattr(signal, "CTRL_BREAK_EVENT", signal.SIGINT))
 
     def outcome(self) -> str:
-        """One line on how it ended."""
+        """One line on its result."""
         if self.status == 0:
             return f"{self.what}: done"
         if self.stopping:
@@ -77,21 +77,21 @@ class Job:
 
 
 def host_command(arguments: list[str]) -> list[str]:
-    """`srbf` with these arguments, run by Blender's own Python."""
+    """The command that runs `srbf` with these arguments in Blender's own Python."""
     return [sys.executable, "-P", str(HOST), *arguments]
 
 
 def no_extensions() -> tempfile.TemporaryDirectory[str]:
-    """A folder to name in BLENDER_USER_EXTENSIONS.
+    """An empty folder for BLENDER_USER_EXTENSIONS.
 
-    The bake's Blender starts with factory settings, where no extension is switched on: in the user's own folder it would remove the
-    installed wheels of all of them, and the library's under the running bake.
+    The bake's Blender starts with factory settings, where no extension is enabled: in the user's own folder it would remove the
+    installed wheels of all extensions, including the library's during the bake.
     """
     return tempfile.TemporaryDirectory(prefix="srbf-no-extensions-", ignore_cleanup_errors=True)
 
 
 def environment(extensions: str) -> dict[str, str]:
-    """This process's, `srbf` where Python looks, and `extensions` for the Blenders to come; MissingHostError where there is no `srbf`."""
+    """This process's environment with `srbf` on the Python path, and `extensions` for its Blenders; MissingHostError without `srbf`."""
     spec = find_spec("srbf")
     if spec is None or spec.origin is None:
         raise MissingHostError("expected the library srbf beside this extension, found none; install the extension's zip again")

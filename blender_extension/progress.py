@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a running `srbf bake --json-progress` says: JSON lines of progress among words for the user."""
+"""Output of a running `srbf bake --json-progress`: JSON lines of progress among lines for the user."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WORDS_KEPT = 20  # lines
 
 @dataclass(frozen=True)
 class Progress:
-    """One line {"done": x, "total": y, "what": "...", "seconds_left": s}; seconds_left is None while nobody knows."""
+    """One line {"done": x, "total": y, "what": "...", "seconds_left": s}; seconds_left is None while it is unknown."""
 
     done: float
     total: float
@@ -27,7 +27,7 @@ class Progress:
 
 
 class Reader:
-    """Takes the stream in pieces of any length; `progress` is the last one told, `words` the last lines that are none."""
+    """Takes the stream in pieces of any length; `progress` is the latest one, `words` the last lines of other text."""
 
     def __init__(self) -> None:
         self.progress: Progress | None = None
@@ -35,13 +35,13 @@ class Reader:
         self._rest = b""
 
     def feed(self, piece: bytes) -> None:
-        """Read what is whole of it; the rest waits for its end of line."""
+        """Read the complete lines; the rest waits for its end of line."""
         *lines, self._rest = (self._rest + piece).split(b"\n")
         for line in lines:
             self._take(line.decode("utf-8", errors="replace").strip())
 
     def close(self) -> None:
-        """The stream has ended: a last line without an end counts."""
+        """Called at the end of the stream, so that a last line without a line break counts."""
         self.feed(b"\n")
 
     def _take(self, line: str) -> None:
@@ -53,7 +53,7 @@ class Reader:
 
 
 def parse(line: str) -> Progress | None:
-    """A line of progress, or None of anything else: words, other JSON, numbers that are none."""
+    """The progress of a line; None for other text, other JSON, or invalid numbers."""
     try:
         told = json.loads(line)
     except ValueError:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one job that runs, and the timer that listens to it without holding Blender up."""
+"""The one running job, and the timer that reads its output without blocking Blender."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .process import Job
 
 PERIOD = 0.5  # seconds
 _job: Job | None = None
-_last = ""  # how the last one ended
+_last = ""  # result of the last one
 
 
 def job() -> Job | None:
@@ -18,12 +18,12 @@ def job() -> Job | None:
 
 
 def last() -> str:
-    """One line on how the last job ended; empty where there was none."""
+    """One line on the last job's result; empty without one."""
     return _last
 
 
 def start(new: Job) -> None:
-    """Listen to a job from now on."""
+    """Follow a job from now on."""
     global _job, _last
     _job, _last = new, ""
     if not bpy.app.timers.is_registered(listen):
@@ -31,7 +31,7 @@ def start(new: Job) -> None:
 
 
 def listen() -> float | None:
-    """Read what the job says and have the panel drawn again; the seconds to the next call, None once it has ended."""
+    """Read the job's output and redraw the panel; the seconds to the next call, None once it has ended."""
     global _last
     if _job is None:
         return None
@@ -46,7 +46,7 @@ def listen() -> float | None:
 
 
 def end() -> None:
-    """Blender ends, or the extension goes: nobody could stop the job any more, and a stopped bake loses nothing."""
+    """Stop the job when Blender ends or the extension is disabled; a stopped bake can be resumed."""
     if bpy.app.timers.is_registered(listen):
         bpy.app.timers.unregister(listen)
     running = job()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""An asset on its object inside Blender: materials that emit the relit result, the object's own kept to be put back."""
+"""An asset on its object inside Blender: materials that emit the relit result; the object's own are kept for restoring."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .asset import AssetError, RelightingMaps, read
 from .lights import lights_of
 
 SHOWN = "srbf_shown"  # on an object: what is shown on it, a dictionary of these keys
-ORIGINAL = "srbf_original"  # on a material of ours: whose place it took
-OURS = "srbf_emits"  # on every material of ours, that of an empty slot too: whether it emits times albedo / pi
-EEVEE_TEXTURES = 8  # which leave it room on every graphics card: 16 slots, some of them its own
-ADDED = "ADDED"  # in a slot's place: there was none before
+ORIGINAL = "srbf_original"  # on a material of ours: the one that it replaces
+OURS = "srbf_emits"  # on every material of ours, also for an empty slot: whether it emits times albedo / pi
+EEVEE_TEXTURES = 8  # safe on every graphics card: 16 slots, some used by EEVEE itself
+ADDED = "ADDED"  # marks a slot that did not exist before
 ALBEDO_SOCKETS = {
     "ShaderNodeBsdfPrincipled": "Base Color",
     "ShaderNodeBsdfDiffuse": "Color",
@@ -30,10 +30,10 @@ ALBEDO_SOCKETS = {
 
 
 def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Path | None, layout: nodes.Layout, albedo: bool) -> list[str]:
-    """Put the asset on `obj`; lines for the user. AssetError where it cannot be.
+    """Show the asset on `obj`; lines for the user. AssetError where it cannot be shown.
 
     Irradiance comes out times albedo / pi where `albedo` is asked for and a slot's material has one to find (the color of a Principled,
-    Diffuse or Subsurface BSDF), else as it is; radiance always as it is.
+    Diffuse or Subsurface BSDF), else unchanged; radiance always unchanged.
     """
     maps = read(asset)
     uv_layer = _uv_layer(obj, maps, capture)
@@ -41,11 +41,11 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Pa
     notes = []
     _, point_lights, others = lights_of(scene, scene.srbf.a0)
     if others:
-        notes.append(f"not shown: light of {', '.join(others)} (suns and points are)")
+        notes.append(f"not shown: light of {', '.join(others)} (only suns and point lights are)")
     if scene.render.engine.startswith("BLENDER_EEVEE") and layout == "IMAGES" and maps.k > EEVEE_TEXTURES:
         notes.append(f"EEVEE may have too few texture slots for {maps.k} maps, and show pink: choose Atlas")
     tree = nodes.build(maps, f"srbf {obj.name}", len(point_lights), uv_layer, layout)
-    links = []  # of each slot, to which of object and mesh its material belonged
+    links = []  # for each slot, whether its material belonged to the object or the mesh
     if not len(obj.data.materials):
         obj.data.materials.append(None)
         links.append(ADDED)
@@ -56,8 +56,8 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Pa
         source = albedo and maps.quantity == "irradiance"
         material, found = _material(original, tree, obj.name, source)
         if source and not found:
-            notes.append(f"{original.name if original else 'an empty slot'} has no albedo to find: irradiance is shown as it is")
-        slot.link = "OBJECT"  # the mesh keeps its own, and so do other objects that share it
+            notes.append(f"{original.name if original else 'an empty slot'} has no single albedo: irradiance is shown unchanged")
+        slot.link = "OBJECT"  # so that the mesh and other objects that share it keep their materials
         slot.material = material
     obj[SHOWN] = {"asset": str(asset), "group": tree, "links": json.dumps(links), "layout": layout}
     update(scene)
@@ -65,7 +65,7 @@ def show(scene: bpy.types.Scene, obj: bpy.types.Object, asset: Path, capture: Pa
 
 
 def hide(obj: bpy.types.Object) -> None:
-    """Put the object's own materials back."""
+    """Restore the object's own materials."""
     shown = obj.get(SHOWN)
     if shown is None:
         return
@@ -97,7 +97,7 @@ def shown_objects() -> list[bpy.types.Object]:
 
 
 def update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Bring what is shown in `scene` to its lamps as they stand."""
+    """Update what is shown in `scene` to its current lights."""
     shown = [obj for obj in scene.objects if SHOWN in obj]
     if not shown:
         return
@@ -107,7 +107,7 @@ def update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None)
         tree = obj[SHOWN].get("group")
         try:
             maps = _cached(obj[SHOWN]["asset"])
-        except AssetError:  # moved or removed since: what stands in the nodes stays
+        except AssetError:  # moved or removed by now: the nodes stay unchanged
             continue
         if tree is None or len(tree.nodes) == 0:
             continue
@@ -118,7 +118,7 @@ def update(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None)
 
 @contextmanager
 def own_materials() -> Iterator[None]:
-    """For as long as it lasts every object has its own materials: what is baked is the scene, not its picture."""
+    """A context in which every object has its own materials, so that a bake sees the scene, not the shown asset."""
     before = [(obj, dict(obj[SHOWN]), _albedo_used(obj)) for obj in shown_objects()]
     scenes = {obj: next((s for s in bpy.data.scenes if obj.name in s.objects), None) for obj, _, _ in before}
     for obj, _, _ in before:
@@ -137,7 +137,7 @@ _maps_read: dict[str, tuple[float, RelightingMaps]] = {}
 
 
 def _cached(asset: str) -> RelightingMaps:
-    """The asset, read again when its manifest has changed."""
+    """The asset, reloaded when its manifest has changed."""
     path = Path(asset)
     try:
         changed = (path / "asset.json").stat().st_mtime
@@ -149,7 +149,7 @@ def _cached(asset: str) -> RelightingMaps:
 
 
 def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMaps, point_lights: int) -> bpy.types.NodeTree:
-    """The group for another number of lamps, in the place of the one before."""
+    """Replace the group by one for another number of point lights."""
     name, layout = tree.name, obj[SHOWN]["layout"]
     uv_layer = next(node.uv_map for node in tree.nodes if node.bl_idname == "ShaderNodeUVMap")
     users = [
@@ -171,7 +171,7 @@ def _rebuilt(obj: bpy.types.Object, tree: bpy.types.NodeTree, maps: RelightingMa
 
 
 def _material(original: bpy.types.Material | None, tree: bpy.types.NodeTree, name: str, albedo: bool) -> tuple[bpy.types.Material, bool]:
-    """(a copy of a material that emits the group's color, whether an albedo was found to multiply it by)."""
+    """(a copy of a material that emits the group's color, whether an albedo multiplies it)."""
     if original is None:
         material = bpy.data.materials.new(f"srbf {name}")
         material.use_nodes = True
@@ -204,7 +204,7 @@ def _material(original: bpy.types.Material | None, tree: bpy.types.NodeTree, nam
 
 
 def _albedo(material: bpy.types.Material) -> Any:
-    """What the surface's one diffuse color is: a socket or an RGB triple; None where the surface is not one BSDF that has it."""
+    """The surface's diffuse color: a socket or an RGB triple; None where the surface is not a single BSDF with one."""
     output = material.node_tree.get_output_node("ALL")
     if output is None or not output.inputs["Surface"].links:
         return None
@@ -221,7 +221,7 @@ def _albedo_used(obj: bpy.types.Object) -> bool:
 
 
 def _uv_layer(obj: bpy.types.Object, maps: RelightingMaps, capture: Path | None) -> str:
-    """The layer that the asset was baked on; one that the bake made is carried over from the capture's uv.json."""
+    """The layer that the asset was baked on; a layer that the bake unwrapped is restored from the capture's uv.json."""
     layers = obj.data.uv_layers
     if maps.uv_layer is None:
         if layers.active is None:
@@ -235,8 +235,8 @@ def _uv_layer(obj: bpy.types.Object, maps: RelightingMaps, capture: Path | None)
     uv = np.array(json.loads(path.read_text(encoding="utf-8"))["per_loop"], np.float32)
     if uv.shape != (len(obj.data.loops), 2):
         raise AssetError(
-            f"expected {len(uv)} corners on {obj.name!r}, as the bake made a UV layer for, found {len(obj.data.loops)}; "
-            "apply its modifiers, as the bake did, or give it a lightmap UV layer and bake anew"
+            f"expected {len(uv)} corners on {obj.name!r}, as in the bake's UV layer, found {len(obj.data.loops)}; "
+            "apply its modifiers, as the bake did, or give it a lightmap UV layer and bake again"
         )
     layer = layers.new(name=maps.uv_layer, do_init=False)
     if layer is None:

@@ -7,11 +7,12 @@ from srbf.capture import Capture
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.io.image import write_picture
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.methods import relight
+from srbf.methods.relighting_map import RelightingMap
 
 
 def main(capture_folder: str, picture: str) -> None:
-    """Fit 25 maps, say the held-out error, relight by a blue sky light and, where there are positions, a warm lamp."""
+    """Fit 25 maps, print the held-out error, relight by a blue directional light and, where there are positions, a warm point light."""
     capture = Capture.open(capture_folder)
     asset = RelightingMap(k=25).encode(capture)
     errors = evaluate(asset, capture)

@@ -1,4 +1,4 @@
-"""The Blender extension as a zip: blender_extension/ with the library's own wheel and those that it needs.
+"""Builds the Blender extension as a zip: blender_extension/ with the wheel of the library and those of its dependencies.
 
 Built and validated by Blender's own tool, which the bpy of the project's virtual environment ships; run by `make extension`. numpy comes
 with Blender. scikit-learn, which clustered eigen maps alone need, is left out: they ask for it by name.
@@ -17,19 +17,19 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 LEFT_OUT = ("numpy", "scikit-learn", "imagecodecs")  # the last: 25 MB for profiles and packed TIFF, which `srbf import` asks for by name
-# Of each platform of Blender's the tags of wheels that its builds can load.
+# Wheel tags that the builds of each of Blender's platforms can load.
 PLATFORMS = {
     "linux-x64": ["manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"],
     "windows-x64": ["win_amd64"],
     "macos-arm64": ["macosx_14_0_arm64", "macosx_13_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"],
 }
-# Blender's Python and the versions that have it: from, and up to but without.
+# Blender's Python and its range of versions, the last one excluded.
 BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
-NUMPY = {"3.11": "numpy==1.26.*", "3.13": "numpy>=2"}  # what Blender brings: others must agree with it
+NUMPY = {"3.11": "numpy==1.26.*", "3.13": "numpy>=2"}  # included in Blender; others must be compatible
 
 
 def main() -> int:
-    """Build one zip for each platform; 1 where a download or Blender's tool fails."""
+    """Build one zip per platform; returns 1 if a download or Blender's tool fails."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     here = f"{sys.version_info.major}.{sys.version_info.minor}"
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "dist", help="folder of the zips")
@@ -60,8 +60,8 @@ def build(work: Path, output: Path, platform: str, python: str, oldest: str, new
     shutil.copytree(ROOT / "blender_extension", staged, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "LICENSES" / "GPL-3.0-or-later.txt", staged / "LICENSE")
     wheels = staged / "wheels"
-    _pip("wheel", "--no-deps", "--wheel-dir", wheels, ROOT)
-    (own,) = wheels.glob("*.whl")
+    _pip("wheel", "--no-deps", "--wheel-dir", wheels, ROOT, ROOT / "blender_bake")
+    (own,) = wheels.glob("srbf-*.whl")
     tags = [word for tag in PLATFORMS[platform] for word in ("--platform", tag)]
     requirements = [*_requirements(python), NUMPY[python]]
     _pip("download", "--only-binary=:all:", "--python-version", python, *tags, "--dest", wheels, *requirements)

@@ -1,4 +1,4 @@
-"""`python -m scripts.film_viewer ASSET --mesh SCENE.glb -o FILM.webp`: what the viewer shows while sun and camera go round, looping.
+"""`python -m scripts.film_viewer ASSET --mesh SCENE.glb -o FILM.webp`: a looping film of the viewer while light and camera orbit.
 
 Needs what the viewer's tests need: `make setup-test`.
 """
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def state(turn: float, target: np.ndarray, distance: float) -> str:
-    """The page's address at a part of the whole round: the camera goes once about the target, the sun the other way."""
+    """The page's address at the fraction `turn` of an orbit: the camera orbits the target, the sun in the opposite direction."""
     angle = 2 * np.pi * turn
     eye = target + distance * np.array([np.sin(0.46 + angle) * 0.83, -np.cos(0.46 + angle) * 0.83, 0.56])
     elevation = np.radians(48 + 12 * np.sin(2 * angle))
@@ -73,7 +73,7 @@ def state(turn: float, target: np.ndarray, distance: float) -> str:
 
 @contextmanager
 def browser(asset: Path, mesh: Path) -> Iterator[tuple[Any, str]]:
-    """A Chromium that is told what to do, and the address of the page."""
+    """A function that sends commands to a Chromium, and the address of the page."""
     server = ViewerServer(contents_of([asset], None, mesh))
     Thread(target=server.serve_forever, daemon=True).start()
     with (

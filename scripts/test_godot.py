@@ -1,4 +1,4 @@
-"""Compare Godot's pixels with numpy's, on both renderers, in the chroot that scripts/godot-chroot makes; exits 1 where they differ.
+"""Compare Godot's pixels with numpy's, on both renderers, in the chroot that scripts/godot-chroot makes; exits 1 if they differ.
 
 Every method, as a picture (canvas) and on a mesh (spatial), lit by Godot's own directional, omni and spot lights. CI does not run it.
     python scripts/test_godot.py [--keep]
@@ -49,14 +49,14 @@ Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.fl
 COLOR = (0.9, 0.5, 0.7)  # as Godot's inspector shows it: sRGB
 STRAIGHT = np.eye(4)
 ASKEW = np.array([[0, 0, 1.25, 0.3], [1.25, 0, 0, -0.1], [0, 1.25, 0, 0.2], [0, 0, 0, 1]], np.float64)  # turned, scaled and moved
-TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon is not the sky's
+TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon differs from the environment's
 PLACE = np.array([0.4, 1.3, -0.2])
 TOWARDS = np.array([0.3, 0.8, 0.4]) / np.linalg.norm([0.3, 0.8, 0.4])
 
 
 @dataclass(frozen=True)
 class Lit:
-    """A light as Godot's node, by property, and what the documentation says it is here, in Godot's frame."""
+    """A light as the properties of a Godot node, and its documented meaning in Godot's frame."""
 
     node: dict[str, Any]
     direction: ndarray
@@ -66,7 +66,7 @@ class Lit:
     spot: tuple[float, float] | None = None  # half-angle (rad), exponent of its edge
 
     def light(self) -> Light:
-        """The same light of ours, in the world, z up."""
+        """The same light in srbf, in the world frame, z up."""
         color = tuple((np.pi * self.energy * decode_srgb(np.array(COLOR))).tolist())
         towards, place = Z_UP[:3, :3] @ self.direction, tuple(Z_UP[:3, :3] @ self.position)
         falloff = "inverse-square" if self.decay >= 1.5 else "linear"
@@ -112,12 +112,12 @@ LIGHTS = {
     "spot": [SPOT],
     "all": [SUN, OMNI, SPOT],
     "by table": [SUN],
-    "sky": [SUN],
+    "environment": [SUN],
 }
-SKY = (
+ENVIRONMENT = (
     np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
-)  # a panorama of Godot's, which begins where x is 0 and -z is ahead
-SKY_ENERGY = 0.7
+)  # a panorama in Godot's layout, which starts at x = 0, -z forward
+ENVIRONMENT_ENERGY = 0.7
 
 
 def affine(asset: Asset) -> Asset:
@@ -131,7 +131,7 @@ def affine(asset: Asset) -> Asset:
 
 
 def assets() -> Iterator[tuple[str, Asset, Settings]]:
-    """Each method and encoding, of 14 x 9 random texels, none symmetric; what is compressed has whole blocks of 4 x 4."""
+    """Each method and encoding, of 14 x 9 random texels without symmetry; compressed ones have whole blocks of 4 x 4."""
     makers: dict[str, Callable[[], Asset]] = {
         "relighting map, half": lambda: build_asset(25, "half", ambient=True),
         "relighting map, uint8": lambda: build_asset(7, "uint8"),
@@ -155,14 +155,14 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
 
 
 def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
-    """What compare.gd is to render: name, mode, whether the viewport is linear, where the asset stands, lights."""
-    every = [name for name in LIGHTS if name not in ("by table", "sky")]
+    """The jobs of godot_compare.gd: name, mode, whether the viewport is linear, transform of the asset, lights."""
+    every = [name for name in LIGHTS if name not in ("by table", "environment")]
     for name in every:
         placed = ASKEW if name == "all" else STRAIGHT
         yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
     yield {"name": "all", "mode": "canvas", "hdr": False, "placed": STRAIGHT}
     for placed in (STRAIGHT, ASKEW, TIPPED):
-        yield {"name": "sky", "mode": "canvas", "hdr": True, "placed": placed}
+        yield {"name": "environment", "mode": "canvas", "hdr": True, "placed": placed}
     if asset.method != "relighting-map":
         yield {"name": "by table", "mode": "canvas", "hdr": True, "placed": STRAIGHT, "by_table": True}
     if np.array_equal(asset.asset_from_world, np.eye(4)):
@@ -174,13 +174,15 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
 
 
 def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
-    """What srbf.methods.relight says; of irradiance what white sends out."""
+    """The result of srbf.methods.relight; for irradiance, the radiance of a white surface."""
     world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
     moved = asset.asset_from_world @ np.linalg.inv(world_from_asset)
     instance = replace(asset, manifest={**asset.manifest, "asset_from_world": moved.tolist()})
     lights: list[Light] = [lit.light() for lit in LIGHTS[job["name"]]]
-    if job["name"] == "sky":
-        lights.append(EnvironmentLight(np.roll(SKY, 4, axis=1), (SKY_ENERGY,) * 3))  # ours begins a quarter turn further
+    if job["name"] == "environment":
+        lights.append(
+            EnvironmentLight(np.roll(ENVIRONMENT, 4, axis=1), (ENVIRONMENT_ENERGY,) * 3)
+        )  # this layout starts a quarter turn later
     picture = far_point_light(instance, SUN) if job.get("by_table") else relight(instance, lights)
     if asset.quantity == "irradiance":
         picture = picture / np.pi
@@ -190,7 +192,7 @@ def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
 
 
 def far_point_light(asset: Asset, sun: Lit) -> ndarray:
-    """A directional light read from the table: a lamp so far away that all receivers see it from one direction."""
+    """A directional light read from the table: a point light so distant that its direction is the same at all receivers."""
     far = sun.light()
     assert isinstance(far, DirectionalLight)
     place = tuple((np.array(far.direction) * FAR).tolist())
@@ -198,7 +200,7 @@ def far_point_light(asset: Asset, sun: Lit) -> ndarray:
 
 
 def white(asset: Asset, lit: Lit) -> ndarray:
-    """What the documentation says that Godot's own light leaves on a white diffuse plane, the asset's: its irradiance over pi."""
+    """Radiance of a white diffuse plane under Godot's own light, by its documentation: the irradiance over pi."""
     light = lit.light()
     if isinstance(light, DirectionalLight):
         towards, strength = np.array(light.direction), np.ones((asset.height, asset.width))
@@ -213,7 +215,7 @@ def white(asset: Asset, lit: Lit) -> ndarray:
 
 
 def held(picture: ndarray, job: dict[str, Any], renderer: str) -> ndarray:
-    """The picture as that target holds it. Compatibility encodes 3D, in half floats too, by a curve without sRGB's straight toe."""
+    """The image as stored in that target. Compatibility encodes 3D, also in half floats, by a curve without sRGB's linear segment."""
     if job["mode"] != "canvas" and renderer == "gl_compatibility":
         encoded = np.maximum(1.055 * picture ** (1 / 2.4) - 0.055, 0)
         return encoded if job["hdr"] else np.minimum(encoded, 1)
@@ -221,7 +223,7 @@ def held(picture: ndarray, job: dict[str, Any], renderer: str) -> ndarray:
 
 
 def run(folder: Path, chroot: Path, *arguments: str, display: bool = False) -> str:
-    """Godot in the chroot on a project below its /tmp; what it said."""
+    """Run Godot in the chroot on a project below its /tmp; returns its output."""
     inside = "/" + folder.relative_to(chroot).as_posix()
     screen = ["xvfb-run", "-a"] if display else []
     command = ["chroot", str(chroot), "env", "HOME=/tmp", *screen, "godot", "--audio-driver", "Dummy", "--path", inside, *arguments]
@@ -233,7 +235,7 @@ def run(folder: Path, chroot: Path, *arguments: str, display: bool = False) -> s
 
 
 def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: bool) -> int:
-    """Print a line for each renderer and job; how many differ."""
+    """Print a line per renderer and job; returns the number of differences."""
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
     write(made, folder, settings)
     asset = Asset.open(folder)  # blocks decoded
@@ -243,7 +245,7 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     written = [
         {
             **{key: job[key] for key in ("name", "mode", "hdr")},
-            "sky": SKY.ravel().tolist() if job["name"] == "sky" else None,
+            "sky": ENVIRONMENT.ravel().tolist() if job["name"] == "environment" else None,  # words: ok
             "by_table": job.get("by_table", False),
             "transform": transform(job["placed"]),
             "lights": [lit.node for lit in LIGHTS[job["name"]]],

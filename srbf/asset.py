@@ -4,32 +4,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy import ndarray
 
 from srbf import schemas
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.basis.gaussian import GaussianBasis, weight
+from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED, Quantity, check_version
+from srbf.captured_light import UNIT_TOLERANCE
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.io import files
-from srbf.io.containers import TextureArray, read_texture_array
-from srbf.io.containers.texture_array import level_bytes, level_size
+from srbf.io.containers import read_texture_array
+from srbf.io.containers.texture_array import TextureArray, level_bytes, level_size
 from srbf.io.image import Encoding, read_image, require_finite, write_images
+from srbf.registry import method_named
 from srbf.sphere import Domain
+
+if TYPE_CHECKING:
+    from srbf.methods.protocol import Method
 
 LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
 MANIFEST = "asset.json"
-LAYERS = {"relighting-map": "maps", "eigen-map": "planes", "clustered-eigen-map": "planes"}  # the key of a method's images
 GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
 SCENE_FILE = "scene.glb"
-UNIT_TOLERANCE = 1e-3
-TABLE_ENTRY_TOLERANCE = 1e-5  # float32 rounding of an entry, and of a manifest's spread
 
 
 @dataclass(eq=False)
@@ -37,7 +39,7 @@ class Asset:
     """Stored layers with the rule value = stored * scale + bias, the functions that they weigh, and the receivers' geometry.
 
     `stored` (N, H, W, C) is float16, float32 or uint8 as on disk (a byte counts as byte / 255; BC7 and BC1 are decoded to bytes, of mip
-    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; scalar planes
+    levels the full size alone is kept); `scale`, `bias` (N, C). Relighting maps are N = K layers of C = 3, one a Gaussian; coefficient maps
     are four to a layer, C = 4.
     `tables` holds what the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32,
     `w_table` (rows, columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
@@ -79,8 +81,8 @@ class Asset:
         return len(self.stored)
 
     @property
-    def scalars(self) -> int:
-        """How many scalar planes."""
+    def components(self) -> int:
+        """How many components."""
         return self.manifest["scalars"]
 
     @property
@@ -89,9 +91,32 @@ class Asset:
         return self.manifest.get("clusters", 1)
 
     @property
+    def layers_key(self) -> str:
+        """Key of asset.json that lists the layers."""
+        return method_named(self.method).layers
+
+    @property
     def layers(self) -> list[dict[str, Any]]:
         """The manifest's entry of every stored layer: file, encoding, scale, bias; in a texture array also layer and levels."""
-        return self.manifest[LAYERS[self.method]]
+        return self.manifest[self.layers_key]
+
+    @property
+    def receivers(self) -> list[dict[str, Any]]:
+        """What the asset was captured for; empty where it says nothing. Assets of before this was a key of its own have it in `source`."""
+        for place in (self.manifest, self.manifest.get("source", {})):
+            if "receiver" in place or "receivers" in place:
+                return place["receivers"] if "receivers" in place else [place["receiver"]]
+        return []
+
+    @property
+    def receiver(self) -> dict[str, Any]:
+        """The first of the receivers; empty where the asset says nothing."""
+        return next(iter(self.receivers), {})
+
+    @property
+    def receiver_kind(self) -> str:
+        """`view`, `lightmap` or `vertices`; a picture of which nothing is known is a view."""
+        return str(self.receiver.get("kind") or "view")
 
     @property
     def encoding(self) -> LayerEncoding:
@@ -114,7 +139,7 @@ class Asset:
 
     @property
     def light_functions(self) -> LightFunctions:
-        """w_f(L) of scalar planes: function (S + 1) m + j is that of plane j in cluster m, j = 0 the mean's."""
+        """w_f(L) of coefficient maps: function (S + 1) m + j is that of component j in cluster m, j = 0 the mean's."""
         basis = self.manifest["light_basis"]
         return LightFunctions(np.array(basis["centers"], np.float64), np.array(basis["spreads"]), self.tables["light_coefficients"])
 
@@ -157,8 +182,13 @@ class Asset:
             return stored
         return stored * self.scale[:, None, None] + self.bias[:, None, None]
 
+    def is_plain(self) -> bool:
+        """Whether what is stored needs no decoding: scale 1 and bias 0, and unused channels (scale 0) hold 0."""
+        unused = self.scale == 0
+        return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
+
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to ask it for answers, not to save."""
+        """An asset of some flat `texels` alone, (1, n) of them, without their geometry: to get responses of, not to save."""
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
@@ -189,10 +219,10 @@ class Asset:
         return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"")
 
     def save(self, folder: Path, force: bool = False) -> None:
-        """Write the folder whole or not at all, an image a layer; fills in `sha256`."""
+        """Write the folder whole or not at all, one image per layer; fills in `sha256`."""
         with files.atomic_folder(folder, force, MANIFEST) as temporary:
             if "layer" in self.layers[0]:  # read from a texture array: saved as what it decoded to
-                self.manifest[LAYERS[self.method]] = layer_entries(LAYERS[self.method][:-1], self.held, self.scale, self.bias)
+                self.manifest[self.layers_key] = layer_entries(self.layers_key[:-1], self.held, self.scale, self.bias)
             self.write(temporary)
 
     def write(self, folder: Path, layers: bool = True) -> None:
@@ -208,7 +238,7 @@ class Asset:
         if self.scene is not None:
             (folder / self.manifest["scene"]).write_bytes(self.scene)
         self.manifest["sha256"] = files.checksums(folder, MANIFEST)
-        schemas.check(self.manifest, "asset", MANIFEST)
+        schemas.check_asset(self.manifest, method_named(self.method).stem(), MANIFEST)
         files.write_json(folder / MANIFEST, self.manifest)
 
     @staticmethod
@@ -220,16 +250,15 @@ class Asset:
             raise ManifestError(f"expected an asset with an {MANIFEST} at {folder}, found none; srbf fit makes one")
         manifest = files.read_json(path)
         check_version(manifest, "srbf-asset", path)
-        if manifest.get("method") not in LAYERS:
-            raise ManifestError(f"expected a method of {', '.join(LAYERS)} in {path}, found {manifest.get('method')!r}")
-        schemas.check(manifest, "asset", str(path))
-        reader = _Reader(folder, manifest)
-        layers = manifest[LAYERS[manifest["method"]]]
+        method = _method(manifest, path)
+        schemas.check_asset(manifest, method.stem(), str(path))
+        reader = AssetReader(folder, manifest)
+        layers = manifest[method.layers]
         if len({entry["encoding"] for entry in layers}) != 1:
             raise ManifestError(f"expected one encoding for all layers in {path}, found several")
         encoding: LayerEncoding = layers[0]["encoding"]
         channels = len(layers[0]["scale"])
-        tables = _read_maps(reader, path) if manifest["method"] == "relighting-map" else _read_planes(reader, path)
+        tables = method.read_tables(reader)
         if any("layer" in entry for entry in layers) or encoding in ("bc7", "bc1"):
             stored = _read_layers(reader, layers, channels, path)
         else:
@@ -253,11 +282,22 @@ SUFFIX: dict[Encoding, str] = {"half": "exr", "float": "exr", "uint8": "png"}
 
 
 @dataclass(frozen=True)
-class _Reader:
+class AssetReader:
     """Reads an asset's files: inside its folder, of the recorded checksum and size, and finite."""
 
     folder: Path
     manifest: dict[str, Any]
+
+    @property
+    def path(self) -> Path:
+        """Of the manifest, for messages."""
+        return self.folder / MANIFEST
+
+    def check_unit(self, vectors: list[list[float]]) -> None:
+        """ManifestError where a listed center is not a unit vector."""
+        lengths = np.linalg.norm(np.array(vectors, np.float64), axis=1)
+        if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
+            raise ManifestError(f"expected unit centers in {self.path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
 
     def image(self, name: str, channels: int) -> np.ndarray:
         pixels = self._pixels(name, channels)
@@ -304,7 +344,7 @@ class _Reader:
         return pixels
 
 
-def _read_layers(reader: _Reader, layers: list[dict[str, Any]], channels: int, path: Path) -> ndarray:
+def _read_layers(reader: AssetReader, layers: list[dict[str, Any]], channels: int, path: Path) -> ndarray:
     """The full size of layers in texture arrays, (N, H, W, C); refuses arrays that are not what the entries say."""
     textures: dict[str, TextureArray] = {}
     decoded: dict[str, ndarray] = {}
@@ -328,56 +368,11 @@ def _read_layers(reader: _Reader, layers: list[dict[str, Any]], channels: int, p
     return pixels
 
 
-def _read_maps(reader: _Reader, path: Path) -> dict[str, ndarray]:
-    """The R table of relighting maps; refuses centers and spread that are not theirs."""
-    manifest = reader.manifest
-    if manifest["basis"]["kind"] != "gaussian":
-        return {}
-    if "r_table" not in manifest:
-        raise ManifestError(f"expected an r_table for Gaussians in {path}, found none")
-    _check_centers(manifest["basis"]["centers"], path)
-    if len(manifest["basis"]["centers"]) != len(manifest["maps"]):
-        found = f"{len(manifest['basis']['centers'])} centers, {len(manifest['maps'])} maps"
-        raise ManifestError(f"expected as many centers as maps in {path}, found {found}")
-    size, spread = manifest["r_table"]["size"], manifest["basis"]["spread"]
-    table = np.ascontiguousarray(reader.table("r_table", (1, size), 1)[0, :, 0])
-    error = float(np.abs(table - weight(np.linspace(-1, 1, size), spread)).max())
-    if error > TABLE_ENTRY_TOLERANCE:
-        raise ManifestError(f"expected the R table of spread {spread:g} in {path}, found one off by {error:.2g}")
-    return {"r_table": table}
-
-
-def _read_planes(reader: _Reader, path: Path) -> dict[str, ndarray]:
-    """The light functions, their octahedral table and the clusters of scalar planes."""
-    manifest = reader.manifest
-    scalars, clusters = manifest["scalars"], manifest.get("clusters", 1)
-    if len(manifest["planes"]) != -(-scalars // 4):
-        found = f"{len(manifest['planes'])} images"
-        raise ManifestError(f"expected {scalars} scalars four to an image in {path}, found {found}")
-    functions = clusters * (scalars + 1)
-    basis = manifest["light_basis"]
-    _check_centers(basis["centers"], path)
-    if len(basis["spreads"]) != functions:
-        raise ManifestError(f"expected a spread for each of {functions} light functions in {path}, found {len(basis['spreads'])}")
-    size, columns = manifest["w_table"]["size"], manifest["w_table"]["columns"]
-    tables = {
-        "light_coefficients": reader.table("light_coefficients", (functions, len(basis["centers"])), 3),
-        "w_table": reader.table("w_table", (-(-functions // columns) * size, columns * size), 3).astype(np.float16),
-    }
-    if "cluster_index" in manifest:
-        index = np.round(reader.table("cluster_index", (manifest["height"], manifest["width"]), 1)[:, :, 0] * 255).astype(np.uint8)
-        if index.max() >= clusters:
-            raise ManifestError(f"expected cluster indices below {clusters} in {path}, found {index.max()}")
-        tables["cluster_index"] = index
-    elif clusters > 1:
-        raise ManifestError(f"expected a cluster_index for the {clusters} clusters in {path}, found none")
-    return tables
-
-
-def _check_centers(listed: list[list[float]], path: Path) -> None:
-    lengths = np.linalg.norm(np.array(listed, np.float64), axis=1)
-    if (np.abs(lengths - 1) > UNIT_TOLERANCE).any():
-        raise ManifestError(f"expected unit centers in {path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
+def _method(manifest: dict[str, Any], path: Path) -> type[Method]:
+    try:
+        return method_named(str(manifest.get("method")))
+    except InputError as error:
+        raise ManifestError(f"{error} in {path}") from None
 
 
 def layer_entries(stem: str, encoding: Encoding, scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]) -> list[dict]:

@@ -1,7 +1,8 @@
-"""The demo: one of our scenes baked, fitted and shown, from nothing to a folder one wants to look at."""
+"""The demo: one of the project's scenes built, baked, fitted and reported in one folder."""
 
 from __future__ import annotations
 
+import importlib.util
 import subprocess
 import sys
 import time
@@ -10,22 +11,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import srbf
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture, Quantity
-from srbf.errors import BakeError, InputError, OutputExistsError
-from srbf.evaluation.errors_by_role import TrainWatch, evaluate
+from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExistsError
+from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
 from srbf.fitting.auto_method import within_budget
 from srbf.io import files
+from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report import write_report
 
 
 @dataclass(frozen=True)
 class DemoScene:
-    """What the article showed of a scene: its receiver, and in what quantity."""
+    """A scene of the article: its receiver and quantity."""
 
     receiver: Receiver
     size: tuple[int, int]
@@ -33,8 +34,8 @@ class DemoScene:
     published: tuple[int, int]
 
     def settings(self, lights: int, quality: Quality) -> BakeSettings:
-        """A `draft` takes a minute or two; what is to be published has more texels, twice the samples, and on a lightmap a sun as
-        wide as the lights stand apart, so that shadows are as soft as so many lights can tell."""
+        """A `draft` takes a minute or two. `publish` has more texels, twice the samples, and on a lightmap a sun as wide as the mean light
+        spacing, the sharpest shadows that so many lights resolve."""
         draft = BakeSettings(self.receiver, *self.size, lights=lights, holdout_samples=HOLDOUT_SAMPLES, quantity=self.quantity)
         if quality == "draft":
             return draft
@@ -43,10 +44,10 @@ class DemoScene:
 
 
 Quality = Literal["draft", "publish"]
-SAMPLES = 4  # of what is to be published
-MAPS = 25  # of the article's own asset of the scene, beside the smallest good one
-FINE_MAPS = 100  # bytes, of what is to be published: neither seams of clusters nor much blur, at 400 bytes a texel
-HOLDOUT_SAMPLES = 24  # fewer than a bake's default: both scenes are clean by then, and the demo is to take minutes
+SAMPLES = 4  # of `publish`
+MAPS = 25  # of the article's asset, beside the smallest good one
+FINE_MAPS = 100  # as bytes, of `publish`: no cluster borders and little blur, at 400 bytes per texel
+HOLDOUT_SAMPLES = 24  # fewer than a bake's default, enough for both scenes, to finish in minutes
 SCENES = {
     "caustics": DemoScene(Receiver("lightmap", "Table"), (256, 256), "irradiance", (512, 512)),
     "house": DemoScene(Receiver("view"), (256, 192), "radiance", (512, 384)),
@@ -54,16 +55,22 @@ SCENES = {
 
 
 def scene_script(name: str) -> Path:
-    """The bpy script of a demo scene: in the checkout's data/scenes, or beside the installed package."""
-    package = Path(srbf.__file__).parent
-    for folder in (package.parent / "data" / "scenes", package / "data" / "scenes"):
+    """The bpy script of a scene: in the installed package blender_bake, or in the data/scenes of its checkout.
+
+    MissingLibraryError without that package, which the distribution srbf-blender holds; InputError where it has no such scene.
+    """
+    package = importlib.util.find_spec("blender_bake")
+    if package is None or package.origin is None:
+        raise MissingLibraryError("expected the demo's scenes, which are in srbf-blender, found it missing; pip install srbf[blender]")
+    root = Path(package.origin).parent
+    for folder in (root / "scenes", root.parent / "data" / "scenes"):
         if (folder / f"{name}.py").is_file():
             return folder / f"{name}.py"
     raise InputError(f"expected a demo scene of {', '.join(SCENES)} with its script installed, found none named {name!r}")
 
 
 def build_scene(name: str, path: Path) -> None:
-    """Run the scene's script in a process of its own to write the .blend at `path`; BakeError with its last words on failure."""
+    """Run the scene's script in a separate process to write the .blend at `path`; BakeError with its last output on failure."""
     temporary = path.with_name(f".{path.stem}.partial.blend")
     finished = subprocess.run(
         [sys.executable, str(scene_script(name)), str(temporary)], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
@@ -77,7 +84,7 @@ def build_scene(name: str, path: Path) -> None:
 
 @dataclass(frozen=True)
 class Demo:
-    """What a demo left in its folder: the report's page, assets with the one to look at first, their capture, and a lightmap's scene."""
+    """The results of a demo: the report's page, the assets (the first is shown first), their capture, and a lightmap's scene."""
 
     page: Path
     assets: tuple[Path, ...]
@@ -88,7 +95,7 @@ class Demo:
 def run_demo(
     name: str, folder: Path, lights: int, reporter: Reporter, progress: Callable[[int, int, str], None], quality: Quality = "draft"
 ) -> Demo:
-    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Run again, it goes on where it stopped."""
+    """Build, bake, fit, evaluate and report the scene `name` in `folder`. Another run resumes it."""
     scene = SCENES[name]
     files.make_folder(folder)
     blend, capture_folder, asset_folder = folder / f"{name}.blend", folder / "capture", folder / "asset"
@@ -104,15 +111,15 @@ def run_demo(
         baked = Bake(blend, capture_folder, settings).run(reporter)
     except OutputExistsError as error:
         raise OutputExistsError(
-            f"expected this demo's own capture at {capture_folder}, found another; choose another -o, or delete it"
+            f"expected the capture of this demo at {capture_folder}, found another; choose another folder, or delete it"
         ) from error
     if baked:
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
     method = within_budget(capture, say=reporter.say)
-    watch = TrainWatch(capture)
-    asset = method.encode(capture, lambda done, total: progress(done, total, "fit"), watch.look)
+    watch = TrainErrorAccumulator(capture)
+    asset = method.encode(capture, FitRun(lambda done, total: progress(done, total, "fit"), watch.look))
     timings["fit"] = clock() - started
     started = clock()
     errors = evaluate(asset, capture, lambda done, total: progress(done, total, "evaluate"), watch=watch)
@@ -132,7 +139,7 @@ def run_demo(
     files.make_folder(folder / "report")
     page = write_report(asset, capture, folder / "report", evaluation=errors, timings=timings, asset_folder=asset_folder)
     holdout, size = asset.manifest["error"]["holdout"], asset.bytes_per_texel()["directional"]
-    reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes a texel")
+    reporter.say(f"held-out PSNR {holdout['psnr']:.2f} dB, relative RMSE {holdout['relative_rmse']:.3f}, at {size} bytes per texel")
     assets = [folder / fit for fit in fits]
     assets.insert(1 if quality == "publish" else 0, asset_folder)
     return Demo(page, tuple(assets), capture_folder, mesh)

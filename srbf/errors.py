@@ -1,8 +1,8 @@
-"""Every failure that a user can cause or mend: one root, one line of text (expected, found, what to do)."""
+"""Errors that a user can cause or fix: one root class, one line of text (expected, found, what to do)."""
 
 
 class SrbfError(Exception):
-    """Root of all errors raised on purpose; its text is one line fit to print as it stands."""
+    """Root of all errors raised on purpose; its text is one printable line."""
 
 
 class InputError(SrbfError, ValueError):
@@ -10,19 +10,19 @@ class InputError(SrbfError, ValueError):
 
 
 class ManifestError(SrbfError, ValueError):
-    """A capture.json, asset.json or lights file that breaks its format."""
+    """A capture.json, asset.json or lights file that violates its format."""
 
 
 class ImageError(SrbfError, OSError):
-    """An image that cannot be read or written, or that holds what it must not (NaN, another size)."""
+    """An image that cannot be read or written, or that has invalid content (NaN, another size)."""
 
 
 class OutputExistsError(SrbfError, FileExistsError):
-    """An output that exists and may be neither resumed nor overwritten."""
+    """An output that exists and can be neither resumed nor overwritten."""
 
 
 class MissingLibraryError(SrbfError, ImportError):
-    """An optional library that this step needs and that is not installed."""
+    """A missing optional library that this step needs."""
 
 
 class BakeError(SrbfError, RuntimeError):

@@ -8,11 +8,13 @@ from typing import Any
 from srbf import asset as assets
 from srbf import capture as captures
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture
+from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.errors import ManifestError
 from srbf.io.image import size_of
+from srbf.methods import method_of
 
-UNFINISHED = "bake.json"  # beside the manifest of a bake that can still be gone on with
+UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -49,7 +51,7 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
 
 
 def _samples(capture: Capture) -> dict[str, Any]:
-    """The fewest samples a texel that a light of each role has, where the capture says so."""
+    """The fewest samples per texel that a light of each role has, where the capture says so."""
     lights = capture.manifest["lights"]
     if not all("samples" in light for light in lights):
         return {}
@@ -72,7 +74,7 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "transport": asset.transport,
         "width": asset.width,
         "height": asset.height,
-        **_model(asset),
+        **method_of(asset).describe(asset),
         "domain": asset.domain,
         "encoding": asset.encoding,
         **({"levels": asset.levels} if asset.levels > 1 else {}),
@@ -80,20 +82,6 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "resident_bytes": asset.resident_bytes(),
         "disk_bytes": folder_bytes(folder),
         "error": asset.manifest.get("error", {}),
-    }
-
-
-def _model(asset: Asset) -> dict[str, Any]:
-    """What tells one asset of a method from another."""
-    if asset.method == "relighting-map":
-        basis = asset.manifest["basis"]
-        return {"k": asset.k, "basis": basis["kind"], **({"spread": basis["spread"]} if "spread" in basis else {})}
-    functions = asset.manifest["light_basis"]
-    return {
-        "scalars": asset.scalars,
-        "clusters": asset.clusters,
-        "light_basis": len(functions["centers"]),
-        "table": asset.manifest["w_table"]["size"],
     }
 
 

@@ -1,8 +1,8 @@
-"""Lights to relight by: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
+"""Lights for relighting: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -15,24 +15,24 @@ from srbf.sphere import Domain, normalize
 Falloff = Literal["linear", "inverse-square"]
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
-DEFAULT_RADIUS = 1e-4  # meters: a receiver no nearer than this, so that a lamp in a surface stays finite
+DEFAULT_RADIUS = 1e-4  # meters, the smallest distance counted, so that a light in a surface stays finite
 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it."""
+    """A distant light: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it."""
 
     direction: Triple
     color: Triple = WHITE
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", _unit(self.direction))
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
 
 
 @dataclass(frozen=True)
 class PointLight:
-    """A lamp at `position`; `color` is its irradiance at the distance a0 [Wong2005, "Attenuation"].
+    """A point light at `position` (m); `color` is its irradiance at the distance a0 [Wong2005, "Attenuation"].
 
     falloff `linear` is the article's a0/|L|, `inverse-square` is (a0/|L|)^2; |L| is never less than `radius` (m).
     """
@@ -44,8 +44,8 @@ class PointLight:
     radius: float = DEFAULT_RADIUS
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", _triple(self.position, "position"))
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "position", triple(self.position, "position"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
         for name in ("a0", "radius"):
             value = float(getattr(self, name))
             if not (np.isfinite(value) and value > 0):
@@ -57,7 +57,7 @@ class PointLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(PointLight):
-    """A point light times a smooth cone about `direction` (where it shines): full inside the half-angle `inner`, none past `outer`."""
+    """A point light times a smooth cone about `direction` (its axis): full inside the half-angle `inner`, none past `outer`."""
 
     direction: Triple
     inner: float
@@ -75,10 +75,14 @@ class SpotLight(PointLight):
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
-    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z; `image` is (H, W, 3) float32."""
+    """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z; `image` is (H, W, 3) float32.
+
+    `rotation` (3, 3) turns the map's directions, as `moved` does.
+    """
 
     image: Float32[ndarray, "H W 3"]
     color: Triple = WHITE
+    rotation: Float64[ndarray, "3 3"] = field(default_factory=lambda: np.eye(3))
 
     def __post_init__(self) -> None:
         image = np.asarray(self.image, np.float32)
@@ -87,7 +91,7 @@ class EnvironmentLight:
         if not np.isfinite(image).all():
             raise InputError("expected a finite environment image, found NaN or Inf pixels")
         object.__setattr__(self, "image", image)
-        object.__setattr__(self, "color", _triple(self.color, "color"))
+        object.__setattr__(self, "color", triple(self.color, "color"))
 
 
 Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight
@@ -108,21 +112,32 @@ def spot_cone(cos_angle: Float[ndarray, "*shape"], cos_inner: float, cos_outer: 
 
 
 def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
-    """A directional, point or spot light carried by a 4x4 rigid motion and uniform scale (a0 and radius scale along).
-
-    An environment is not carried: `environment_samples` turns its directions instead.
-    """
+    """A light carried by a 4 x 4 rigid motion and uniform scale: a0 and radius scale along, an environment map turns."""
     linear = matrix[:3, :3]
-    if isinstance(light, EnvironmentLight) or np.array_equal(matrix, np.eye(4)):
+    if np.array_equal(matrix, np.eye(4)):
         return light
+    if isinstance(light, EnvironmentLight):
+        return replace(light, rotation=linear / np.cbrt(np.linalg.det(linear)) @ light.rotation)
     if isinstance(light, DirectionalLight):
         return replace(light, direction=_unit(linear @ light.direction))
     scale = float(np.cbrt(abs(np.linalg.det(linear))))
-    position = _triple(linear @ light.position + matrix[:3, 3], "position")
+    position = triple(linear @ light.position + matrix[:3, 3], "position")
     changes: dict[str, Any] = {"position": position, "a0": light.a0 * scale, "radius": light.radius * scale}
     if isinstance(light, SpotLight):
         return replace(light, direction=_unit(linear @ light.direction), **changes)
     return replace(light, **changes)
+
+
+def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:
+    """Unit direction to the light and its strength, attenuation times a spot's cone, at `positions` of its frame [Wong2005, fig. 8-10]."""
+    vectors = np.array(light.position) - positions  # L = S - P, eq. 3
+    distance = np.linalg.norm(vectors, axis=-1)
+    unit = vectors / np.maximum(distance, 1e-30)[..., None]
+    strength = attenuation(distance, light)
+    if isinstance(light, SpotLight):
+        cos_angle = -(unit @ np.array(light.direction))
+        strength = strength * spot_cone(cos_angle, np.cos(light.inner), np.cos(light.outer))
+    return unit, strength
 
 
 def environment_samples(
@@ -130,8 +145,8 @@ def environment_samples(
 ) -> tuple[Float64[ndarray, "H W 3"], Float64[ndarray, "H W"]]:
     """Directions of an equirectangular map's texel centers turned by `rotation`, and the solid angle (sr) of each texel.
 
-    On the hemisphere only what is above the (turned) horizon counts. Unturned, this is exact: a row that straddles the horizon
-    is cut there and its center moved to the middle of what is left.
+    On the hemisphere only directions above the horizon count. Without rotation this is exact: a row across the horizon is cut there,
+    and its center moves to the middle of the remaining part.
     """
     height, width = image.shape[:2]
     elevation = np.pi / 2 - np.arange(height + 1) * (np.pi / height)
@@ -153,7 +168,8 @@ def environment_samples(
     return directions, solid_angle
 
 
-def _triple(value: object, name: str) -> Triple:
+def triple(value: object, name: str = "a vector") -> Triple:
+    """Three finite numbers as a tuple of floats; InputError for others, with `name` in its text."""
     try:
         array = np.asarray(value, np.float64)
     except (TypeError, ValueError, OverflowError) as error:
@@ -164,5 +180,5 @@ def _triple(value: object, name: str) -> Triple:
 
 
 def _unit(value: object) -> Triple:
-    x, y, z = normalize(np.array(_triple(value, "direction")))
+    x, y, z = normalize(np.array(triple(value, "direction")))
     return (float(x), float(y), float(z))

@@ -56,7 +56,7 @@ def fibonacci(n: int) -> Float64[ndarray, "n 3"]:
 
 
 def all_around(domain: Domain, density: int = 2048) -> Float64[ndarray, "n 3"]:
-    """Directions that fill a domain evenly, to integrate or to look for errors over it: `density` Fibonacci points on a sphere."""
+    """Evenly spread directions of a domain, for integrals or errors over it: `density` Fibonacci points on a sphere."""
     points = fibonacci(density)
     return points if domain == "sphere" else points[points[:, 2] > 0]
 
@@ -98,9 +98,9 @@ def random_directions(n: int, domain: Domain, rng: np.random.Generator) -> Float
 
 
 def farthest_points(points: Float[ndarray, "n d"], count: int) -> list[int]:
-    """At most `count` indices of points in any space, each the farthest from those before it; starts at the largest last coordinate.
+    """At most `count` indices of points in any space, each the farthest from the previous ones; starts at the largest last coordinate.
 
-    Every prefix covers the set within twice the radius that the best choice of as many would [Gonzalez1985]. n x count work.
+    Every prefix covers the set within twice the optimal radius [Gonzalez1985]. Cost: n x count.
     """
     taken: list[int] = []
     distance = np.full(len(points), np.inf)
@@ -108,18 +108,18 @@ def farthest_points(points: Float[ndarray, "n d"], count: int) -> list[int]:
     while len(taken) < min(count, len(points)):
         taken.append(chosen)
         distance = np.minimum(distance, np.linalg.norm(points - points[chosen], axis=1))
-        distance[taken] = -1  # before no other, be they equal
+        distance[taken] = -1  # below all others, equal ones too
         chosen = int(np.argmax(distance))
     return taken
 
 
 def domain_of(directions: Float[ndarray, "n 3"]) -> Domain:
-    """`hemisphere` where every direction has z > 0, else `sphere`."""
+    """`hemisphere` if every direction has z > 0, else `sphere`."""
     return "hemisphere" if bool((np.asarray(directions)[:, 2] > 0).all()) else "sphere"
 
 
 def nearest_neighbor_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
-    """Geodesic distance (rad) of every point to its nearest other point; pi for a lone point. n x n work."""
+    """Geodesic distance (rad) of every point to its nearest other point; pi for a single point. Cost: n x n."""
     points = np.asarray(points, np.float64)
     if len(points) < 2:
         return np.full(len(points), np.pi)
@@ -131,11 +131,11 @@ def nearest_neighbor_angles(points: Float[ndarray, "n 3"]) -> Float64[ndarray, "
 
 
 def mean_spacing(points: Float[ndarray, "n 3"]) -> float:
-    """How far apart (rad) points of a set stand: the mean geodesic distance of each to its four nearest others.
+    """Mean spacing (rad) of a point set: the mean geodesic distance of each point to its four nearest others.
 
     The pitch of a square lattice, and within 5 % of sqrt(area / n) for Hammersley and Fibonacci sets of some hundred points: 10.3
-    degrees for 400 on the sphere, 7.4 on the hemisphere. It needs no area, so it holds for a list that covers part of the sky. pi for
-    a lone point. n x n work.
+    degrees for 400 on the sphere, 7.4 on the hemisphere. It needs no area, so it also holds for a set on part of the sphere. pi for a
+    single point. Cost: n x n.
     """
     points = np.asarray(points, np.float64)
     others = min(4, len(points) - 1)

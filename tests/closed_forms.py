@@ -36,7 +36,7 @@ def flat_normals(corners: np.ndarray) -> np.ndarray:
 def build_plane(
     *occluders: np.ndarray,
     panes: tuple[np.ndarray, ...] = (),
-    tint: np.ndarray | None = None,
+    transmittance: np.ndarray | None = None,
     size: int = 40,
     half: float = 1.0,
     albedo: tuple[float, float, float] | None = None,
@@ -54,7 +54,7 @@ def build_plane(
     corners = np.concatenate(parts)
     opaque = sum(len(part) for part in parts[: 1 + len(occluders)])
     material = np.where(np.arange(len(corners)) < opaque, OPAQUE, GLASS)
-    curve = np.full((KNOTS, 3), 0.5, np.float32) if tint is None else tint.astype(np.float32)
+    curve = np.full((KNOTS, 3), 0.5, np.float32) if transmittance is None else transmittance.astype(np.float32)
     triangles = Triangles(corners, flat_normals(corners), material, np.ones(len(corners), bool), np.stack([np.zeros_like(curve), curve]))
     images = {"position": position, "normal": normal}
     if albedo is not None:

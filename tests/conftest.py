@@ -19,7 +19,7 @@ import pytest  # noqa: E402
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-# Begun in the background of a script, Python is told to ignore Ctrl-C, and so would be the processes that tests interrupt.
+# Begun in the background of a script, Python ignores Ctrl-C, and so would the processes that tests interrupt.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parent.parent / "srbf"

@@ -53,7 +53,7 @@ def build_asset(
 
 
 def build_planes(
-    scalars: int = 9,
+    components: int = 9,
     clusters: int | None = None,
     encoding: str = "float",
     height: int = 9,
@@ -64,21 +64,21 @@ def build_planes(
     patches: bool = False,
     seed: int = 0,
 ) -> Asset:
-    """An asset of random scalar planes with smooth random light functions; clusters are scattered, or in patches of 4 x 3 texels.
+    """An asset of random coefficient maps with smooth random light functions; clusters are scattered, or in patches of 4 x 3 texels.
 
     None clusters is an eigen map, a number of them a clustered one.
     """
-    rng = np.random.default_rng([seed, scalars, clusters or 0])
-    count = (clusters or 1) * (scalars + 1)
+    rng = np.random.default_rng([seed, components, clusters or 0])
+    count = (clusters or 1) * (components + 1)
     centers = point_set("fibonacci", 24, "sphere")
     coefficients = rng.normal(size=(count, len(centers), 3)).astype(np.float32)
     functions = LightFunctions(centers, rng.choice([0.5, 0.8], count), coefficients)
     table = octahedral_table(functions, "sphere", sizes=(17,))
-    layers = np.zeros((-(-scalars // 4), height, width, 4), np.float32)
-    for j in range(scalars):
+    layers = np.zeros((-(-components // 4), height, width, 4), np.float32)
+    for j in range(components):
         layers[j // 4, :, :, j % 4] = rng.normal(size=(height, width))
     stored, scale, bias = quantize(layers, encoding)  # type: ignore[arg-type]
-    scale[-1, scalars % 4 or 4 :], bias[-1, scalars % 4 or 4 :] = 0, 0
+    scale[-1, components % 4 or 4 :], bias[-1, components % 4 or 4 :] = 0, 0
     images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
     if position:
         images["position"] = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
@@ -89,7 +89,7 @@ def build_planes(
         "width": width,
         "height": height,
         "domain": "sphere",
-        "scalars": scalars,
+        "scalars": components,
         "light_basis": {"kind": "gaussian", "centers": centers.tolist(), "spreads": functions.spreads.tolist()},
         "w_table": {"size": table.size, "columns": table.columns},
         "planes": [{"encoding": encoding} for _ in layers],

@@ -39,7 +39,7 @@ def profile(chromaticities: Sequence[float], gamma: float, space: str = "rgb") -
 
 
 def ink_profile() -> bytes:
-    """A CMYK profile of version 2 whose table says L* = 100 - 25 (c + m + y + k): linear, so read alike by every interpolation."""
+    """A CMYK profile of version 2 whose table says L* = 100 - 25 (c + m + y + k): linear, so every interpolation gives the same."""
     grid = np.stack(np.meshgrid(*[np.arange(2)] * 4, indexing="ij"), axis=-1).reshape(-1, 4)
     light = np.round(0xFF00 * (1 - grid.mean(axis=1))).astype(">u2")
     table = np.stack([light, np.full_like(light, 0x8000), np.full_like(light, 0x8000)], axis=1).astype(">u2")

@@ -16,4 +16,4 @@ def test_what_is_published_is_finer(name: str) -> None:
     assert fine.width * draft.height == draft.width * fine.height, "of the same shape"
     assert (draft.samples, fine.samples) == (2, 4)
     assert fine.lights == draft.lights == 400
-    assert (fine.sun_angle > 0) == (scene.receiver.kind == "lightmap"), "as wide as the lights stand apart"
+    assert (fine.sun_angle > 0) == (scene.receiver.kind == "lightmap"), "as wide as the light spacing"

@@ -1,4 +1,4 @@
-"""The gallery, tiny: stopped in its bake, gone on with, run again, and told to make one lost picture anew."""
+"""The gallery at a tiny size: killed during its bake, resumed, run again, and run again after the loss of one picture."""
 
 from __future__ import annotations
 

@@ -93,12 +93,12 @@ def test_mixed_and_half_said_lights_are_refused(point_lights) -> None:
 
 @pytest.mark.slow
 def test_the_approximation_is_measured_by_role(suns: Capture, point_lights) -> None:
-    """Without occluders a directional asset foretells lamps exactly but for its fit; lamps twice as strong are missed by half."""
+    """Without occluders a directional asset predicts point lights up to its fit; for lights twice as strong it is off by half."""
     asset = RelightingMap(k=40).encode(suns)
     errors = evaluate(asset, point_lights())
     assert [light["role"] for light in errors["lights"]] == ["train"] * 3 + ["validation", "holdout"]
     assert all(errors[role]["relative_rmse"] < FIT for role in POINT_LIGHTS)
-    shade = np.linspace(0, 1, 14)[:, None]  # what an occluder near the lamp would take away, and directional lights know nothing of
+    shade = np.linspace(0, 1, 14)[:, None]  # the shadow of an occluder near the light, which a directional capture lacks
     shaded = evaluate(asset, point_lights(shade))
     assert all(shaded[role]["relative_rmse"] > 0.3 for role in POINT_LIGHTS)
     doubled = evaluate(asset, point_lights(2.0))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A table with glass on it: two rings, a ball and an angel of tinted glass, beside one opaque pawn.
 
-The lightmap of the object `Table` (one quad, top at z = 0, UV layer = [0, 1]², u along +x, v along +y) answers a sun
+The lightmap of the object `Table` (one quad, top at z = 0, UV layer = [0, 1]², u along +x, v along +y) responds to a sun
 with caustics, colored shadows and one crisp shadow, after the scene "caustics" of [Wong2005, fig. 7].
 
 By default the caustics are a stand-in, not traced: shadow rays pass straight through the glass, tinted by the angle at
-which they meet it, see `glass`. That costs no noise but that of the edges, so two samples a texel will do. With --traced
+which they meet it, see `glass`. Only the edges are noisy, so two samples per texel are enough. With --traced
 the light really refracts, see `traced_glass`: the same error then needs a hundred times the samples.
 
     python data/scenes/caustics.py OUT.blend [--traced]
@@ -33,7 +33,7 @@ def circle(radius, z, segments, fold=0.0, folds=0):
 
 
 def outline(text):
-    """Points (radius, height) in meters from "radius height, ..." in centimetres."""
+    """Points (radius, height) in meters from "radius height, ..." in centimeters."""
     return [tuple(float(n) / 100 for n in pair.split()) for pair in text.split(",")]
 
 
@@ -145,12 +145,12 @@ def glass(name, color, ior, rim, core, power):
     lens = calculate(tree, "MULTIPLY_ADD", calculate(tree, "POWER", cosine, power), core - rim, rim)
     past = node(tree, "MapRange", Value=path["Ray Length"], **{"From Min": FADE[0], "From Max": FADE[1]}).outputs[0]
     gain = calculate(tree, "MULTIPLY_ADD", past, calculate(tree, "SUBTRACT", EVEN, lens), lens)
-    tint = node(tree, "VectorMath")
-    tint.operation = "SCALE"
-    tint.inputs[0].default_value = color
-    tree.links.new(gain, tint.inputs["Scale"])
+    transmission = node(tree, "VectorMath")
+    transmission.operation = "SCALE"
+    transmission.inputs[0].default_value = color
+    tree.links.new(gain, transmission.inputs["Scale"])
     bent = node(tree, "BsdfGlass", Color=(*color, 1), Roughness=0.0, IOR=ior)
-    straight = node(tree, "BsdfTransparent", Color=tint.outputs[0])
+    straight = node(tree, "BsdfTransparent", Color=transmission.outputs[0])
     mix = node(tree, "MixShader", Fac=path["Is Shadow Ray"])
     tree.links.new(bent.outputs[0], mix.inputs[1])
     tree.links.new(straight.outputs[0], mix.inputs[2])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Small scenes whose light has a closed form.
 
-`python closed_form_scenes.py NAME OUT.blend`, or `python closed_form_scenes.py hdri IN.blend SKY.exr OUT.npy`.
+`python closed_form_scenes.py NAME OUT.blend`, or `python closed_form_scenes.py hdri IN.blend ENVIRONMENT.exr OUT.npy`.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def point_light(name="PointLight", energy=500, location=(0, 0, 2)):
 
 
 def plane():
-    """A white square, z = 0, moved to (10, 5, 0), with a bright lamp and world that a bake must switch off."""
+    """A white square, z = 0, moved to (10, 5, 0), with a bright light and world that a bake must switch off."""
     quad("Plane", location=(10, 5, 0))
     point_light(location=(10, 5, 2))
     camera()
@@ -91,7 +91,7 @@ def occluder():
 
 
 def view(kind="PERSP"):
-    """A colored plane before a camera, empty sky around it."""
+    """A colored plane before a camera, nothing around it."""
     quad("Plane", color=(0.8, 0.4, 0.2))
     camera(kind)
 
@@ -286,15 +286,15 @@ def blocks():
     walls.location, walls.scale = (0, 0, 1.5), (2.5, 2.5, 2)
 
 
-def bake_under_hdri(blend, sky, out):
-    """Irradiance of Plane under an equirectangular sky, straight from Cycles, (32, 32, 3), row 0 at the top."""
+def bake_under_hdri(blend, environment, out):
+    """Irradiance of Plane under an equirectangular environment map, by Cycles, (32, 32, 3), row 0 at the top."""
     bpy.ops.wm.open_mainfile(filepath=blend)
     scene = bpy.context.scene
-    world = bpy.data.worlds.new("Sky")
+    world = bpy.data.worlds.new("Environment")
     world.use_nodes = True
     nodes = world.node_tree.nodes
     texture = nodes.new("ShaderNodeTexEnvironment")
-    texture.image = bpy.data.images.load(sky)
+    texture.image = bpy.data.images.load(environment)
     texture.image.colorspace_settings.name = "Non-Color"
     world.node_tree.links.new(texture.outputs["Color"], nodes["Background"].inputs["Color"])
     scene.world = world

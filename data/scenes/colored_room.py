@@ -69,7 +69,7 @@ def smoothed(points, times=3):
 
 
 def curve(text, times=3):
-    """A smooth outline of (radius, height) in meters from "radius height, ..." in centimetres."""
+    """A smooth outline of (radius, height) in meters from "radius height, ..." in centimeters."""
     return smoothed([Vector([float(n) / 100 for n in pair.split()]) for pair in text.split(",")], times)
 
 

@@ -297,7 +297,7 @@ def sequencer(_canaries):
 
 
 def names(_canaries):
-    """Names that a terminal, a markup or a format string would act upon."""
+    """Names that a terminal, a markup or a format string would interpret."""
     for name in ("\x1b[2J\x1b[31mred", "[/bold]{0}%s", "two\nlines", "'; import os"):
         scripted(far(name).driver_add("location", 0), "bpy.context.scene.frame_current * 0.0")
 

@@ -54,7 +54,7 @@ def circle(radius, z, segments):
 
 
 def profile(text):
-    """Points (radius, height) in meters from "radius height, ..." in centimetres."""
+    """Points (radius, height) in meters from "radius height, ..." in centimeters."""
     return [tuple(float(n) / 100 for n in pair.split()) for pair in text.split(",")]
 
 
@@ -318,7 +318,7 @@ def chair(seat=0.45, width=0.42):
 
 
 def add_table_and_chairs(dark, brass, shade):
-    """A round table with an oil lamp; one chair stands turned to the window, one lies fallen."""
+    """A round table with an oil lantern; one chair turned to the window, one fallen over."""
     at = Matrix.Translation((-0.75, 0.55, 0))
     table = profile("24 0, 24 3, 6 8, 4.5 25, 7.5 45, 5 60, 10 69, 50 71, 52 72.5, 50 74")
     mesh_object("RoundTable", [moved(lathe(table, 40), at)], dark)

@@ -2,7 +2,7 @@
 """A terrace under a pergola with a vine on it, seen by one fixed camera: shadows of slats and leaves on stone.
 
 What it shows is where relighting maps end: thousands of leaves, a trellis and a roof of slats throw shadows that are hard
-and finer than the lights stand apart, over a floor, a bench and a wall that every sun draws anew. Leaves pass a part of
+and finer than the light spacing, over a floor, a bench and a wall with other shadows under every sun. Leaves pass a part of
 their light. Maps blur such shadows and a bake by --sun-angle auto softens them; a transport without the direct light is
 smooth.
 
@@ -58,7 +58,7 @@ def circle(radius, z=0.0, segments=32):
 
 
 def lathe(text, segments=32):
-    """A profile "radius height, ..." in centimetres turned about the z axis."""
+    """A profile "radius height, ..." in centimeters turned about the z axis."""
     return skin([circle(*(float(n) / 100 for n in pair.split()), segments) for pair in text.split(",")])
 
 
@@ -143,7 +143,7 @@ def each(*stops):
 
 
 def paving(tree):
-    """Slabs of pale stone in a bond, no two alike, with darker joints."""
+    """Slabs of pale stone in a bond, all different, with darker joints."""
     place = node(tree, "TexCoord").outputs["Object"]
     slabs = {"Color1": (0.74, 0.67, 0.57, 1), "Color2": (0.60, 0.53, 0.45, 1), "Mortar": (0.30, 0.26, 0.22, 1)}
     sizes = {"Mortar Size": 0.007, "Mortar Smooth": 0.3, "Brick Width": 0.62, "Row Height": 0.42}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Receivers of every kind, small and with known answers: `python real_scenes.py NAME OUT.blend`.
+"""Receivers of every kind, small and with known results: `python real_scenes.py NAME OUT.blend`.
 
 Objects that must not shade each other stand FAR meters apart.
 """

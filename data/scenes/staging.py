@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What the scene scripts have in common: a camera, a sun and sky to look by, Cycles, and the .blend that they write."""
+"""What the scene scripts have in common: a camera, daylight for viewing, Cycles, and the .blend that they write."""
 
 import sys
 from math import radians
@@ -21,19 +21,19 @@ def add_camera(location, target, lens):
     return camera
 
 
-def add_daylight(direction, strength, sky, sky_strength, color=WARM):
-    """The scene's own sun (`direction` points to it) and dim sky: for looking at, a bake removes both."""
+def add_daylight(direction, strength, world_color, world_strength, color=WARM):
+    """The scene's own sun (`direction` points to it) and a dim world, for viewing: a bake switches both off."""
     data = bpy.data.lights.new("Sun", "SUN")
     data.energy, data.angle, data.color = strength, radians(0.5), color
     sun = bpy.data.objects.new("Sun", data)
     sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(sun)
-    world = bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    world = bpy.context.scene.world = bpy.data.worlds.new("World")
     if world.node_tree is None:
         world.use_nodes = True
     background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (*sky, 1)
-    background.inputs["Strength"].default_value = sky_strength
+    background.inputs["Color"].default_value = (*world_color, 1)
+    background.inputs["Strength"].default_value = world_strength
 
 
 def start_cycles(scene, width=800, height=600):

@@ -61,7 +61,7 @@ def ramped_metal():
 def water():
     """A Principled BSDF in a group that is given its color, muted nodes and reroutes on the way."""
     group = bpy.data.node_groups.new("liquid", "ShaderNodeTree")
-    group.interface.new_socket("Tint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Color", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketShader")
     kinds = ("NodeGroupInput", "NodeReroute", "ShaderNodeBsdfPrincipled", "NodeGroupOutput")
     given, way, shader, out = (group.nodes.new(kind) for kind in kinds)

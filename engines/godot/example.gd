@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 extends Node3D
-## A lamp to drag over the asset: on model.glb or a mesh through its texels, or in its picture laid flat.
+## A point light to drag over the asset: over model.glb, a mesh through its texels, or its flat picture.
 
-const HELP := "drag: move the lamp    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
+const HELP := "drag: move the light    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
 const MODEL := "res://model.glb"  # second UV layer: the asset's
-const TURN := 0.03  # radians a key press
+const TURN := 0.03  # radians per key press
 
 var _dragged := false
 var _middle := Vector3.ZERO
@@ -20,7 +20,7 @@ func _ready() -> void:
 		if ResourceLoader.exists(MODEL):
 			_show_model()
 		else:
-			$Surface.mesh = _asset.texel_mesh()
+			$Surface.mesh = SrbfTexelMesh.of(_asset)
 		var box := _asset.bounds()
 		_middle = box.get_center()
 		_size = maxf(box.get_longest_axis_size(), 1e-3)
@@ -29,7 +29,7 @@ func _ready() -> void:
 	$Camera.look_at_from_position(_middle + Vector3(0.0, 0.65, 0.8) * _size, _middle)
 	$Camera.far = maxf(1000.0, 10.0 * _size)
 	$PointLight.position = _middle + Vector3(-0.2, 0.3, 0.1) * _size
-	$PointLight.light_energy *= 0.4 * _size  # its answer falls with the distance
+	$PointLight.light_energy *= 0.4 * _size  # its light falls off with distance
 	if _asset.is_view:
 		$Sun.light_energy = 1.0
 		$Relight.exposure = 0.5
@@ -69,7 +69,7 @@ func _unhandled_input(event: InputEvent) -> void:
 				$Sun.rotate_object_local(Vector3.RIGHT, TURN)
 
 
-## Put the lamp under the mouse, its height kept: over the surface's plane, or over the picture's texel.
+## Move the light under the mouse at constant height: over the surface's plane, or over the picture's texel.
 func move_point_light(mouse: Vector2) -> void:
 	if not _asset.position:
 		return

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// One relit surface, unlit otherwise: albedo times what the asset answers to the lights. Runs in the built-in pipeline and in URP, which
+// One relit surface, otherwise unlit: albedo times the asset's response to the lights. Runs in the built-in pipeline and in URP, which
 // draws passes without a LightMode; in HDRP use a Shader Graph with SrbfAsset.hlsl.
 Shader "Srbf/Relit @ID@"
 {

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Import an exported asset into the open Unreal project: Tools > Execute Python Script, or `py "…/import_srbf.py"` in the console.
 
-Beside it lie node.json, images/ and Shaders/. It copies Shaders/ into the project's folder of that name, imports the images below
-/Game/Srbf, gathers the layers in a texture array, and makes a parameter collection for the lights and a material whose Custom node
-relights. `py "…/import_srbf.py" follow` afterwards copies the level's first directional light and first lamp into the collection.
+node.json, images/ and Shaders/ must lie beside it. It copies Shaders/ into the project's folder of that name, imports the images below
+/Game/Srbf, combines the layers in a texture array, and creates a parameter collection for the lights and a material whose Custom node
+relights. `py "…/import_srbf.py" follow` then copies the level's first directional and first point or spot light into the collection.
 """
 
 import json
@@ -44,7 +44,7 @@ def import_texture(file, folder, filtered, compression):
     unreal.AssetToolsHelpers.get_asset_tools().import_asset_tasks([task])
     texture = unreal.load_asset(f"{folder}/{Path(file).stem}")
     if texture is None:
-        raise RuntimeError(f"expected Unreal to import {file}, found no texture; look into the output log")
+        raise RuntimeError(f"expected Unreal to import {file}, found no texture; see the output log")
     settle(texture, filtered, compression)
     return texture
 
@@ -89,7 +89,7 @@ def make_collection(node, folder):
 
 
 def make_material(node, folder, textures, collection):
-    """A material whose emissive color is what the asset answers to the collection's lights."""
+    """A material whose emissive color is the asset's response to the collection's lights."""
     editing = unreal.MaterialEditingLibrary
     material = make("Relit", folder, unreal.Material, unreal.MaterialFactoryNew())
     material.set_editor_property("shading_model", unreal.MaterialShadingModel.MSM_UNLIT)
@@ -115,7 +115,7 @@ def make_material(node, folder, textures, collection):
             source.set_editor_property("sampler_type", kind)
         elif name == "UV":
             source = editing.create_material_expression(material, unreal.MaterialExpressionTextureCoordinate, -1000, y)
-            source.set_editor_property("coordinate_index", 1)  # the lightmap's; 0 where a mesh has one set alone
+            source.set_editor_property("coordinate_index", 1)  # the lightmap's; 0 for a mesh with only one set
         elif name == "WorldPosition":
             world = editing.create_material_expression(material, unreal.MaterialExpressionWorldPosition, -1200, y)
             source = editing.create_material_expression(material, unreal.MaterialExpressionTruncateLWC, -1000, y)
@@ -147,7 +147,7 @@ def follow_lights():
     suns = [actor for actor in actors if isinstance(actor, unreal.DirectionalLight)]
     point_lights = [actor for actor in actors if isinstance(actor, (unreal.PointLight, unreal.SpotLight))]
     for actor in suns[:1]:
-        forward = actor.get_actor_forward_vector()  # where it shines
+        forward = actor.get_actor_forward_vector()  # the direction it shines in
         values["SunDirection"] = [-forward.x, -forward.y, -forward.z, 0.0]
         values["SunColor"] = color_of(actor)
     for actor in point_lights[:1]:
@@ -168,7 +168,7 @@ def follow_lights():
 
 
 def color_of(actor):
-    """Linear color times intensity: lux of a directional light; set lamps to candelas."""
+    """Linear color times intensity: lux for a directional light; set point and spot lights to candelas."""
     component = actor.get_component_by_class(unreal.LightComponent)
     color, strength = component.get_light_color(), component.get_editor_property("intensity")
     return [color.r * strength, color.g * strength, color.b * strength, 0.0]
@@ -185,7 +185,7 @@ def main():
     for name, file in node["textures"].items():
         textures[name] = import_texture(file, folder, name == "Ambient", {"Table": exact, "Clusters": gray}.get(name, hdr))
     make_material(node, folder, textures, make_collection(node, folder))
-    unreal.log(f"srbf: {folder}/Relit is made; give it to a mesh, then run this script again with the word follow")
+    unreal.log(f"srbf: {folder}/Relit is ready; assign it to a mesh, then run this script again with the word follow")
 
 
 if __name__ == "__main__":

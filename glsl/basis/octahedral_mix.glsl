@@ -2,7 +2,7 @@
 /* srbfOctahedralMix: one light function at a node and fraction of its tile, by four fetches and a mix.
    use:    vec3 srbfOctahedralMix(sampler2D wTable, int tableSize, int index, vec4 node)
    domain: wTable an atlas of tiles of tableSize x tableSize nodes, tile `index` counted row by row; node from srbfOctahedralNode, the
-           same for every function of a light direction; nodes stand on the borders, so that no fold needs a neighbor outside the tile
+           same for every function of a light direction; nodes lie on the borders, so that no fold needs a neighbor outside the tile
    twin:   srbf.basis.octahedral_table.lookup
    cite:   Cigolle2014 */
 vec3 srbfOctahedralMix(highp sampler2D wTable, int tableSize, int index, vec4 node) {

@@ -2,12 +2,12 @@
 /* srbfWeightPairs: R_i for one light direction from a table of values and differences: one fetch where srbfWeight takes two.
    use:    float srbfWeightPairs(sampler2D pairs, float versine)
    domain: versine = 1 - cos theta in [0, 2]; pairs n x 1 texels, RG32F: R at versine 2 j / (n - 1), which is the R
-           table from its end, and what the next entry has more than it, 0 in the last; result in [0, 1]; SRBF_SAMPLED says
-           that a nearest sampler gets the same texel sooner than a fetch, as in software renderers, which check a fetch's bounds
+           table from its end, and the difference to the next entry, 0 in the last; result in [0, 1]; SRBF_SAMPLED reads
+           the same texel by a nearest sampler, which is faster in software renderers, since they check a fetch's bounds
    twin:   srbf.basis.gaussian.lookup
    cite:   Wong2005, fig. 9 */
 float srbfWeightPairs(highp sampler2D pairs, float versine) {
-    // Never the hardware's filter: its fractions have 8 bits. Counted from the center, where R changes with every digit of the versine.
+    // Never the hardware's filter: its fractions have 8 bits. Counted from the center, where R is most sensitive to the versine.
     int n = textureSize(pairs, 0).x;
     float place = versine * (0.5 * float(n - 1));
     float entry = floor(place);

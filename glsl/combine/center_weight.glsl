@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /* srbfCenterWeight: R_i of one light direction: by the table, by pairs where SRBF_PAIRS is defined, by formula where SRBF_FORMULA is.
    use:    float srbfCenterWeight(sampler2D rTable, vec3 lightDirection, vec4 center)
-   domain: lightDirection of length 1, or 0 where the receiver lies in the lamp; center.xyz unit; with SRBF_PAIRS rTable holds what
-           srbfWeightPairs takes; with SRBF_FORMULA center.w is 1 / (2 spread^2) and rTable is not read
+   domain: lightDirection of length 1, or 0 where the receiver coincides with the point light; center.xyz unit; with SRBF_PAIRS rTable
+           holds what srbfWeightPairs takes; with SRBF_FORMULA center.w is 1 / (2 spread^2) and rTable is not read
    twin:   srbf.methods.relighting_map.basis_weights
    cite:   Wong2005, fig. 8 and 9 */
 #include "basis/weight.glsl"

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombineComponentsProjected: an offset plus the sum over stored scalars of their weights, decoding folded in: the least that far lights cost.
+/* srbfCombineComponentsProjected: an offset plus the sum over components of projected weight times stored value; the weights include the
+   decoding.
    use:    vec3 srbfCombineComponentsProjected(sampler2DArray planes, vec2 uv, float level, int firstLayer, vec4 weights[3 * SRBF_LAYERS],
                                         vec3 offset)
-   domain: weights: three vec4 a layer, the red, green and blue weights of its four scalars, each w_j times the channel's scale; offset:
-           w_0 plus the sum of w_j times bias, with one pass alone; level: of mip maps, 0 without; result signed, before the clamp
-   twin:   srbf.methods.coefficient_maps.linear_response
+   domain: weights: three vec4 per layer, the red, green and blue weights of its four components, each w_j times the channel's scale;
+           offset: w_0 plus the sum of w_j times bias, with one pass only; level: mip level, 0 without mip maps; result signed, before the
+           clamp
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #ifndef SRBF_COMPONENTS
-#error define SRBF_COMPONENTS: how many scalars a texel has
+#error define SRBF_COMPONENTS: components per texel
 #endif
 #ifndef SRBF_LAYERS
 #define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 /* srbfCombineComponentsProjectedCluster: the same for a cluster, whose offset and weights are a row of a texture.
    use:    vec3 srbfCombineComponentsProjectedCluster(sampler2DArray planes, vec2 uv, int firstLayer, sampler2D weights, int cluster)
-   domain: weights: RGBA32F, nearest, 3 (all layers) + 1 texels wide, a row a cluster: the offset, then three texels a layer, the red,
-           green and blue weights of its four scalars, each w_j times the channel's scale; the offset counts with firstLayer 0; result
+   domain: weights: RGBA32F, nearest, 3 (all layers) + 1 texels wide, one row per cluster: the offset, then three texels per layer, the red,
+           green and blue weights of its four components, each w_j times the channel's scale; the offset counts with firstLayer 0; result
            signed, before the clamp
-   twin:   srbf.methods.coefficient_maps.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003 */
 #ifndef SRBF_COMPONENTS
-#error define SRBF_COMPONENTS: how many scalars a texel has
+#error define SRBF_COMPONENTS: components per texel
 #endif
 #ifndef SRBF_LAYERS
 #define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)

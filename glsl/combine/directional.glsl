@@ -4,7 +4,7 @@
                                        vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
    domain: layers firstMap ... firstMap + SRBF_K - 1 of maps; weights.rgb the lights' colors times R_i(L), summed over all
            directional and environment lights; result signed, before the clamp
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 */
 #include "combine/decode.glsl"
 

@@ -3,9 +3,9 @@
    use:    vec3 srbfCombineEnvironmentRow(sampler2D environment, int row, sampler2D rTable, vec4 center,
                                          vec4 assetFromMap[3], int domain)
    domain: environment as in srbfEnvironmentTexel; center as srbfCenterWeight takes it; assetFromMap: the rows of the
-           matrix that turns the map into the asset's frame; domain SRBF_SPHERE, SRBF_HEMISPHERE where the map stands
+           matrix that turns the map into the asset's frame; domain SRBF_SPHERE, SRBF_HEMISPHERE where the map is
            upright in that frame, else SRBF_TURNED_HEMISPHERE
-   twin:   srbf.methods.relighting_map.projected_weights
+   twin:   srbf.methods.projected_weights
    cite:   Wong2005, "Directional-Source Relighting" */
 #include "combine/center_weight.glsl"
 #include "lights/environment_texel.glsl"

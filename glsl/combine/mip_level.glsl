@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfMipLevel: the level of a mip map whose texels are as large as a pixel: once a pixel, since loops may take no derivatives.
+/* srbfMipLevel: the level of a mip map whose texels are as large as a pixel: computed once per pixel, since loops may take no derivatives.
    use:    float srbfMipLevel(vec2 texelsAcross, vec2 texelsDown)
    domain: dFdx and dFdy of uv times the texture's size; result at least 0
    twin:   numpy.log2

@@ -5,7 +5,7 @@
                                  vec4 directions[SRBF_POINT_LIGHTS], vec4 colors[SRBF_POINT_LIGHTS], int shining)
    domain: weights, scale, bias as in srbfCombineDirectional, weights 0 where no directional or environment light shines; level: of mip
            maps, 0 without; centers as srbfCenterWeight takes them; directions, colors, shining from srbfPointLightsAt; result signed
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 and 8 */
 #include "combine/center_weight.glsl"
 #include "combine/decode.glsl"
@@ -14,7 +14,7 @@
 #error define SRBF_K: how many maps this pass combines
 #endif
 #ifndef SRBF_POINT_LIGHTS
-#error define SRBF_POINT_LIGHTS: how many pointLights a pass takes at most
+#error define SRBF_POINT_LIGHTS: how many point lights a pass takes at most
 #endif
 
 vec3 srbfCombinePointLights(highp sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], highp sampler2D rTable,

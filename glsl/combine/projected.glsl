@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombineProjected: sum over SRBF_K maps of weight times what is stored, decoding folded into the weights: the least that far lights cost.
+/* srbfCombineProjected: sum over SRBF_K maps of projected weight times stored value; the weights include the decoding.
    use:    vec3 srbfCombineProjected(sampler2DArray maps, vec2 uv, float level, int firstMap, vec4 weights[SRBF_K], vec3 offset)
    domain: weights: those of srbfCombineDirectional times each map's scale; offset: the sum over maps of weight times bias, with one pass
-           alone; level: of mip maps, 0 without; result signed, before the clamp
-   twin:   srbf.methods.relighting_map.linear_response
+           alone; level: mip level, 0 without mip maps; result signed, before the clamp
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 */
 #ifndef SRBF_K
 #error define SRBF_K: how many maps this pass combines

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-/* srbfCombineWeighted: srbfCombineDirectional with weights out of a texture, such as environment_weights.frag leaves on the GPU.
+/* srbfCombineWeighted: srbfCombineDirectional with weights from a texture, such as environment_weights.frag leaves on the GPU.
    use:    vec3 srbfCombineWeighted(sampler2DArray maps, vec2 uv, float level, int firstMap, sampler2D weights,
                                     vec4 scale[SRBF_K], vec4 bias[SRBF_K])
-   domain: weights RGBA32F, nearest, all maps' in one row; scale, bias of the maps of this pass; level: of mip maps, 0 without; result
-           signed, before the clamp
-   twin:   srbf.methods.relighting_map.linear_response
+   domain: weights RGBA32F, nearest, all maps' in one row; scale, bias of the maps of this pass; level: mip level, 0 without mip maps;
+           result signed, before the clamp
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, fig. 6 */
 #include "combine/decode.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfAttenuation: a0/|L|, or its square, with |L| never less than the lamp's radius.
+/* srbfAttenuation: a0/|L|, or its square, with |L| never less than the light's radius.
    use:    float srbfAttenuation(float dist, float a0, float radius, int falloff)
    domain: dist >= 0, a0 > 0 and radius > 0 in meters; falloff SRBF_FALLOFF_LINEAR or SRBF_FALLOFF_INVERSE_SQUARE
    twin:   srbf.lights.attenuation

@@ -14,7 +14,7 @@ vec4 srbfEnvironmentTexel(ivec2 texel, ivec2 size, bool cut) {
     int bottom = max(size.y - 2 * (texel.y + 1), lowest);
     vec2 elevation = srbfSineCosine(top + bottom, 2 * size.y);
     vec2 azimuth = srbfSineCosine(2 * (size.x - 2 * texel.x - 1), size.x);
-    // sin a - sin b without taking one number near 1 from another
+    // sin a - sin b without subtracting numbers near 1
     float solidAngle = 2.0 * elevation.y * srbfSineCosine(top - bottom, 2 * size.y).x * (6.28318530717959 / float(size.x));
     return vec4(elevation.y * azimuth.y, elevation.y * azimuth.x, elevation.x, solidAngle);
 }

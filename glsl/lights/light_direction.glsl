@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfLightDirection: the unit vector along L; the zero vector, where a receiver lies in the lamp, stays zero.
+/* srbfLightDirection: the unit vector along L; the zero vector, where a receiver coincides with the point light, stays zero.
    use:    vec3 srbfLightDirection(vec3 lightVector)
    domain: |lightVector| of 0 or within [1e-18, 1e18]; result of length 1 or 0
    twin:   srbf.sphere.normalize

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 /* srbfPointLightStrength: the attenuation of a point light, times the cone of a spot, without the color.
-   use:    float srbfPointLightStrength(SrbfPointLight lamp, vec3 lightVector)
-   domain: lightVector = S - P in meters, from srbfLightVector; a point light is a lamp with versineInner 3, versineOuter 4
+   use:    float srbfPointLightStrength(SrbfPointLight pointLight, vec3 lightVector)
+   domain: lightVector = S - P in meters, from srbfLightVector; a point light without a cone has versineInner 3, versineOuter 4
    twin:   srbf.methods.relighting_map.receiver_weights
    cite:   Wong2005, "Attenuation" */
 #include "lights/attenuation.glsl"

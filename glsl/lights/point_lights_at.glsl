@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-/* srbfPointLightsAt: which of many lamps shine on a receiver, from where and how brightly.
-   use:    int srbfPointLightsAt(vec4 lamps[4 * SRBF_POINT_LIGHTS], int pointLightCount, vec3 receiver,
+/* srbfPointLightsAt: which of many point lights shine on a receiver, from where and how brightly.
+   use:    int srbfPointLightsAt(vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount, vec3 receiver,
                            out vec4 directions[SRBF_POINT_LIGHTS], out vec4 colors[SRBF_POINT_LIGHTS])
-   domain: lamps in fours as srbfUnpackPointLight takes them, the first pointLightCount of them in use; receiver in their frame, meters; result:
-           how many shine there. So many entries hold, in .xyz, the unit direction (0 where the receiver lies in the lamp) and color
-           times strength; the rest are 0. Lamps whose cone passes by are left out
-   twin:   srbf.methods.receivers.light_vectors
+   domain: pointLights in fours as srbfUnpackPointLight takes them, the first pointLightCount of them in use; receiver in their frame,
+           meters; result: how many shine there. So many entries hold, in .xyz, the unit direction (0 where the receiver coincides with
+           the point light) and color times strength; the rest are 0. Lights whose cone misses the receiver are left out
+   twin:   srbf.lights.light_vectors
    cite:   Wong2005, fig. 8 to 10 */
 #include "lights/point_light_strength.glsl"
 #include "lights/light_direction.glsl"

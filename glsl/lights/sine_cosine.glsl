@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-/* srbfSineCosine: (sine, cosine) of a fraction of a right angle, as precise on every card: GLSL lets a card's own be 2^-11 off.
+/* srbfSineCosine: (sine, cosine) of a fraction of a right angle, equally precise on every GPU: GLSL allows an error of 2^-11.
    use:    vec2 srbfSineCosine(int part, int whole)
    domain: whole > 0; the angle is part / whole right angles, |part| below 2^30 and |part / whole| below 2^20; error below 3e-7
    twin:   numpy.sin
-   cite:   Taylor series on [-pi/4, pi/4]: what is left out is below 3e-8 of the cosine, 2e-9 of the sine */
+   cite:   Taylor series on [-pi/4, pi/4]: the remainder is below 3e-8 of the cosine, 2e-9 of the sine */
 vec2 srbfSineCosine(int part, int whole) {
     int quarter = int(floor(float(part) / float(whole) + 0.5));
     float x = 1.57079632679490 * (float(part - quarter * whole) / float(whole));

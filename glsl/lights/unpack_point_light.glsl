@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-/* srbfUnpackPointLight: a lamp out of the four vec4 that an array of lamps holds of each.
+/* srbfUnpackPointLight: a point light from the four vec4 that an array holds for each.
    use:    SrbfPointLight srbfUnpackPointLight(vec4 a, vec4 b, vec4 c, vec4 d)
    domain: a: position, radius; b: positionLow, falloff 0 or 1; c: color as irradiance at 1 m, versineInner; d: axis, versineOuter.
-           The lamp's a0 is 1: color times a0, or a0 squared, is the irradiance at 1 m
+           The light's a0 is 1: color times a0, or a0 squared, is the irradiance at 1 m
    twin:   srbf.gl.uniforms.packed_point_lights
    cite:   - */
 #include "lights/point_light_strength.glsl"

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-/* srbfClusteredDirectional, srbfClusteredDirectionalFiltered, srbfClusteredPoint, srbfClusteredPointFiltered: what a receiver answers
-   to the lights, by scalar planes whose light functions are its cluster's; add the results of all lights, then call srbfFinish once.
+/* srbfClusteredDirectional, srbfClusteredDirectionalFiltered, srbfClusteredPoint, srbfClusteredPointFiltered: a receiver's response to the
+   lights, from coefficient maps whose light functions depend on its cluster; add the results of all lights, then call srbfFinish once.
    use:    vec3 srbfClusteredDirectional(sampler2DArray planes, sampler2D clusters, ivec2 texel, int firstLayer, sampler2D weights,
                                          vec4 scale[SRBF_LAYERS], vec4 bias[SRBF_LAYERS])
            vec3 srbfClusteredPoint(sampler2DArray planes, sampler2D clusters, ivec2 texel, int firstLayer, sampler2D wTable,
-                                   int tableSize, vec4 scale[SRBF_LAYERS], vec4 bias[SRBF_LAYERS], vec3 receiver, SrbfPointLight lamp)
+                                   int tableSize, vec4 scale[SRBF_LAYERS], vec4 bias[SRBF_LAYERS], vec3 receiver, SrbfPointLight pointLight)
            vec3 srbfClusteredDirectionalFiltered(..., vec2 uv, ...) and vec3 srbfClusteredPointFiltered(..., vec2 uv, ...): the same with a
            place instead of a texel
-   domain: planes sampled nearest, never filtered: a scalar means something else in another cluster; the filtered functions rebuild the
-           four texels about uv and mix the answers bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, a row a cluster; firstLayer 0
-           where one pass combines all layers; receiver and lamp as in the eigen map
-   twin:   srbf.methods.clustered_eigen_map.linear_response
+   domain: planes sampled nearest, never filtered: a component has another meaning in another cluster; the filtered functions rebuild the
+           four texels about uv and mix the results bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, one row per cluster; firstLayer
+           0 where one pass combines all layers; receiver and light as in the eigen map
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003; Kristensen2005 */
 #include "combine/cluster_index.glsl"
 #include "combine/finish.glsl"

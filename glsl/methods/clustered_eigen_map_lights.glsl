@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT
-/* srbfClusteredLights, srbfClusteredLightsFiltered: what a receiver answers to all lights at once, by scalar planes whose light functions
-   are its cluster's: directional, environments, points and spots.
+/* srbfClusteredLights, srbfClusteredLightsFiltered: a receiver's response to all lights at once, from coefficient maps whose light
+   functions depend on its cluster: directional, environments, points and spots.
    use:    vec3 srbfClusteredLights(sampler2DArray planes, sampler2D clusters, ivec2 texel, int firstLayer, sampler2D weights,
                                     sampler2D wTable, int tableSize, vec4 scale[SRBF_LAYERS], vec4 bias[SRBF_LAYERS], vec3 receiver,
-                                    vec4 lamps[4 * SRBF_POINT_LIGHTS], int pointLightCount)
+                                    vec4 pointLights[4 * SRBF_POINT_LIGHTS], int pointLightCount)
            vec3 srbfClusteredLightsFiltered(..., vec2 uv, ...): the same with a place instead of a texel
-   domain: planes and clusters as in srbfClusteredDirectional, never filtered; the filtered function rebuilds the four texels about uv
-           and mixes the answers bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, a row a cluster, or 0; lamps in fours as
-           srbfUnpackPointLight takes them, the first pointLightCount in use (0 is allowed); receiver the world position of this place, meters, one
-           frame with the lamps. Call srbfFinish once, after all passes
-   twin:   srbf.methods.clustered_eigen_map.linear_response
+   domain: planes and clusters as in srbfClusteredDirectional, never filtered; the filtered function rebuilds the four texels about uv and
+           mixes the results bilinearly; weights (SRBF_COMPONENTS + 1) texels wide, one row per cluster, or 0; pointLights in fours as
+           srbfUnpackPointLight takes them, the first pointLightCount in use (0 is allowed); receiver the world position of this place,
+           meters, one frame with the lights. Call srbfFinish once, after all passes
+   twin:   srbf.methods.linear_response
    cite:   Sloan2003; Kristensen2005 */
 #include "combine/cluster_index.glsl"
 #include "combine/finish.glsl"

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
-/* srbfRelightDirectional, srbfRelightPoint: what a receiver answers to the lights, by relighting maps; add the results of all
+/* srbfRelightDirectional, srbfRelightPoint: a receiver's response to the lights, from relighting maps; add the results of all
    lights, then call srbfFinish once.
    use:    vec3 srbfRelightDirectional(sampler2DArray maps, vec2 uv, int firstMap,
                                        vec4 weights[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K])
            vec3 srbfRelightPoint(sampler2DArray maps, vec2 uv, int firstMap, sampler2D rTable,
-                                 vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfPointLight lamp)
-   domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, meters, and the lamp in the
+                                 vec4 centers[SRBF_K], vec4 scale[SRBF_K], vec4 bias[SRBF_K], vec3 receiver, SrbfPointLight pointLight)
+   domain: firstMap 0 where one pass combines all maps; receiver the world position of this texel, meters, and the light in the
            asset's frame; weights summed on the host over all directional and environment lights
-   twin:   srbf.methods.relighting_map.linear_response
+   twin:   srbf.methods.linear_response
    cite:   Wong2005, "Directional-Source Shader", "Point-Source Shader" */
 #include "combine/directional.glsl"
 #include "combine/finish.glsl"

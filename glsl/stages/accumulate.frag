@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// The article's own variant: a few plain textures a pass, many passes [Wong2005, "Directional-Source Shader"]. Blend ONE, ONE into a
+// The article's variant: a few plain textures per pass, many passes [Wong2005, "Directional-Source Shader"]. Blend ONE, ONE into a
 // float target. SRBF_UNITS is 1 to 8; the terms are spelled out because a sampler array takes constant indices only.
 precision highp float;
 precision highp int;

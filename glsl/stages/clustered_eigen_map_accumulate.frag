@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// The multi-pass variant for clusters: a few plain textures of four scalars a pass, the cluster and its row of weights, many passes, as
-// in clustered_eigen_map_projected.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8, and two units more are taken.
+// The multi-pass variant for clusters: a few plain textures of four components per pass, the cluster and its row of weights, many passes,
+// as in clustered_eigen_map_projected.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8, and two units more are taken.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

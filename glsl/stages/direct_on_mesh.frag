@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// Direct light of one sun at points of the receivers' mesh: N.L times visibility by a shadow map, times the tint of the walls above. Irradiance.
+// Direct light of one sun at points of the receivers' mesh: N.L times visibility by a shadow map, times the transmittance of the walls
+// above. Irradiance.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -13,7 +14,7 @@ uniform sampler2D points;   // a: weight in the texel's mean
 uniform sampler2D normals;  // of shading; a: height of the rounded surface above its triangle, meters
 uniform sampler2D faces;    // normals of the triangles
 uniform sampler2D heights;
-uniform sampler2D tints;
+uniform sampler2D transmittance;
 uniform sampler2D wallHeights;
 uniform vec3 across;
 uniform vec3 up;
@@ -24,7 +25,7 @@ uniform float weight;
 
 layout(location = 0) out vec4 response;
 
-const float STEEPEST = 64.0;   // meters a meter: beyond it a receiver's plane tells nothing
+const float STEEPEST = 64.0;   // meters per meter: a steeper receiver's plane is ignored
 const float BIAS = 0.5;        // map texels
 const float TERMINATOR = 0.1;  // cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021]
 
@@ -45,6 +46,6 @@ void main() {
     float bias = BIAS * step;
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
-    visibility *= mix(vec3(1.0), textureLod(tints, place.xy, 0.0).rgb, shaded);
+    visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
     response = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
 }

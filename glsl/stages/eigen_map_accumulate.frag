@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// The multi-pass variant for scalar planes: a few plain textures of four scalars a pass, many passes, decoding folded into the weights as
+// The multi-pass variant for coefficient maps: a few plain textures of four components per pass, many passes, projected weights as
 // in eigen_map_projected.frag. Blend ONE, ONE into a float target. SRBF_UNITS is 1 to 8; a sampler array takes constant indices only.
 precision highp float;
 precision highp int;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// All directional and environment lights in one pass over scalar planes. Blend ONE, ONE into a float target.
+// All directional and environment lights in one pass over coefficient maps. Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// A surface lit by scalar planes: directional lights, environments and up to SRBF_POINT_LIGHTS points and spots in one draw, finished.
+// A surface lit by coefficient maps: directional lights, environments and up to SRBF_POINT_LIGHTS points and spots in one draw, finished.
 // Its place in the lightmap and its position come from lightmap.vert. Irradiance assets: outgoing light = albedo * relit / pi.
 precision highp float;
 precision highp int;

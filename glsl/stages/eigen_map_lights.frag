@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// All lights in one pass over scalar planes: directional, environments and up to SRBF_POINT_LIGHTS points and spots. Receivers'
+// All lights in one pass over coefficient maps: directional, environments and up to SRBF_POINT_LIGHTS points and spots. Receivers'
 // positions are read from a map or, with SRBF_DEPTH, rebuilt from a camera's depth buffer. Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// One point or spot light a pass over scalar planes, each receiver with its own light vector and weights.
+// One point or spot light per pass over coefficient maps, each receiver with its own light vector and weights.
 // Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;

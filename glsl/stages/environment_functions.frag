@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// The weights of an environment for scalar planes, out of those of the light basis: as wide as there are functions a cluster, a row a
-// cluster. RGBA32F; over what suns weigh, blend ONE, ONE.
+// The weights of an environment for coefficient maps, from those of the light basis: as wide as a cluster has functions, one row
+// per cluster. RGBA32F; blend ONE, ONE over the weights of directional lights.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -11,7 +11,7 @@ precision highp sampler2DArray;
 
 uniform sampler2D gaussians;     // of environment_weights.frag
 uniform sampler2D coefficients;  // light_coefficients.exr, the number of the spread in alpha
-uniform int functions;           // a cluster: scalars + 1
+uniform int functions;           // a cluster: components + 1
 
 layout(location = 0) out vec4 weight;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
 // An environment's weights, row by row of the map: the target is as wide as there are centers and as high as the map, RGBA32F. The sum of
-// its rows is taken by environment_weights.frag. Scalar planes need SRBF_FORMULA; their centers stand once for each spread.
+// its rows is taken by environment_weights.frag. Coefficient maps need SRBF_FORMULA; their centers are repeated for each spread.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

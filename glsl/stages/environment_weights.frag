@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// The weights of an environment in one row: of relighting maps, or of the Gaussians of a light basis. RGBA32F; over what suns weigh, blend
-// ONE, ONE.
+// The weights of an environment in one row: of relighting maps, or of the Gaussians of a light basis. RGBA32F; blend ONE, ONE over the
+// weights of directional lights.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// max(0, sum over lights) + ambient, once, after every other pass. A 1 x 1 black texture stands for no ambient.
+// max(0, sum over lights) + ambient, once, after every other pass. No ambient: a 1 x 1 black texture.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// One point or spot light a pass, each receiver with its own light vector [Wong2005, fig. 8]. Blend ONE, ONE into a float target.
+// One point or spot light per pass, each receiver with its own light vector [Wong2005, fig. 8]. Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

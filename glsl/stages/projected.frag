@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// All directional and environment lights in one pass over a texture array, decoding folded into the weights. Blend ONE, ONE into a float
-// target.
+// All directional and environment lights in one pass over a texture array, by projected weights, which include the decoding.
+// Blend ONE, ONE into a float target.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// All directional and environment lights in one pass over a texture array, their weights out of a texture. Blend ONE, ONE into a float
+// All directional and environment lights in one pass over a texture array, weights from a texture. Blend ONE, ONE into a float
 // target.
 precision highp float;
 precision highp int;

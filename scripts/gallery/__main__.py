@@ -1,7 +1,7 @@
-"""`python -m scripts.gallery`: make the gallery, or go on with it.
+"""`python -m scripts.gallery`: make the gallery, or resume it.
 
-What is baked and fitted goes to -o, pictures to --docs, the page beside that folder. An output that is there, made from the same
-scene, settings and version, is kept. --small makes every step for real, tiny: for the test.
+Bakes and assets go to -o, pictures to --docs, the page beside that folder. Outputs made from the same scene, settings and version
+are kept. --small runs every step at a tiny size, for the test.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scripts.gallery import figure, page
 from scripts.gallery.making import is_done, make
-from scripts.gallery.places import Places
+from scripts.gallery.paths import ScenePaths
 from scripts.gallery.scenes import SCENES
 from scripts.gallery.steps import Steps
 from srbf.bake.folder import locked
@@ -24,16 +24,16 @@ from srbf.errors import SrbfError
 from srbf.io import files
 
 LOCK = ".gallery.lock"
-EVERY = 20.0  # seconds between two lines about a bake's progress
+PROGRESS_INTERVAL = 20.0  # seconds between two lines about a bake's progress
 
 
 def main() -> int:
-    """Make what is asked for; 0 where all of it is there."""
+    """Make the requested scenes; returns 0 when all are done."""
     parser = argparse.ArgumentParser(prog="python -m scripts.gallery", description=__doc__.splitlines()[0])
-    parser.add_argument("--only", action="append", choices=[scene.name for scene in SCENES], help="make this scene alone; repeats")
+    parser.add_argument("--only", action="append", choices=[scene.name for scene in SCENES], help="make only this scene; may be repeated")
     parser.add_argument("-o", "--output", type=Path, default=Path("out/gallery"), help="folder of bakes and assets")
     parser.add_argument("--docs", type=Path, default=Path("docs/gallery"), help="folder of pictures; the page is beside it")
-    parser.add_argument("--small", action="store_true", help="tiny, in seconds")
+    parser.add_argument("--small", action="store_true", help="tiny, takes seconds")
     given = parser.parse_args()
     warnings.showwarning = lambda message, *_rest, **_named: say(f"  {message}")
     try:
@@ -47,26 +47,26 @@ def main() -> int:
         return 1
     steps = Steps(given.output, say)
     scenes = [scene.small() if given.small else scene for scene in SCENES]
-    everything = [Places(scene, given.output / scene.name, given.docs) for scene in scenes]
+    everything = [ScenePaths(scene, given.output / scene.name, given.docs) for scene in scenes]
     started = time.perf_counter()
     try:
-        for places in everything:
-            if not given.only or places.scene.name in given.only:
-                make(places, steps, Reporter(progress_lines(), say))
-        made = [places for places in everything if is_done(places, steps)]
+        for paths in everything:
+            if not given.only or paths.scene.name in given.only:
+                make(paths, steps, Reporter(progress_lines(), say))
+        made = [paths for paths in everything if is_done(paths, steps)]
         finish(made, steps, given.docs)
     except SrbfError as error:
         say(f"gallery: {error}")
         return 1
-    for places in made:
-        say(f"{places.scene.name:14} {page.duration(steps.total([places.scene.name]).seconds)}")
-    whole = page.duration(steps.total([places.scene.name for places in made]).seconds)
+    for paths in made:
+        say(f"{paths.scene.name:14} {page.duration(steps.total([paths.scene.name]).seconds)}")
+    whole = page.duration(steps.total([paths.scene.name for paths in made]).seconds)
     say(f"{'all':14} {whole}; this run {page.duration(time.perf_counter() - started)}, {len(steps.redone)} steps")
     return 0
 
 
-def finish(made: list[Places], steps: Steps, docs: Path) -> None:
-    """The figure of all scenes that are done, and the page, which is written only where its text changes."""
+def finish(made: list[ScenePaths], steps: Steps, docs: Path) -> None:
+    """Draw the figure of all finished scenes and write the page if its text changed."""
     steps.run("figure", figure.made_from(made, steps), [docs / page.FIGURE], lambda: figure.draw(made, docs / page.FIGURE))
     path = docs.with_suffix(".md")
     written = page.text(made, steps, docs.name)
@@ -76,20 +76,20 @@ def finish(made: list[Places], steps: Steps, docs: Path) -> None:
 
 
 def progress_lines() -> Callable[[float, float, str], None]:
-    """A line about a bake now and then."""
+    """A callback that prints a line about a bake at intervals."""
     last = time.monotonic()
 
-    def tell(done: float, total: float, what: str) -> None:
+    def show(done: float, total: float, what: str) -> None:
         nonlocal last
-        if time.monotonic() - last > EVERY:
+        if time.monotonic() - last > PROGRESS_INTERVAL:
             last = time.monotonic()
             say(f"  {what}, {done:.0f} of {total:.0f} samples")
 
-    return tell
+    return show
 
 
 def say(line: str) -> None:
-    """A line on stdout, at once."""
+    """Print a line and flush stdout."""
     print(line, flush=True)
 
 

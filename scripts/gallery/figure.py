@@ -1,4 +1,4 @@
-"""What a byte buys, a panel a scene: held-out PSNR of methods and of the gallery's own assets against bytes a texel."""
+"""The figure of error by bytes: held-out PSNR of methods and of the gallery's assets against bytes per texel, one panel per scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from scripts.gallery.making import read_scores
-from scripts.gallery.places import Places
+from scripts.gallery.paths import ScenePaths
 from scripts.gallery.steps import Steps
 from srbf.asset import Asset
 from srbf.evaluation.rate_distortion import ALL, NEAREST, texel_bytes
@@ -26,26 +26,26 @@ COLORS = {
     "ptm": "#8a929b",
 }
 RED = "#c8501e"
-OWN = {"all": ("s", "shown here, on all texels"), "indirect": ("*", "shown here, direct light by rays")}  # marks of this page's assets
+MARKS = {"all": ("s", "shown here, on all texels"), "indirect": ("*", "shown here, direct light by rays")}  # of this page's assets
 BASELINES = {ALL: "--", NEAREST: ":"}
 TICKS = (2, 4, 8, 16, 32, 64, 128, 256, 512)
-ACROSS = 3
+COLUMNS = 3
 DPI = 140
 
 
-def draw(made: Sequence[Places], path: Path) -> None:
+def draw(made: Sequence[ScenePaths], path: Path) -> None:
     """Write the figure of all scenes that are done."""
-    across = min(ACROSS, len(made))
+    across = min(COLUMNS, len(made))
     down = -(-len(made) // across)
     figure = Figure(figsize=(0.6 + 3.7 * across, 0.9 + 2.9 * down), dpi=DPI, facecolor="white", layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(down, across, squeeze=False)
     for axes in panels.ravel()[len(made) :]:
         axes.set_axis_off()
-    for axes, places in zip(panels.ravel(), made, strict=False):
-        _panel(axes, places)
+    for axes, paths in zip(panels.ravel(), made, strict=False):
+        _panel(axes, paths)
     for axes in panels[-1]:
-        axes.set_xlabel("bytes a texel (log scale)", color=SOFT, fontsize=9)
+        axes.set_xlabel("bytes per texel (log scale)", color=SOFT, fontsize=9)
     for row in panels:
         row[0].set_ylabel("held-out PSNR, dB", color=SOFT, fontsize=9)
     handles = {name: handle for axes in panels.ravel() for handle, name in zip(*axes.get_legend_handles_labels(), strict=True)}
@@ -57,16 +57,16 @@ def draw(made: Sequence[Places], path: Path) -> None:
         figure.savefig(temporary, format="webp", pil_kwargs={"lossless": True})
 
 
-def made_from(made: Sequence[Places], steps: Steps) -> Any:
-    """What the figure depends on."""
+def made_from(made: Sequence[ScenePaths], steps: Steps) -> Any:
+    """The inputs of the figure: its source and the digests of the steps."""
     text = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
     parts = {f"{p.scene.name}/{part}" for p in made for part in ("compare methods", *(f"evaluate {fit.folder}" for fit in p.scene.fits))}
     return [text, *((part, steps.made(part).digest) for part in sorted(parts))]
 
 
-def _panel(axes: Any, places: Places) -> None:
-    scores = read_scores(places)
-    axes.set_title(places.scene.name.replace("_", " "), fontsize=11, color=INK, loc="left")
+def _panel(axes: Any, paths: ScenePaths) -> None:
+    scores = read_scores(paths)
+    axes.set_title(paths.scene.name.replace("_", " "), fontsize=11, color=INK, loc="left")
     axes.set_xscale("log", base=2)
     axes.grid(color=RULE, lw=0.6)
     axes.set_axisbelow(True)
@@ -81,9 +81,9 @@ def _panel(axes: Any, places: Places) -> None:
     for score in scores:
         if score.family in BASELINES:
             axes.axhline(score.psnr, color="#8a929b", lw=1.1, ls=BASELINES[score.family], label=score.family)
-    for fit in places.scene.fits:
-        mark, name = OWN[fit.light]
-        bytes_per_texel, reached = own_point(places, fit.folder)
+    for fit in paths.scene.fits:
+        mark, name = MARKS[fit.light]
+        bytes_per_texel, reached = own_point(paths, fit.folder)
         axes.plot(
             bytes_per_texel,
             reached,
@@ -101,7 +101,7 @@ def _panel(axes: Any, places: Places) -> None:
     axes.minorticks_off()
 
 
-def own_point(places: Places, folder: str) -> tuple[float, float]:
-    """(bytes a texel, held-out PSNR) of an asset as it was evaluated, on all texels."""
-    fit = next(fit for fit in places.scene.fits if fit.folder == folder)
-    return float(texel_bytes(Asset.open(places.asset(fit)))), files.read_json(places.errors(fit))["holdout"]["psnr"]
+def own_point(paths: ScenePaths, folder: str) -> tuple[float, float]:
+    """(bytes per texel, held-out PSNR in dB) of an asset, evaluated on all texels."""
+    fit = next(fit for fit in paths.scene.fits if fit.folder == folder)
+    return float(texel_bytes(Asset.open(paths.asset(fit)))), files.read_json(paths.errors(fit))["holdout"]["psnr"]

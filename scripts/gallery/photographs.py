@@ -1,4 +1,4 @@
-"""A dome of lamps as photographers of reliefs use it, and the photographs that it would deliver: 8-bit JPEGs with light lists."""
+"""A light dome as used for photographs of reliefs, and its photographs: 8-bit JPEGs with light lists."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from srbf.sphere import point_set, random_directions
 
 POINT_LIGHTS, DIRS, TEST = "point_lights.lp", "dirs.lp", "test.lp"
 QUALITY = 95  # of the JPEGs
-WHITEST = 0.998  # of the pixels of all photographs are below white
+WHITE_QUANTILE = 0.998  # of the pixels of all photographs; it becomes white
 
 
 def dome_directions(dome: Dome) -> Float64[ndarray, "L 3"]:
-    """Its lamps, evenly spread above its lowest elevation, then the random ones to test by."""
+    """Unit directions of a dome's lights: those to fit, evenly spread above its lowest elevation, then the random held-out ones."""
     floor = np.sin(np.radians(dome.lowest))
     even = point_set("fibonacci", dome.point_lights, "hemisphere")
     random = random_directions(dome.tests, "hemisphere", np.random.default_rng(5))
@@ -29,30 +29,30 @@ def dome_directions(dome: Dome) -> Float64[ndarray, "L 3"]:
 
 
 def _lifted(directions: Float64[ndarray, "n 3"], floor: float) -> Float64[ndarray, "n 3"]:
-    """Directions of the hemisphere moved evenly onto the cap above z = floor: equal areas stay equal."""
+    """Directions of the hemisphere mapped onto the cap above z = floor; the map preserves area up to a factor."""
     z = floor + directions[:, 2] * (1 - floor)
     across = directions[:, :2] * np.sqrt((1 - z**2) / np.maximum(1 - directions[:, 2] ** 2, 1e-12))[:, None]
     return np.column_stack([across, z])
 
 
 def write_list(path: Path, names: list[str], directions: Float64[ndarray, "n 3"]) -> None:
-    """A .lp file."""
+    """Write a .lp file: one name and direction per light."""
     lines = [f"{name} {x:.6f} {y:.6f} {z:.6f}" for name, (x, y, z) in zip(names, directions, strict=True)]
     files.write_text(path, "\n".join([str(len(lines)), *lines]) + "\n")
 
 
 def write_point_lights(path: Path, dome: Dome) -> None:
-    """The light list that Blender bakes by."""
+    """Write the light list of the bake."""
     directions = dome_directions(dome)
     write_list(path, [f"{i:03d}" for i in range(len(directions))], directions)
 
 
 def photograph(rendered: Path, dome: Dome, folder: Path) -> None:
-    """Write every image of a baked dome as a JPEG under one exposure, and the lists of those to fit and of those to test by."""
+    """Write every image of a baked dome as a JPEG with one exposure, and the light lists to fit and to test."""
     files.make_folder(folder)
     capture = Capture.open(rendered)
     everything = np.concatenate([image[::4, ::4].ravel() for image in map(capture.image, range(len(capture.lights)))])
-    gain = 1.0 / float(np.quantile(everything, WHITEST))
+    gain = 1.0 / float(np.quantile(everything, WHITE_QUANTILE))
     names = [f"{'test' if i >= dome.point_lights else 'photo'}_{i:03d}.jpg" for i in range(len(capture.lights))]
     for i, name in enumerate(names):
         bytes_ = np.round(encode_srgb(np.clip(capture.image(i) * gain, 0, 1)) * 255).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""The scenes of the gallery: what of each is baked, how it is fitted, and what is shown of it."""
+"""The scenes of the gallery: how each is baked and fitted, and what the page shows of it."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from srbf.bake.settings import BakeSettings, Receiver, captures_of
 from srbf.capture import Transport
 from srbf.relighting.direct_light import Direct
 
-Place = tuple[float, float, float]
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Fit:
-    """One asset of a scene: its folder, what it is called in a picture, and the flags of `srbf fit`.
+    """One asset of a scene: its folder, its label in a picture, and the flags of `srbf fit`.
 
-    `light`: `all` fits the combined answer, `indirect` what an indirect bake leaves after the direct light, which rays then add.
+    `light`: `all` fits the combined response; `indirect` fits the indirect images, and rays add the direct light.
     """
 
     folder: str
@@ -33,7 +33,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Dome:
-    """A photographer's dome: so many lamps above an elevation (degrees), every one photographed, some only to test by."""
+    """A photographer's light dome: `point_lights` to fit and `tests` to hold out, all above the elevation `lowest` (degrees)."""
 
     point_lights: int
     tests: int
@@ -42,30 +42,30 @@ class Dome:
 
 @dataclass(frozen=True)
 class Lantern:
-    """A lamp carried through a scene: corners of its closed path (m), its irradiance at 1 m, and the moon beside it."""
+    """A point light carried through a scene: corners of its closed path (m), its irradiance at 1 m, and a directional moon."""
 
-    path: tuple[Place, ...]
-    color: Place
+    path: tuple[Vector, ...]
+    color: Vector
     radius: float
-    moon: Place
-    moon_color: Place
+    moon: Vector
+    moon_color: Vector
 
 
 @dataclass(frozen=True)
 class Sun:
-    """A directional light that goes round once, its elevation swinging between two (degrees), `swings` times."""
+    """A directional light that orbits once while its elevation oscillates between `low` and `high` (degrees), `swings` times."""
 
     low: float
     high: float
     swings: int = 1
-    second: Place | None = None  # color of another one that goes the other way
-    color: Place = (1.0, 1.0, 1.0)
+    second: Vector | None = None  # color of a second light that orbits in the opposite direction
+    color: Vector = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """All that is decided of one scene. `moving` are the folders of the fits in the clip, `tested` directions (azimuth and elevation,
-    degrees) near which the strip's held-out lights are taken. Of several `receivers`, all lightmaps, one atlas is baked."""
+    """The settings of one scene. `moving` are the folders of the fits in the clip; `tested` are directions (azimuth and elevation,
+    degrees), and the strip shows the held-out lights nearest to them. Several `receivers`, all lightmaps, share one atlas."""
 
     name: str
     receivers: tuple[str, ...]
@@ -88,17 +88,17 @@ class Scene:
 
     @property
     def moved(self) -> tuple[Fit, ...]:
-        """The fits of the clip; the first carries the lantern."""
+        """The fits of the clip; the lantern uses the first."""
         return tuple(next(fit for fit in self.fits if fit.folder == folder) for folder in self.moving)
 
     @property
     def receiver(self) -> Receiver:
-        """What is baked, as `srbf bake` takes its --receiver words."""
+        """The receiver, parsed as by `srbf bake --receiver`."""
         (receiver,) = captures_of([Receiver.parse(word) for word in self.receivers])
         return receiver
 
     def bake_settings(self) -> BakeSettings:
-        """As `srbf bake` takes them; a dome's light list is added by who writes it."""
+        """The settings of `srbf bake`; the caller adds a dome's light list."""
         receiver = self.receiver
         settings = BakeSettings(
             receiver,
@@ -116,7 +116,7 @@ class Scene:
         return settings.with_matched_sun() if self.soft_sun else settings
 
     def point_light_settings(self, samples: int = 64) -> BakeSettings | None:
-        """A bake of true lamps on the lantern's path, by which the relit lantern is measured."""
+        """The settings of a bake of true point lights on the lantern's path, the reference of the relit lantern; None without a lantern."""
         if not isinstance(self.clip, Lantern):
             return None
         receiver = self.receiver
@@ -124,7 +124,7 @@ class Scene:
         return BakeSettings(receiver, *self.size, samples=samples, validation=0, holdout=0, quantity="radiance", points=grid)
 
     def small(self) -> Scene:
-        """The same with few lights on few texels, in seconds: for the test."""
+        """The same scene with few lights and few texels, for the test; takes seconds."""
         largest = max(self.size)
         size = (max(24, 64 * self.size[0] // largest), max(24, 64 * self.size[1] // largest))
         dome = self.dome and replace(self.dome, point_lights=24, tests=4)
@@ -143,11 +143,11 @@ class Scene:
         )
 
 
-MAPS = Fit("asset-25-maps", "25 maps of all light", "relighting-map", {"k": 25})
+MAPS = Fit("asset-25-maps", "25 maps of combined light", "relighting-map", {"k": 25})
 SMALL = Fit("asset", "best of 16 bytes", "auto", {"budget": 16})
 MAPS_AND_RAYS = replace(MAPS, folder="asset-indirect-25-maps", label="25 maps + rays", light="indirect")
-SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, all light")
-SCALARS_AND_RAYS = Fit("asset", "16 scalars + rays", "eigen-map", {"scalars": 16, "encoding": "uint8"}, light="indirect")
+SMALL_ALL = replace(SMALL, folder="asset-all", label="best of 16 bytes, combined light")
+COMPONENTS_AND_RAYS = Fit("asset", "16 components + rays", "eigen-map", {"components": 16, "encoding": "uint8"}, light="indirect")
 
 STILL_LIFE = tuple(f"lightmap:{name}" for name in ("Table", "Tall Vase", "Egg", "Faceted Vase", "Mirrored Jar", "Sheared Bowl", "Ring"))
 
@@ -168,7 +168,7 @@ SCENES = (
         size=(384, 288),
         validation=0,
         transport="indirect",
-        fits=(MAPS, MAPS_AND_RAYS, SCALARS_AND_RAYS),
+        fits=(MAPS, MAPS_AND_RAYS, COMPONENTS_AND_RAYS),
         moving=("asset-indirect-25-maps",),
         clip=Lantern(
             ((-1.9, -1.6, 1.2), (-0.2, -1.7, 1.2), (1.1, -1.2, 1.2), (0.9, 0.6, 1.2), (0.5, 2.2, 1.2), (-1.2, 2.1, 1.2), (-1.8, 0.4, 1.2)),
@@ -193,7 +193,7 @@ SCENES = (
         receivers=("view",),
         size=(384, 288),
         transport="indirect",
-        fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
+        fits=(MAPS, SMALL_ALL, COMPONENTS_AND_RAYS),
         clip=Sun(25, 60, 2),
         moving=("asset-25-maps", "asset-all", "asset"),
         clip_width=900,
@@ -213,7 +213,7 @@ SCENES = (
         receivers=STILL_LIFE,
         size=(288, 288),
         transport="indirect",
-        fits=(MAPS, SMALL_ALL, SCALARS_AND_RAYS),
+        fits=(MAPS, SMALL_ALL, COMPONENTS_AND_RAYS),
         clip=Sun(20, 60, 2),
         moving=("asset-25-maps", "asset"),
         clip_width=800,

@@ -1,4 +1,4 @@
-"""Steps that are done once: each knows what it was made from, what it left and how long it took, over any number of runs."""
+"""Steps that run once: each records its inputs, its outputs and its time, over any number of runs."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from typing import Any
 from srbf.io import files
 
 TIMES = "times.json"
-BEAT = 5.0  # seconds between two notes of how long the step at hand has taken so far
+RECORD_INTERVAL = 5.0  # seconds between two records of the time of the running step
 
 
 @dataclass(frozen=True)
 class Made:
-    """A finished step: the digest of all that it was made from, its wall seconds, those of interrupted runs included, and CPU seconds.
+    """A finished step: the digest of its inputs, its wall seconds (interrupted runs included), and its CPU seconds.
 
-    `cpu` lacks what a killed run had used by then; `interrupted` counts such runs.
+    `cpu` leaves out killed runs; `interrupted` counts them.
     """
 
     digest: str
@@ -34,7 +34,7 @@ class Made:
 
 @dataclass
 class Steps:
-    """The steps of one gallery, noted in times.json of its folder."""
+    """The steps of one gallery, recorded in its folder's times.json."""
 
     folder: Path
     say: Callable[[str], None]
@@ -47,7 +47,7 @@ class Steps:
             self._noted = files.read_json(self.folder / TIMES)["steps"]
 
     def run(self, name: str, made_from: Any, outputs: Sequence[Path], make: Callable[[], object]) -> str:
-        """Do the step unless its outputs are there and were made from the same; returns the digest for steps that follow."""
+        """Run `make` unless the outputs exist and were made from the same inputs; returns the digest of the inputs for later steps."""
         digest = hashlib.sha256(json.dumps(made_from, sort_keys=True, default=str).encode()).hexdigest()[:16]
         before = self._noted.get(name)
         same = before is not None and before["digest"] == digest
@@ -63,26 +63,26 @@ class Steps:
             note |= {"seconds": before["seconds"], "interrupted": before["interrupted"] + 1}
         self._noted[name] = note
         used = _cpu_seconds()
-        with self._beating(note):
+        with self._recording(note):
             make()
         missing = [path.name for path in outputs if not path.exists()]
-        assert not missing, f"{name} left no {missing}"
+        assert not missing, f"{name} did not write {missing}"
         note |= {"done": True, "cpu": round(_cpu_seconds() - used, 2)}
         self._write()
         self.say(f"{name}: {note['seconds']:.1f} s")
         return digest
 
     def made(self, name: str) -> Made:
-        """What is noted of a finished step."""
+        """The record of a finished step."""
         note = self._noted[name]
         return Made(note["digest"], note["seconds"], note["cpu"], note["interrupted"])
 
     def has(self, name: str) -> bool:
-        """Whether a step was finished once."""
+        """Whether a step was ever finished."""
         return bool(self._noted.get(name, {}).get("done"))
 
     def spent(self, scene: str, kinds: Sequence[str]) -> float:
-        """Seconds of a scene's finished steps whose names are, or begin with, one of some words."""
+        """Seconds of a scene's finished steps whose names equal, or begin with, one of `kinds`."""
         names = [f"{scene}/{kind}" for kind in kinds]
         return sum(
             note["seconds"]
@@ -91,22 +91,22 @@ class Steps:
         )
 
     def total(self, scenes: Sequence[str]) -> Made:
-        """The sums over all finished steps of some scenes."""
+        """Sums over all finished steps of some scenes."""
         notes = [note for name, note in self._noted.items() if note["done"] and name.split("/")[0] in scenes]
         return Made("", sum(n["seconds"] for n in notes), sum(n["cpu"] for n in notes), sum(n["interrupted"] for n in notes))
 
     @contextmanager
-    def _beating(self, note: dict[str, Any]) -> Iterator[None]:
-        """Note every few seconds how long it has taken, so that a kill loses little of the time."""
+    def _recording(self, note: dict[str, Any]) -> Iterator[None]:
+        """Record the elapsed time every few seconds, so that a kill loses little of it."""
         earlier, started, over = note["seconds"], time.perf_counter(), threading.Event()
 
-        def beat() -> None:
-            while not over.wait(BEAT):
+        def record() -> None:
+            while not over.wait(RECORD_INTERVAL):
                 note["seconds"] = round(earlier + time.perf_counter() - started, 2)
                 self._write()
 
         self._write()
-        thread = threading.Thread(target=beat, daemon=True)
+        thread = threading.Thread(target=record, daemon=True)
         thread.start()
         try:
             yield
@@ -121,6 +121,6 @@ class Steps:
 
 
 def _cpu_seconds() -> float:
-    """Of this process and of all children that have ended."""
+    """CPU seconds of this process and of all ended children."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system

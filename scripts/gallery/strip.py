@@ -1,4 +1,4 @@
-"""The strip of a scene: rendered and relit pictures side by side under unseen lights."""
+"""The strip of a scene: rendered and relit images side by side under held-out lights."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from PIL import Image, ImageDraw
 
 from scripts.gallery import drawing
 from scripts.gallery.drawing import INK, SOFT, font
-from scripts.gallery.places import Places
+from scripts.gallery.paths import ScenePaths
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.evaluation.errors_by_role import psnr
 from srbf.io import files
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 from srbf.relighting.direct_light import Added
 from srbf.sphere import normalize
 
-NARROWEST, WIDEST = 160, 384  # pixels of one picture
+MIN_WIDTH, MAX_WIDTH = 160, 384  # pixels of one image
 GAP, HEADING, UNDER, SIDE = 8, 30, 24, 74
 
 
 @dataclass(frozen=True)
 class Row:
-    """One light: what stands beside its pictures, the pictures with a line under each, and the exposure that they share."""
+    """One light: the glyph and text beside its images, the images with a line under each, and their common exposure."""
 
     glyph: Image.Image | None
     beside: tuple[str, ...]
@@ -35,13 +35,13 @@ class Row:
     gain: float
 
 
-def draw(places: Places) -> None:
-    """Write the strip: a row a light, the renderer's picture first, then each fit's with its PSNR."""
-    scene = places.scene
-    capture = Capture.open(places.capture).combined()
+def draw(paths: ScenePaths) -> None:
+    """Write the strip: one row per light, the rendered image first, then each fit's with its PSNR."""
+    scene = paths.scene
+    capture = Capture.open(paths.capture).combined()
     chosen = tested_lights(capture, scene.tested)
-    responses = [relit(places, fit_index, capture, chosen) for fit_index in range(len(scene.fits))]
-    errors = [files.read_json(places.errors(fit)) for fit in scene.fits]
+    responses = [relit(paths, fit_index, capture, chosen) for fit_index in range(len(scene.fits))]
+    errors = [files.read_json(paths.errors(fit)) for fit in scene.fits]
     rows = []
     for n, index in enumerate(chosen):
         direction, file = capture.directions([index])[0], capture.lights[index].file
@@ -61,11 +61,11 @@ def draw(places: Places) -> None:
             )
         )
     headings = ["photographed" if scene.dome else "rendered by Cycles", *(fit.label for fit in scene.fits)]
-    drawing.save(sheet(headings, rows), places.strip)
+    drawing.save(sheet(headings, rows), paths.strip)
 
 
 def tested_lights(capture: Capture, wanted: Sequence[tuple[float, float]]) -> list[int]:
-    """The held-out light nearest to each (azimuth, elevation) in degrees, none twice."""
+    """Index of the held-out light nearest to each (azimuth, elevation) in degrees, none twice."""
     indices = capture.indices("holdout")
     directions = capture.directions(indices)
     chosen: list[int] = []
@@ -76,20 +76,20 @@ def tested_lights(capture: Capture, wanted: Sequence[tuple[float, float]]) -> li
     return chosen
 
 
-def relit(places: Places, fit_index: int, capture: Capture, chosen: Sequence[int]) -> list[ndarray]:
-    """A fit's pictures under some of the capture's lights, its direct light added where it lacks it."""
-    fit = places.scene.fits[fit_index]
-    asset = Asset.open(places.asset(fit))
+def relit(paths: ScenePaths, fit_index: int, capture: Capture, chosen: Sequence[int]) -> list[ndarray]:
+    """A fit's images under some of the capture's lights, with direct light where the fit leaves it out."""
+    fit = paths.scene.fits[fit_index]
+    asset = Asset.open(paths.asset(fit))
     directions = capture.directions(chosen)
     with Added(asset, fit.direct) as added:
         direct = added.directional(directions)
-        return list(np.maximum(directional_responses(asset, directions) + direct, 0))
+        return list(np.maximum(asset_responses(asset, directions) + direct, 0))
 
 
 def sheet(headings: Sequence[str], rows: Sequence[Row]) -> Image.Image:
-    """Rows of pictures under headings on white."""
+    """Rows of images under headings on white."""
     height, width = rows[0].pictures[0].shape[:2]
-    w = min(WIDEST, max(NARROWEST, width))
+    w = min(MAX_WIDTH, max(MIN_WIDTH, width))
     h = round(w * height / width)
     paper = Image.new("RGB", (SIDE + len(headings) * (w + GAP), HEADING + len(rows) * (h + UNDER)), "white")
     pen = ImageDraw.Draw(paper)

@@ -1,4 +1,4 @@
-"""What goes wrong in a night's bake and can be known at its start: light that reaches nothing, a disk too small."""
+"""Failures of an overnight bake that can be detected at its start: light that reaches nothing, a full disk."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from srbf.bake.settings import BakeSettings
 from srbf.errors import BakeError
 from srbf.io.files import WriteError
 
-FIRST_LIGHTS = 24  # of the order in which they are rendered: they cover the domain
+FIRST_LIGHTS = 24  # in the order of rendering: they cover the domain
 HALF_BYTES, FLOAT_BYTES = 2, 4
 GEOMETRY_CHANNELS = 10
 
 
 class FirstLights:
-    """Looks at the first lights of a bake. A night of black images, or of images that light does not change, ends after a few.
+    """Checks the first lights of a bake, so that one whose images are all black, or all constant, ends after a few.
 
-    One black image may be a sun behind a wall, and one constant one is what a plane shows: those are said. FIRST_LIGHTS of them, over
-    all the domain, are an error.
+    A single black image may be a sun behind a wall, and a plane's image is constant: the first black one is a warning. FIRST_LIGHTS of
+    them, over the whole domain, are an error.
     """
 
     def __init__(self, lights: int, place: str, say: Callable[[str], None]) -> None:
@@ -38,18 +38,18 @@ class FirstLights:
 
     @property
     def lit(self) -> bool:
-        """Whether one of those looked at has any light."""
+        """Whether one of the images checked has any light."""
         return not self._black
 
     def black(self, count: int) -> BakeError:
         """The error of `count` black images."""
         return BakeError(
-            f"every one of {count} light images is black: does light reach {self._place} from where the lights stand? "
-            "Mend the scene, then bake with --restart"
+            f"all {count} light images are black: can light reach {self._place} from the directions or positions of the lights? "
+            "Fix the scene, then bake with `restart=True`"
         )
 
     def look(self, image: np.ndarray) -> None:
-        """Of the next light; BakeError at the last of the first ones, where nothing was lit or nothing changed."""
+        """Check the next light's image; BakeError at the last of the first ones, where all were black or all constant."""
         if not self.looking:
             return
         self._seen += 1
@@ -58,20 +58,20 @@ class FirstLights:
         self._varied |= bool((image != image.flat[0]).any()) or self._constant not in (None, value)
         self._constant = value
         if self._black and self._seen == 1 < self._count:
-            self._say(f"the first light leaves {self._place} black; should {self._count} of them do so, the bake ends")
+            self._say(f"the image of the first light of {self._place} is black; the bake ends if the first {self._count} are")
         if self.looking:
             return
         if self._black:
             raise self.black(self._count)
         if not self._varied:
             raise BakeError(
-                f"the first {self._count} light images all hold {value:g} and nothing else: {self._place} does not answer to light. "
-                "Mend the scene, then bake with --restart"
+                f"the first {self._count} light images all hold {value:g} and nothing else: {self._place} does not respond to light. "
+                "Fix the scene, then bake with `restart=True`"
             )
 
 
 def bytes_needed(settings: BakeSettings, lights: int, summed: int) -> int:
-    """Bytes of a capture of so many lights, uncompressed, `summed` of them with their sums."""
+    """Bytes of an uncompressed capture of `lights` lights, `summed` of which keep their running sums."""
     texels = settings.width * settings.height
     images = 2 if settings.transport == "indirect" else 1
     sums = images + 1  # validation lights have their squares
@@ -79,11 +79,11 @@ def bytes_needed(settings: BakeSettings, lights: int, summed: int) -> int:
 
 
 def check_disk(folder: Path, needed: int) -> None:
-    """WriteError where the disk under `folder` has not so many bytes left."""
+    """WriteError where the disk of `folder` has fewer than `needed` bytes left."""
     where = next(path for path in (folder.resolve(), *folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     if free < needed:
         raise WriteError(
             f"expected {needed / 1e9:.2f} GB free for the whole capture at {folder}, found {free / 1e9:.2f} GB; "
-            "free some, choose another -o, or a smaller --size"
+            "free some, choose another folder, or a smaller `size`"
         )

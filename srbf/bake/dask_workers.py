@@ -1,7 +1,7 @@
-"""`--dask`: other machines render a bake's lights into the folder that they share with its host, each pass of a light at most once.
+"""Baking by dask: other machines render a bake's lights into the folder that they share with its host, each pass of a light at most once.
 
-The host alone holds the folder, decides what is rendered next, and writes the manifest. A fence, a file that is there as long as it runs,
-keeps away what a process that was taken for dead would still write.
+Only the host holds the folder, decides what is rendered next, and writes the manifest. A fence file exists while the host runs: without
+it a worker that was taken for dead writes nothing more.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from uuid import uuid4
 
 import srbf
 from srbf.bake import folder
+from srbf.bake.accumulation import LATE, Accumulation
 from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
 from srbf.bake.settings import BakeSettings
-from srbf.bake.sums import LATE, Sums
 from srbf.bake.worker import Worker
 from srbf.bake.worker_pool import TRIES, RemoteResult, Response, Take, Task, WorkerPool, WorkerPoolSettings
 from srbf.compute.dask_client import Cluster, ClusterError, scratch_root
@@ -36,14 +36,14 @@ from srbf.io import files
 if TYPE_CHECKING:
     from srbf.bake.run import Bake
 
-MOST_LIGHTS = 4  # of one dask task: a bake that is stopped waits for those begun
-IDLE = 300.0  # seconds after which a machine's Blender is closed that nobody asks
-STOP = "stop"  # in the scratch folder: begin nothing more
+MOST_LIGHTS = 4  # per dask task: a bake that is stopped waits for those begun
+IDLE = 300.0  # seconds without a request after which a machine's Blender is closed
+STOP = "stop"  # file in the scratch folder: begin no other light
 
 
 @dataclass(frozen=True)
 class RemoteBake:
-    """What another machine must know of a bake; `folder` and `scene` are paths that it sees too. `token` names the host's run of it."""
+    """What another machine needs of a bake. It sees `folder` and `scene` under the same paths; `token` names the host's run."""
 
     token: str
     scene: Path
@@ -51,7 +51,7 @@ class RemoteBake:
     folder: Path
     settings: BakeSettings
     blender: Path | None
-    crew: WorkerPoolSettings
+    pool: WorkerPoolSettings
     version: str
 
     @property
@@ -61,9 +61,9 @@ class RemoteBake:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a dask task's lights, by index: committed, or given up and why. Those of which nothing is said are due as before.
+    """The results of a dask task's lights, by index: committed, or failed and why. Lights in neither are still to be rendered.
 
-    `said`: lines for the user.
+    said: lines for the user.
     """
 
     lights: dict[int, RemoteResult]
@@ -72,7 +72,7 @@ class Report:
 
 
 class DaskWorkerPool:
-    """A `WorkerPool` of a dask scheduler's workers: they render lights and take them into the folder. The scene is prepared here."""
+    """A `WorkerPool` of a dask scheduler's workers, which render lights into the folder. This machine prepares the scene."""
 
     def __init__(self, address: str, bake: Bake, identity: dict[str, Any], here: WorkerPool, say: Callable[[str], None]) -> None:
         self._cluster = Cluster(address, say)
@@ -84,7 +84,7 @@ class DaskWorkerPool:
             bake.folder.resolve(),
             bake.settings,
             bake.blender,
-            WorkerPoolSettings(1, bake.crew.lights_per_worker, bake.crew.worker_timeout),
+            WorkerPoolSettings(1, bake.pool.lights_per_worker, bake.pool.worker_timeout),
             srbf.__version__,
         )
         self._refused: Counter[int] = Counter()
@@ -102,20 +102,20 @@ class DaskWorkerPool:
         self._cluster.__exit__(kind, error, trace)
 
     def open(self) -> None:
-        """Open the scene on this machine, and close it again."""
-        with self._here as crew:
-            crew.open()
+        """Open the scene on this machine, which prepares it, and close it."""
+        with self._here as pool:
+            pool.open()
 
     def stop(self) -> None:
-        """Begin no other light; `render` returns once those at hand are done."""
+        """Begin no other light; `render` returns once those begun are done."""
         self._stop = True
         with suppress(OSError):
             (self._bake.folder / SCRATCH / STOP).touch()
 
     def render(self, tasks: Sequence[Task], take: Take) -> None:
-        """Have every task rendered and committed, and hand over what was said of it; lights given up are in `failed`.
+        """Have every task rendered and committed, and pass its result to `take`; lights given up are in `failed`.
 
-        KeyboardInterrupt lets the lights at hand finish, then is raised.
+        KeyboardInterrupt lets the lights begun finish, then is raised.
         """
         size = max(1, min(MOST_LIGHTS, len(tasks) // max(1, 2 * self._cluster.threads)))
         waiting = [list(tasks[i : i + size]) for i in range(0, len(tasks), size)]
@@ -133,19 +133,19 @@ class DaskWorkerPool:
                     if interrupt is not None:
                         raise
                     interrupt = pressed
-                    self._say("finishing the lights at hand; press again to stop at once")
+                    self._say("finishing the lights begun; press again to stop at once")
                     self.stop()
                     results = self._cluster.map(render_lights, [], lambda: False)
         if interrupt is not None:
             raise interrupt
 
     def _taken(self, chunk: list[Task], result: Report | ClusterError, take: Take) -> list[list[Task]]:
-        """Hand over what came of a chunk; what is to be tried again in other chunks."""
+        """Pass the results of a chunk to `take`; returns what is to be tried again, in other chunks."""
         if isinstance(result, ClusterError):
-            if len(chunk) > 1:  # it may be one of them alone
+            if len(chunk) > 1:  # one light alone may be the cause
                 return [[task] for task in chunk]
             index = chunk[0].light.index
-            self._say(f"light {index}: {result}; given up, the rest goes on")
+            self._say(f"light {index}: {result}; given up, the other lights are rendered")
             self.failed[index] = str(result)
             return []
         for line in result.said:
@@ -158,19 +158,19 @@ class DaskWorkerPool:
             elif index not in result.failed and not self._stop:
                 self._refused[index] += 1
                 if self._refused[index] >= TRIES:
-                    self.failed[index] = f"expected its pass {task.before} in the folder, found it nowhere; do all machines see one folder?"
+                    self.failed[index] = f"expected its pass {task.before} in the folder, found none; do all machines see the same folder?"
         return []
 
 
 class _RemoteWorker:
-    """One machine's Blender for one bake, kept from task to task."""
+    """One machine's Blender for one bake, kept between tasks."""
 
     def __init__(self, bake: RemoteBake) -> None:
         host = socket.gethostname()
         if not bake.fence.is_file():
             raise BakeError(f"expected the capture at {bake.folder} on {host} too, found none; share the folder under one path")
         if srbf.__version__ != bake.version:
-            raise BakeError(f"expected srbf {bake.version} on {host}, found {srbf.__version__}; install the same everywhere")
+            raise BakeError(f"expected srbf {bake.version} on {host}, found {srbf.__version__}; install the same version everywhere")
         if not bake.scene.is_file() or files.sha256_of(bake.scene) != bake.scene_sha256:
             raise BakeError(f"expected the same scene at {bake.scene} on {host}, found {'another' if bake.scene.exists() else 'none'}")
         self._said: list[str] = []
@@ -180,21 +180,21 @@ class _RemoteWorker:
         self.bake = bake
         self.timer: threading.Timer | None = None
         self._scratch = Path(tempfile.mkdtemp(prefix="srbf-", dir=scratch_root()))
-        self._worker_pool = WorkerPool(bake.crew, self._scratch, self._start, self._ready, self._said.append)
+        self._worker_pool = WorkerPool(bake.pool, self._scratch, self._start, self._ready, self._said.append)
 
     def close(self) -> None:
         self._worker_pool.__exit__(None, None, None)
         shutil.rmtree(self._scratch, ignore_errors=True)
 
     def render(self, tasks: list[Task]) -> Report:
-        """Render and commit what is not in yet."""
+        """Render and commit the tasks that are not in the folder yet."""
         self._said.clear()
-        sums = Sums(self.bake.folder, [task.light for task in tasks])
+        accumulation = Accumulation(self.bake.folder, [task.light for task in tasks])
         lights: dict[int, RemoteResult] = {}
         due = []
         for task in tasks:
-            if sums.refresh(task.light, task.before, LATE):
-                if sums.passes(task.light) == task.before:
+            if accumulation.refresh(task.light, task.before, LATE):
+                if accumulation.passes(task.light) == task.before:
                     due.append(task)
                 else:
                     lights[task.light.index] = RemoteResult(0.0)
@@ -203,10 +203,10 @@ class _RemoteWorker:
             assert isinstance(response, Response)
             try:
                 with self._alone(task) as allowed:
-                    sums.refresh(task.light)
-                    if allowed and sums.passes(task.light) == task.before:
-                        add_pass(self._images, sums, task, response)
-                    if sums.passes(task.light) > task.before:
+                    accumulation.refresh(task.light)
+                    if allowed and accumulation.passes(task.light) == task.before:
+                        add_pass(self._images, accumulation, task, response)
+                    if accumulation.passes(task.light) > task.before:
                         lights[task.light.index] = RemoteResult(response.seconds)
             except BakeError as error:
                 lights[task.light.index] = RemoteResult(response.seconds, str(error))
@@ -219,7 +219,7 @@ class _RemoteWorker:
 
     @contextmanager
     def _alone(self, task: Task) -> Iterator[bool]:
-        """Alone with one light, its host still there: False where it is not."""
+        """Hold one light's lock; yields False where another process has it, or the host is gone."""
         if not self.bake.fence.is_file():
             yield False
             return
@@ -249,39 +249,39 @@ _mutex = threading.Lock()
 
 
 def render_lights(bake: RemoteBake, tasks: list[Task]) -> Report:
-    """What a dask worker does: one pass of some lights, by a Blender that it opens once a bake."""
+    """What a dask worker runs: one pass of some lights, by a Blender that it opens once per bake."""
     if (bake.folder / SCRATCH / STOP).exists():
         return Report({}, {}, [])
-    station = _from_idle(bake) or _RemoteWorker(bake)
+    worker = _from_idle(bake) or _RemoteWorker(bake)
     try:
-        report = station.render(tasks)
+        report = worker.render(tasks)
     except BaseException:
-        station.close()
+        worker.close()
         raise
     with _mutex:
-        station.timer = threading.Timer(IDLE, close_idle, (bake.token,))
-        station.timer.daemon = True
-        station.timer.start()
-        _idle.append(station)
+        worker.timer = threading.Timer(IDLE, close_idle, (bake.token,))
+        worker.timer.daemon = True
+        worker.timer.start()
+        _idle.append(worker)
     return report
 
 
 def close_idle(token: str) -> None:
-    """End this process's Blenders of a bake that wait for nothing, and those whose host is gone."""
+    """Close this process's idle Blenders of the bake `token`, and those whose host is gone."""
     with _mutex:
-        closing = [station for station in _idle if station.bake.token == token or not station.bake.fence.is_file()]
-        _idle[:] = [station for station in _idle if station not in closing]
-    for station in closing:
-        if station.timer is not None:
-            station.timer.cancel()
-        station.close()
+        closing = [worker for worker in _idle if worker.bake.token == token or not worker.bake.fence.is_file()]
+        _idle[:] = [worker for worker in _idle if worker not in closing]
+    for worker in closing:
+        if worker.timer is not None:
+            worker.timer.cancel()
+        worker.close()
 
 
 def _from_idle(bake: RemoteBake) -> _RemoteWorker | None:
     with _mutex:
-        station = next((station for station in _idle if station.bake.token == bake.token), None)
-        if station is not None:
-            _idle.remove(station)
-            if station.timer is not None:
-                station.timer.cancel()
-    return station
+        worker = next((worker for worker in _idle if worker.bake.token == bake.token), None)
+        if worker is not None:
+            _idle.remove(worker)
+            if worker.timer is not None:
+                worker.timer.cancel()
+    return worker

@@ -1,4 +1,4 @@
-"""The dry run: what a bake will cost, from two small lights of it."""
+"""The dry run: time and disk of a bake, estimated from a few renders of one light."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ import numpy as np
 
 from srbf.bake.checks import bytes_needed
 from srbf.bake.job import base_job
+from srbf.bake.request import Rendered, RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
 from srbf.bake.worker import Worker
 from srbf.io.image import write_image
 
-PROBE_SAMPLES = 4  # more than that of the other probe: enough to tell a light's fixed cost from its cost a sample
+PROBE_SAMPLES = 4  # more than that of the other probe: enough to separate the fixed cost per light from the cost per sample
 
 
 def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list[str]:
-    """Lines that tell receiver, lights, disk and time of `bake`; nothing is written where it would bake.
+    """Lines with scene, receiver, lights, disk and time of `bake`; its folder is not written to.
 
-    Two lights are rendered in a scratch folder; errors of the scene or receiver come up here as they would in the bake.
+    A light is rendered three times in a scratch folder; errors of scene and receiver are raised as the bake would raise them.
     """
     settings = bake.settings
     bake.check_scene()
@@ -35,33 +36,36 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     lights = plan_lights(settings)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        probes = [{**lights[len(lights) // 3].job(), "index": i, "samples": n} for i, n in enumerate((1, 1, 1 + PROBE_SAMPLES))]
-        job = {**base_job(bake.scene, settings, scratch), "geometry": False, "ambient": None, "lights": probes, "probes": []}
+        probe = lights[len(lights) // 3]
+        channels: tuple[Rendered, ...] = ("response", "direct") if settings.transport == "indirect" else ("response",)
+        counts = (1, 1, 1 + PROBE_SAMPLES)
+        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=channels) for i, n in enumerate(counts)]
+        job = base_job(bake.scene, settings, scratch, requests)
         facts: dict[str, Any] = {}
-        seconds, image_bytes = [0.0] * len(probes), 0
+        seconds, image_bytes = [0.0] * len(requests), 0
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
             for event in worker.events(say):
                 if event["event"] == "scene":
                     facts = event
-                elif event["event"] == "image":
+                elif event["event"] == "rendered":
                     seconds[event["light"]] = event["seconds"]
                     image_bytes = 0
-                    for file in (event[key] for key in ("file", "direct") if key in event):
+                    for file in event["files"].values():
                         write_image(scratch / "probe.exr", np.clip(np.load(scratch / file), -6e4, 6e4), "half")
                         image_bytes += (scratch / "probe.exr").stat().st_size
-    # The first light also hands the scene to Cycles: the second and third tell what every other one costs.
+    # The first render includes passing the scene to Cycles: the second and third give the cost of the others.
     per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
     fixed = max(0.0, seconds[1] - per_sample)
     ambient = 2 * settings.holdout_samples  # as the scene emits, and with all of it off
     passes = [_passes(light) for light in lights]
     time = (sum(passes) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
-    summed = len(lights) if bake.keeps_sums else sum(count > 1 for count in passes)
+    summed = len(lights) if bake.keeps_accumulation else sum(count > 1 for count in passes)
     disk = len(lights) * image_bytes + bytes_needed(settings, 0, summed)
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
     if settings.points is not None:
-        train_from = f"lamps {settings.points.spacing:g} m apart"
+        train_from = f"point lights {settings.points.spacing:g} m apart"
     else:
         train_from = settings.domain if settings.light_list is None else "from the light list"
         train_from += f", a sun of {np.degrees(settings.sun_angle):.3g} degrees"
@@ -74,14 +78,14 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
         f"lights     {roles['train']} train at {_samples(bake)}, {roles['validation']} validation and "
         f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
-        f"time       about {_duration(time)} {'a sample of all lights ' if bake.is_open_ended else ''}on this machine as busy as it is now",
+        f"time       about {_duration(time)} {'per sample of all lights ' if bake.is_open_ended else ''}on this machine as loaded now",
     ]
 
 
 def _samples(bake: Bake) -> str:
     if bake.settings.samples == "auto":
-        return "as many samples as help"
-    return f"{bake.settings.samples} samples" if bake.seconds is None else f"the samples that {_duration(bake.seconds)} allow"
+        return "the samples that lower the error"
+    return f"{bake.settings.samples} samples" if bake.time_limit is None else f"the samples that {_duration(bake.time_limit)} allow"
 
 
 def _passes(light: PlannedLight) -> int:

@@ -1,4 +1,4 @@
-"""A capture's images as a bake writes them: geometry and ambient once, then every light's mean, dilated, without what shines anyway."""
+"""A capture's images as a bake writes them: its receiver's channels once, then every light's mean, dilated, without residual emission."""
 
 from __future__ import annotations
 
@@ -12,36 +12,41 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Int
+from srbf.bake.accumulation import ACCUMULATION, load_array, save_array
 from srbf.bake.settings import PlannedLight
-from srbf.bake.sums import SUMS, load_array, save_array
+from srbf.channels import CHANNELS, GEOMETRY, file_name
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
 from srbf.io import files
 from srbf.io.image import HALF_MAX, read_image, write_image
 
-GEOMETRY = ("position", "normal", "albedo", "coverage")
+MASKS = ("hit", "valid")  # of the receiver, see `srbf.channels.Channel`; coverage, the third, is a channel itself
+SEAMS = "seams"  # (1, E, 8), an image that is no channel: it has no texels
+ASKED_FOR = (*GEOMETRY, *MASKS, SEAMS)  # what the first worker of a bake sends of its receiver
 SCENE_FILE = "scene.glb"
-PREPARED = "prepared.json"  # in the folder of sums: the receiver is known and its geometry written
-READABLE = "readable.npz"  # where light can be read off the receiver
-LEFT = "left.npz"  # what shines with every lamp and emission off
+PREPARED = "prepared.json"  # in the accumulation folder: the receiver is known and its channels are written
+VALID_MASK = "valid_mask.npz"  # where light can be read off the receiver
+RESIDUAL = "residual_emission.npz"  # what the receiver shows with every light and emission off
 
 
 class CaptureImages:
-    """Writes the images of a capture. `prepared` holds what the worker told of scene and receiver, once that is known.
+    """Writes the images of a capture.
 
-    prepared: facts, sampling, tints, ambient and seams (whether there are such images), uv (checksum of a layer that was made), files
-    (checksums of all that was written).
+    `prepared`, once the receiver is known, is what is kept of it between runs:
+    facts (what the worker says of scene and receiver), sampling (footprint or camera, see the manifest's `direct`), transmittances (of
+    translucent materials by name, or None), channels (names of those written), seams (whether there is such an image), uv (checksum of a
+    UV layer that the bake made, or None), files ({name: checksum} of all that was written).
     """
 
     def __init__(self, folder: Path, say: Callable[[str], None] = lambda line: None) -> None:
         self._folder = folder
         self._say = say
-        self._raw: dict[str, ndarray] = {}
-        self._left: Float32[ndarray, "H W 3"] | None = None
+        self._received: dict[str, ndarray] = {}
+        self._residual: Float32[ndarray, "H W 3"] | None = None
         self._nearest: Int[ndarray, "H W"] | None = None
         self._size: tuple[int, ...] = (0, 0)
         self.prepared: dict[str, Any] | None = None
-        path = folder / SUMS / PREPARED
+        path = folder / ACCUMULATION / PREPARED
         if path.is_file():
             try:
                 self._load(files.read_json(path))
@@ -49,82 +54,85 @@ class CaptureImages:
                 path.unlink()  # of a damaged preparation: made again
 
     def take(self, name: str, array: ndarray) -> None:
-        """An array of the preparation; `prepare` writes what follows from all of them."""
-        self._raw[name] = array
+        """Receive an image of the preparation (H, W, C): a channel, a mask, `seams`, or `residual`. `prepare` writes them."""
+        self._received[name] = array
 
-    def prepare(self, facts: dict[str, Any], sampling: dict[str, Any], tints: dict[str, Any] | None) -> None:
-        """Write geometry, ambient and a made UV layer; last, that the preparation is whole. Positions are real where `hit`."""
-        raw, self._raw = self._raw, {}
-        readable, hit = raw.pop("readable"), raw.pop("hit")
-        save_array(self._folder / SUMS / READABLE, readable)
-        self._nearest, self._size = nearest_covered(readable[:, :, 0]), readable.shape[:2]
-        left, ambient, seams = (raw.pop(name, None) for name in ("left", "ambient", "seams"))
-        self._left = None
-        (self._folder / SUMS / LEFT).unlink(missing_ok=True)
-        if left is not None and left.any():
-            self._left = dilate(left, self._nearest)
-            save_array(self._folder / SUMS / LEFT, self._left)
-        shines = ambient is not None and bool(ambient.any())
-        if ambient is not None and shines:
-            write_image(self._folder / "ambient.exr", dilate(ambient, self._nearest), "float")
+    def prepare(self, facts: dict[str, Any], sampling: dict[str, Any], transmittances: dict[str, Any] | None) -> None:
+        """Write the channels received and a UV layer that was made; last, the record that the preparation is complete.
+
+        facts, sampling, transmittances: as in `prepared`; `facts["uv"]` has the coordinates of a layer that was made.
+        """
+        received, self._received = self._received, {}
+        masks = {"coverage": received["coverage"], **{name: received.pop(name) for name in MASKS}}
+        nearest = {name: nearest_covered(mask[:, :, 0]) for name, mask in masks.items()}
+        save_array(self._folder / ACCUMULATION / VALID_MASK, masks["valid"])
+        self._nearest, self._size = nearest["valid"], masks["valid"].shape[:2]
+        residual, seams = received.pop("residual", None), received.pop(SEAMS, None)
+        self._residual = None
+        (self._folder / ACCUMULATION / RESIDUAL).unlink(missing_ok=True)
+        if residual is not None and residual.any():
+            self._residual = dilate(residual, self._nearest)
+            save_array(self._folder / ACCUMULATION / RESIDUAL, self._residual)
+        if "ambient" in received and not received["ambient"].any():
+            del received["ambient"]
         if seams is not None:
-            write_image(self._folder / "seams.exr", seams, "float")
-        nearest, of_hits = nearest_covered(raw["coverage"][:, :, 0]), nearest_covered(hit[:, :, 0])
-        for name, image in raw.items():
-            if name != "coverage":
-                image = dilate(image, nearest if name == "albedo" else of_hits)
-            write_image(self._folder / f"{name}.exr", image, "float")
+            write_image(self._folder / file_name(SEAMS), seams, "float")
+        for name, image in received.items():
+            mask = CHANNELS[name].real_where
+            write_image(self._folder / file_name(name), image if mask is None else dilate(image, nearest[mask]), "float")
         if "uv" in facts:
             files.write_json(self._folder / "uv.json", facts["uv"])
         names = [
-            *(f"{name}.exr" for name in (*GEOMETRY, "ambient", "seams")),
+            *(file_name(name) for name in (*received, SEAMS)),
             "uv.json",
             SCENE_FILE,
-            f"{SUMS}/{READABLE}",
-            f"{SUMS}/{LEFT}",
+            f"{ACCUMULATION}/{VALID_MASK}",
+            f"{ACCUMULATION}/{RESIDUAL}",
         ]
         prepared = {
             "facts": without_uv(facts),
             "sampling": sampling,
-            "tints": tints,
-            "ambient": shines,
+            "transmittances": transmittances,
+            "channels": [name for name in CHANNELS if name in received],
             "seams": seams is not None,
             "uv": uv_checksum(facts),
             "files": {name: files.sha256_of(self._folder / name) for name in names if (self._folder / name).is_file()},
         }
-        files.write_json(self._folder / SUMS / PREPARED, {"sha256": _checksum(prepared), "prepared": prepared})
+        write_preparation(self._folder, prepared)
         self.prepared = prepared
 
     def require_receiver(self, facts: dict[str, Any]) -> None:
-        """BakeError where a worker tells of another receiver than what is prepared."""
+        """BakeError where a worker has another receiver than the one prepared."""
         assert self.prepared is not None
         if without_uv(facts) != self.prepared["facts"] or uv_checksum(facts) != self.prepared["uv"]:
-            raise BakeError(f"expected the receiver of {self._folder} as it was when its bake began, found another; add --restart")
+            raise BakeError(
+                f"expected the receiver of {self._folder} as it was when its bake began, found another; bake with `restart=True`"
+            )
 
     def require_size(self, light: PlannedLight, image: ndarray) -> None:
-        """BakeError where an answer has not the size of the receiver."""
+        """BakeError where an image of `light` has not the size of the receiver."""
         if image.shape != (*self._size, 3):
             raise BakeError(
                 f"expected {(*self._size, 3)} values of light {light.index} from Blender, found {image.shape}; see the bake's log"
             )
 
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
-        """`mean` as the capture has it, but for the rounding: dilated, what shines without any light taken away. BakeError on NaN."""
+        """`mean` as the capture holds it, before rounding: dilated, the residual emission subtracted. BakeError for NaN."""
         if not np.isfinite(mean).all():
             raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
         mean = dilate(mean, self._nearest)
-        return mean if self._left is None else mean - self._left
+        return mean if self._residual is None else mean - self._residual
 
     def publish(self, light: PlannedLight, own: Float32[ndarray, "H W 3"], direct: Float32[ndarray, "H W 3"] | None = None) -> None:
-        """Write one light's answer as half floats, fireflies beyond them clipped, and said.
+        """Write one light's response as half floats, values beyond their range clipped with a warning.
 
-        With `direct` given that is taken from it and written beside it, first: a light whose image is there has both.
+        `direct`, where given, is subtracted from it and written first, to a file of its own: a light whose image exists has both.
         """
         if direct is not None:
             if not np.isfinite(direct).all():
                 raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
             direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
-            own = own - direct  # as the file has it, so that the two add up again
+            own = own - direct  # as stored, so that the two add up again
             write_image(self._folder / light.direct_file, direct, "half")
         beyond = int((np.abs(own) > HALF_MAX).sum())
         if beyond:
@@ -133,40 +141,46 @@ class CaptureImages:
         write_image(self._folder / light.file, own, "half")
 
     def checksum(self, light: PlannedLight, apart: bool) -> str:
-        """Of the light's images as they are on disk, empty where one is missing; `apart` where there are two."""
+        """Checksum of the light's images on disk, empty where one is missing; `apart`: there are two."""
         paths = [self._folder / name for name in (light.file, *([light.direct_file] if apart else []))]
         if not all(path.is_file() for path in paths):
             return ""
         return hashlib.sha256("".join(files.sha256_of(path) for path in paths).encode()).hexdigest()
 
     def published(self, light: PlannedLight, apart: bool) -> Float32[ndarray, "H W 3"]:
-        """All light of one that is published; of an indirect capture (`apart`), both its images together."""
+        """The published response to a light; of an indirect capture (`apart`), the sum of its two images."""
         image = read_image(self._folder / light.file, 3)
         return image + read_image(self._folder / light.direct_file, 3) if apart else image
 
     def _load(self, stored: dict[str, Any]) -> None:
         prepared = stored.get("prepared")
-        if stored.get("sha256") != _checksum(prepared) or not isinstance(prepared, dict):
+        if stored.get("sha256") != checksum_of(prepared) or not isinstance(prepared, dict):
             raise ManifestError(f"expected {PREPARED} as it was written, found another")
         for name, checksum in prepared["files"].items():
             if not (self._folder / name).is_file() or files.sha256_of(self._folder / name) != checksum:
                 raise ImageError(f"expected {name} as it was written, found another")
-        readable = load_array(self._folder / SUMS / READABLE)
-        self._nearest, self._size = nearest_covered(readable[:, :, 0]), readable.shape[:2]
-        left = self._folder / SUMS / LEFT
-        self._left = load_array(left) if left.is_file() else None
+        valid = load_array(self._folder / ACCUMULATION / VALID_MASK)
+        self._nearest, self._size = nearest_covered(valid[:, :, 0]), valid.shape[:2]
+        residual = self._folder / ACCUMULATION / RESIDUAL
+        self._residual = load_array(residual) if residual.is_file() else None
         self.prepared = prepared
 
 
 def without_uv(facts: dict[str, Any]) -> dict[str, Any]:
-    """Facts of a scene without the long list of a made layer's coordinates."""
+    """Facts of a scene without the long list of UV coordinates of a layer that was made."""
     return {key: value for key, value in facts.items() if key not in ("uv", "event")}
 
 
 def uv_checksum(facts: dict[str, Any]) -> str | None:
-    """Of the layer that was made, where one was: every worker must make the same."""
+    """Checksum of the UV layer that was made, None without one: every worker must make the same."""
     return hashlib.sha256(json.dumps(facts["uv"]).encode()).hexdigest() if "uv" in facts else None
 
 
-def _checksum(value: Any) -> str:
+def write_preparation(folder: Path, prepared: dict[str, Any]) -> None:
+    """Write the record of `CaptureImages.prepared`, with its checksum."""
+    files.write_json(folder / ACCUMULATION / PREPARED, {"sha256": checksum_of(prepared), "prepared": prepared})
+
+
+def checksum_of(value: Any) -> str:
+    """Hex SHA-256 of a JSON value."""
     return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from srbf.bake.images import ASKED_FOR
+from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
 
 AMBIENT_SEED = -1  # the light index of the image without a light
@@ -13,21 +16,21 @@ PROBES = 12  # about so many lights choose the transmittance of translucent mate
 
 
 def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | None, scratch: Path) -> dict[str, Any]:
-    """The job of a worker that is then asked for lights; with nothing `prepared` it hands over what the images of the receiver need."""
+    """The job of a worker that renders requests as they come; with nothing `prepared` it first sends what the receiver's images need."""
     train = [light for light in plan_lights(settings) if light.role == "train"]
+    first = prepared is None
     return {
         **base_job(scene, settings, scratch),
         "serve": True,
-        "geometry": prepared is None,
-        "ambient": {"samples": settings.holdout_samples, "seed": noise_seed(settings.seed, AMBIENT_SEED)} if prepared is None else None,
-        "lights": [],
-        "probes": [light.job() for light in train[:: max(1, len(train) // PROBES)]],
-        "tints": None if prepared is None else prepared["tints"],
+        "channels": list(ASKED_FOR) if first else [],
+        "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if first else None,
+        "probes": [light.placed() for light in train[:: max(1, len(train) // PROBES)]],
+        "transmittances": None if prepared is None else prepared["transmittances"],
     }
 
 
-def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, Any]:
-    """What every job tells the worker of scene and receiver."""
+def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Sequence[RenderRequest] = ()) -> dict[str, Any]:
+    """A job of `requests` alone, and what every job says of scene and receiver. Keys: see `blender_bake.__main__.run`."""
     return {
         "scene": str(scene.resolve()),
         "scene_name": settings.scene,
@@ -41,4 +44,9 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path) -> dict[str, An
         "no_shadow": list(settings.no_shadow),
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
+        "channels": [],
+        "ambient": None,
+        "probes": [],
+        "transmittances": None,
+        "requests": [request.message() for request in requests],
     }

@@ -1,26 +1,26 @@
-"""One more pass of a light, taken into a capture: the sum grows, its mean is published, and last the sum says so."""
+"""One more pass of a light, added to a capture: its mean is published, then the running sum is written."""
 
 from __future__ import annotations
 
 from numpy import ndarray
 
 from srbf.arrays import Float32
+from srbf.bake.accumulation import NOTHING, Accumulation
 from srbf.bake.images import CaptureImages
-from srbf.bake.sums import NOTHING, Sums
 from srbf.bake.worker_pool import Response, Task
 
 
-def add_pass(images: CaptureImages, sums: Sums, task: Task, response: Response) -> Float32[ndarray, "H W 3"] | None:
-    """Add `answer` to the light of `task`; what the capture then holds of it but for the rounding.
+def add_pass(images: CaptureImages, accumulation: Accumulation, task: Task, response: Response) -> Float32[ndarray, "H W 3"] | None:
+    """Add `response` to the light of `task`; returns the image that the capture then holds, before rounding.
 
-    None where the light is not at the pass that `task` adds to: it is rendered again from where it is. BakeError on NaN or another size.
+    None where the light is not at the pass that `task` adds to: it is then rendered from where it is. BakeError for NaN or another size.
     """
     light = task.light
-    if sums.passes(light) != task.before:
+    if accumulation.passes(light) != task.before:
         return None
-    total = sums.read(light) if task.before else NOTHING
+    total = accumulation.read(light) if task.before else NOTHING
     if total.passes != task.before:  # damaged since it was counted
-        sums.forget(light)
+        accumulation.forget(light)
         return None
     for image in (response.whole, response.direct):
         if image is not None:
@@ -28,5 +28,5 @@ def add_pass(images: CaptureImages, sums: Sums, task: Task, response: Response) 
     total = total.with_pass(task.samples, response.whole, response.direct, task.squares)
     own = images.own_light(light, total.mean)
     images.publish(light, own, total.direct_mean)
-    sums.write(light, total, task.keep, images.checksum(light, response.direct is not None))
+    accumulation.write(light, total, task.keep, images.checksum(light, response.direct is not None))
     return own

@@ -1,4 +1,4 @@
-"""capture.json as a bake writes it: at the end of every pass, and the same whatever interrupted the bake."""
+"""capture.json as a bake writes it at the end of every pass; interruptions do not change it."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import srbf
-from srbf.bake.images import GEOMETRY, SCENE_FILE
+from srbf.bake.images import SCENE_FILE, SEAMS
 from srbf.bake.settings import BakeSettings, PlannedLight
+from srbf.channels import file_name, manifest_keys
 
 
 def capture_manifest(
@@ -18,7 +19,11 @@ def capture_manifest(
     reached: int,
     curve: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    """The manifest of the lights that are there, each with its samples; `reached` by the train lights, `curve` of `--samples auto`."""
+    """The manifest (the keys of capture.schema.json) of the lights rendered so far.
+
+    identity: scene, scene_sha256 and settings of the bake. prepared: see `CaptureImages`. lights: (light, its samples so far).
+    reached: samples per texel of every train light, at least. curve: what `samples=auto` measured, see `stopping.record`.
+    """
     facts = prepared["facts"]
     receivers = facts["receivers"]
     source = {**identity, "settings": {**identity["settings"], "samples": reached}, "srbf": srbf.__version__, "blender": facts["blender"]}
@@ -48,8 +53,7 @@ def capture_manifest(
             for light, samples in lights
         ],
         **({"scene": SCENE_FILE, "direct": {"sun_angle": settings.sun_angle, **prepared["sampling"]}} if apart else {}),
-        **{name: f"{name}.exr" for name in GEOMETRY},
-        **({"seams": "seams.exr"} if prepared["seams"] else {}),
-        **({"ambient": "ambient.exr"} if prepared["ambient"] else {}),
+        **manifest_keys(prepared["channels"]),
+        **({SEAMS: file_name(SEAMS)} if prepared["seams"] else {}),
         "source": source,
     }

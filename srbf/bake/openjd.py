@@ -1,6 +1,6 @@
-"""`--farm openjd`: a bake and its fit as a job of a render farm, an Open Job Description bundle (specification jobtemplate-2023-09).
+"""A bake and its fit as a render farm's job: an Open Job Description bundle (specification jobtemplate-2023-09).
 
-Steps: Prepare, then Bake with a task a part of the lights, then Finish, which takes stock and writes the manifest, then Fit.
+Steps: Prepare; Bake, with a task per shard of the lights; Finish, which checks the images and writes the manifest; Fit.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ sys.exit(subprocess.run(command).returncode)
 
 
 def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> None:
-    """Write the job of `bake` into `folder`: template.json, and in parameters.json the scene's path.
+    """Write the job of `bake` into `folder`: template.json, and parameters.json with the scene's path.
 
-    InputError where the tasks cannot be known beforehand; OutputExistsError where the folder holds something.
+    tasks: of the step Bake, see `template`. force: replace an earlier bundle. InputError where the number of samples is not fixed;
+    OutputExistsError where the folder may not be replaced.
     """
     bake.check_scene()
     job = template(bake, tasks)
@@ -42,9 +43,9 @@ def write_bundle(bake: Bake, folder: Path, tasks: int | None, force: bool) -> No
 
 
 def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
-    """The job template of a bake, `tasks` of them at most one a light; by default one for LIGHTS_PER_TASK lights."""
+    """The job template of a bake. `tasks`: of the step Bake, at most one per light; None: one per LIGHTS_PER_TASK lights."""
     if bake.is_open_ended:
-        raise InputError("--farm needs its tasks beforehand: expected --samples N, found --samples auto or --time")
+        raise InputError("expected a fixed number of `samples` with `farm`, found `samples=auto` or `time_limit`: a farm's tasks are fixed")
     lights = len(plan_lights(bake.settings))
     count = min(lights, tasks or -(-lights // LIGHTS_PER_TASK))
     command = ["-m", "srbf", "bake", "{{Param.Scene}}", "-o", "{{Param.Capture}}", *_flags(bake)]
@@ -54,17 +55,17 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
         "name": f"srbf {bake.scene.stem}"[:NAME_LENGTH],
         "parameterDefinitions": [
             _path("Scene", "FILE", "IN", "The .blend."),
-            _path("Capture", "DIRECTORY", "INOUT", "Where the capture is written; every machine of the farm sees it.", "capture"),
+            _path("Capture", "DIRECTORY", "INOUT", "Where the capture is written, visible to every machine of the farm.", "capture"),
             _path("Asset", "DIRECTORY", "OUT", "Where the asset is written.", "asset"),
             *listed,
             {"name": "FitFlags", "type": "STRING", "default": "", "description": "Flags of srbf fit."},
-            {"name": "Python", "type": "STRING", "default": "python3", "description": "A Python that has srbf."},
+            {"name": "Python", "type": "STRING", "default": "python3", "description": "A Python with srbf installed."},
         ],
         "steps": [
-            _step("Prepare", [*command, "--part", "prepare"]),
+            _step("Prepare", [*command, "--shard", "prepare"]),
             {
-                **_step("Bake", [*command, "--part", f"{{{{Task.Param.Part}}}}/{count}"], "Prepare"),
-                "parameterSpace": {"taskParameterDefinitions": [{"name": "Part", "type": "INT", "range": f"1-{count}"}]},
+                **_step("Bake", [*command, "--shard", f"{{{{Task.Param.Shard}}}}/{count}"], "Prepare"),
+                "parameterSpace": {"taskParameterDefinitions": [{"name": "Shard", "type": "INT", "range": f"1-{count}"}]},
             },
             _step("Finish", command, "Bake"),
             _step("Fit", ["{{Task.File.Fit}}", "{{Param.Capture}}", "{{Param.Asset}}", "{{Param.FitFlags}}"], "Finish", FIT),
@@ -73,7 +74,7 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
 
 
 def arguments(settings: BakeSettings) -> list[str]:
-    """The flags of `srbf bake` that give these settings, to the bit; a light list is the job's parameter."""
+    """The flags of `srbf bake` that give exactly these settings; a light list is the job's parameter."""
     receiver, points = settings.receiver, settings.points
     named = {
         "scene": settings.scene,
@@ -91,28 +92,28 @@ def arguments(settings: BakeSettings) -> list[str]:
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",
-        "light-box": None if points is None or points.box is None else ",".join(map(repr, points.box)),
+        "light-bounds": None if points is None or points.box is None else ",".join(map(repr, points.box)),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
-    flags += [f"--no-shadow={name}" for name in settings.no_shadow]
+    flags += [f"--no-cast-shadow={name}" for name in settings.no_shadow]
     flags += ["--keep-scene-lights"] if settings.keep_scene_lights else []
     return flags + (["--denoise"] if settings.denoise else [])
 
 
 def _flags(bake: Bake) -> list[str]:
-    crew = {
-        "workers": bake.crew.workers,
-        "lights-a-worker": bake.crew.lights_per_worker,
-        "hang-after": bake.crew.worker_timeout,
+    pool = {
+        "workers": bake.pool.workers,
+        "lights-per-worker": bake.pool.lights_per_worker,
+        "worker-timeout": bake.pool.worker_timeout,
         "blender": bake.blender,
     }
-    flags = [f"--{name}={value}" for name, value in crew.items() if value is not None]
-    flags += ["--keep-sums"] if bake.keep_sums else []
+    flags = [f"--{name}={value}" for name, value in pool.items() if value is not None]
+    flags += ["--keep-accumulation"] if bake.keep_accumulation else []
     for flag in (*flags, *arguments(bake.settings), bake.scene.stem):
         if "{{" in flag and flag != "--light-list={{Param.LightList}}":
-            raise InputError(f"expected names without {{{{, which a job template reads as its own, found {flag!r}; rename it")
+            raise InputError(f"expected names without {{{{, which begins an expression of job templates, found {flag!r}; rename it")
     return [*arguments(bake.settings), *flags]
 
 

@@ -1,4 +1,4 @@
-"""Point lights of a bake: a box filled with lamps, those inside geometry left out; Blender is asked which, before the bake."""
+"""Point lights of a bake: a box filled with them, except inside geometry; a scene query before the bake finds the free places."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Places = tuple[tuple[float, float, float], ...]
 
 @dataclass(frozen=True)
 class PointGrid:
-    """Lamps `spacing` meters apart in a box (None: the bounds of what the scene renders), and random ones in the same free space.
+    """Point lights `spacing` meters apart in a box (None: the bounds of all that renders), and random ones in the same free space.
 
-    `grid` and `random` are positions in meters, not known before `srbf.bake.survey.with_free_point_lights` has asked the scene.
+    grid, random: positions (m), unknown before `srbf.bake.scene_query.with_free_point_lights`.
     """
 
     spacing: float
@@ -38,7 +38,7 @@ class PointGrid:
                 raise InputError(f"expected a box x0,y0,z0,x1,y1,z1 with each first value the smaller, found {self.box}")
 
     @staticmethod
-    def parse(light_set: str, light_box: str | None) -> PointGrid:
+    def parse(light_set: str, light_bounds: str | None) -> PointGrid:
         """From the command line: `point:SPACING` and `x0,y0,z0,x1,y1,z1`; InputError on other words."""
         kind, _, spacing = light_set.partition(":")
         box: Box | None = None
@@ -47,23 +47,23 @@ class PointGrid:
         except ValueError:
             kind, meters = "", 0.0
         if kind != "point":
-            raise InputError(f"expected --light-set point:SPACING, the spacing in meters, found {light_set!r}")
-        if light_box is not None:
+            raise InputError(f"expected `light_set` point:SPACING, the spacing in meters, found {light_set!r}")
+        if light_bounds is not None:
             try:
-                x0, y0, z0, x1, y1, z1 = (float(word) for word in light_box.split(","))
+                x0, y0, z0, x1, y1, z1 = (float(word) for word in light_bounds.split(","))
                 box = (x0, y0, z0, x1, y1, z1)
             except ValueError as error:
-                raise InputError(f"expected --light-box x0,y0,z0,x1,y1,z1 in meters, found {light_box!r}") from error
+                raise InputError(f"expected `light_bounds` x0,y0,z0,x1,y1,z1 in meters, found {light_bounds!r}") from error
         return PointGrid(meters, box)
 
     def places(self, validation: int, holdout: int) -> tuple[Float64[ndarray, "L 3"], Float64[ndarray, "V 3"], Float64[ndarray, "H 3"]]:
-        """(train, validation, holdout) positions; InputError before a survey, or where it was for fewer."""
+        """(train, validation, holdout) positions, m; InputError where they are not known yet, or too few."""
         if self.grid is None or len(self.random) < validation + holdout:
-            raise InputError("expected point lights whose free places are known, found none; survey the scene first")
+            raise InputError("expected point lights with known positions, found none; call with_free_point_lights first")
         random = np.array(self.random, np.float64).reshape(-1, 3)
         return np.array(self.grid, np.float64).reshape(-1, 3), random[:validation], random[validation : validation + holdout]
 
     def record(self) -> dict[str, Any]:
-        """For the manifest: spacing and box, and the positions by a checksum, since the lights hold them."""
+        """JSON for the manifest: spacing, box, and a checksum of the positions, which the lights hold."""
         places = json.dumps([self.grid, self.random])
         return {"spacing": self.spacing, "box": self.box, "positions": hashlib.sha256(places.encode()).hexdigest()}

@@ -1,4 +1,4 @@
-"""How far the point relighter is from the truth: the same receivers under real Cycles lamps inside the scene."""
+"""The error of relighting by point lights: the same receivers under point lights of Cycles inside the scene."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from srbf import methods
 from srbf.asset import Asset
-from srbf.bake.job import base_job
-from srbf.bake.settings import BakeSettings, Receiver, noise_seed
+from srbf.bake.job import AMBIENT_SEED, base_job
+from srbf.bake.request import RenderRequest
+from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, noise_seed
 from srbf.bake.worker import Worker
 from srbf.errors import InputError
 from srbf.io import files
@@ -20,8 +21,8 @@ from srbf.lights import Falloff, Light, PointLight
 
 FALLOFFS: tuple[Falloff, ...] = ("inverse-square", "linear")
 DISTANCE_BINS = 6
-MIDDLE = (0.1, 0.9)  # quantiles of the receivers' positions that bound the scene proper
-DISTANCE = (0.1, 0.6)  # from a lamp to the receiver that it stands before, in extents of that box
+MIDDLE = (0.1, 0.9)  # quantiles of the receivers' positions that bound the main part of the scene
+DISTANCE = (0.1, 0.6)  # from a light to the receiver that it is placed before, in extents of that box
 
 
 def compare_with_point_lights(
@@ -35,27 +36,28 @@ def compare_with_point_lights(
     blender: Path | None = None,
     direct: Callable[[Sequence[Light]], np.ndarray | None] = lambda lights: None,
 ) -> dict[str, Any]:
-    """Error of the point relighter by distance, against `count` random lamps of unit irradiance at 1 m rendered by Cycles.
+    """The error of relighting by point lights, by distance, against `count` random ones of unit irradiance at 1 m rendered by Cycles.
 
-    For each falloff and distance bin: relative RMSE as it stands (a0 = 1 m) and `scaled`, at the one global a0 that fits best.
-    The asset's captured light is directional, so occluders beyond a lamp still cast: this measures that approximation. `direct` gives
-    the light that an indirect asset leaves out, where that is to be added.
+    For each falloff and distance bin: the relative RMSE with a0 = 1 m, and `scaled`, with the one global a0 that fits best.
+    The asset's captured lights are directional, so occluders beyond a point light still cast shadows: this measures that approximation.
+    direct: gives the direct light that an indirect asset leaves out, or None.
+    Returns point_lights (positions, m), best_scale by falloff, all, by_distance. InputError for an asset without receivers, positions
+    or coverage, or a missing scene; BakeError where Blender fails.
     """
     if count < 1 or samples < 1:
-        raise InputError(f"expected at least 1 lamp and 1 sample, found {count} and {samples}")
+        raise InputError(f"expected at least 1 point light and 1 sample, found {count} and {samples}")
     if not asset.covered.any():
         raise InputError("expected covered texels in the asset, found none")
     if "position" not in asset.images:
-        raise InputError("comparing with lamps needs a position map, and this asset has none")
-    source = asset.manifest.get("source", {})
-    described = source.get("receivers") or [source[key] for key in ("receiver",) if key in source]
+        raise InputError("expected an asset with a position map for a comparison with point lights, found none")
+    described = asset.receivers
     if not described:
         raise InputError("expected an asset baked from a scene, found one that names no receiver")
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found no such file")
     baked = asset.manifest["source"].get("scene_sha256")
     if baked not in (None, files.sha256_of(scene)):
-        say(f"{scene.name} is not as it was when this asset's capture was baked: the figures mix two scenes")
+        say(f"{scene.name} has changed since this asset's capture was baked: the comparison is of two different scenes")
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
     point_lights = point_light_positions(asset, count, seed)
@@ -74,10 +76,10 @@ def compare_with_point_lights(
 
 
 def point_light_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
-    """(count, 3) places inside the scene: before a random receiver, along its normal, by a random part of the scene's extent.
+    """(count, 3) positions inside the scene, m: before a random receiver, along its normal, by a random fraction of the scene's extent.
 
-    The extent, and the receivers to choose from, are the box that holds the middle four fifths of the receivers on each axis: a
-    view's horizon is not the room.
+    The extent, and the receivers to choose from, are those of the box that holds the middle 80 % of the receivers on each axis, so that
+    a view's horizon does not count.
     """
     rng = np.random.default_rng(seed)
     covered = asset.covered
@@ -104,28 +106,22 @@ def _render(
     chosen = asset.manifest["source"].get("settings", {}).get("scene")
     settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
     lights = [
-        {"index": i, "kind": "point", "position": point_light.tolist(), "samples": samples, "seed": noise_seed(seed, i)}
-        for i, point_light in enumerate(point_lights)
+        PlannedLight(i, tuple(place.tolist()), "holdout", samples, noise_seed(seed, i), "point") for i, place in enumerate(point_lights)
     ]
+    requests = [RenderRequest(light, light.samples, light.seed) for light in lights]
     images: list[np.ndarray] = []
-    left: np.ndarray | float = 0.0
+    residual: np.ndarray | float = 0.0
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        job = {
-            **base_job(scene, settings, scratch),
-            "geometry": False,
-            "ambient": {"samples": samples, "seed": noise_seed(seed, -1)},
-            "lights": lights,
-        }
+        ambient = RenderRequest(None, samples, noise_seed(seed, AMBIENT_SEED))
+        job = {**base_job(scene, settings, scratch, requests), "ambient": ambient.message()}
         with Worker(job, scratch, scratch / "bake.log", blender) as worker:
             for event in worker.events(say):
-                if event["event"] == "image":
-                    array = np.load(scratch / event["file"])
-                    if "light" in event:
-                        images.append(np.maximum(array - left, 0))
-                        progress(len(images), len(lights))
-                    elif event["name"] == "left":
-                        left = array
+                if event["event"] == "rendered":
+                    images.append(np.maximum(np.load(scratch / event["files"]["response"]) - residual, 0))
+                    progress(len(images), len(lights))
+                elif event["event"] == "image" and event["name"] == "residual":
+                    residual = np.load(scratch / event["file"])
     return images
 
 

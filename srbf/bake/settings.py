@@ -1,4 +1,4 @@
-"""What a bake is asked for, and the lights that it plans."""
+"""The settings of a bake, and its lights."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from srbf.bake.point_lights import PointGrid
-from srbf.capture import LightKind, Quantity, Role, Transport
+from srbf.capture import Quantity, Transport
+from srbf.captured_light import LightKind, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
@@ -26,7 +27,7 @@ LARGEST_SIDE = 16384
 class Receiver:
     """`lightmap:OBJECT` (its UV layer, else one that fits), `vertices:OBJECT`, or `view[:CAMERA]` (else the scene's own camera).
 
-    `also` names further objects whose texels share the lightmap. `unwrap` says how a layer is made where the user's do not fit.
+    also: further objects whose texels share the lightmap. unwrap: how a UV layer is made where none fits.
     """
 
     kind: Kind
@@ -37,19 +38,19 @@ class Receiver:
 
     @staticmethod
     def parse(text: str, uv_layer: str | None = None, unwrap: Unwrap = "smart") -> Receiver:
-        """From the command line's word; InputError on any other."""
+        """From the command line's `lightmap:OBJECT`, `vertices:OBJECT` or `view[:CAMERA]`; InputError for others."""
         kind, _, name = text.partition(":")
         if kind == "lightmap" and name:
             return Receiver("lightmap", name, uv_layer, unwrap=unwrap)
         if (kind == "vertices" and name) or kind == "view":
             if uv_layer is not None:
-                raise InputError(f"--uv-layer belongs to a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
+                raise InputError(f"expected `uv_layer` with a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
             return Receiver("view" if kind == "view" else "vertices", name or None)
         raise InputError(f"expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found {text!r}")
 
     @staticmethod
     def of_manifest(described: Sequence[dict[str, Any]]) -> Receiver:
-        """What a capture's `receiver`, or `receivers` in one atlas, say of themselves; one UV layer only where all have it."""
+        """From a capture's `receiver`, or `receivers` in one atlas; with a UV layer only where all have the same."""
         first = described[0]
         layers = {one.get("uv_layer") for one in described}
         names = [one.get("object") or one.get("camera") for one in described]
@@ -57,11 +58,11 @@ class Receiver:
 
     @property
     def place(self) -> str:
-        """What it is called in a message."""
+        """Its name in messages."""
         return f"{self.kind} {self.name!r}" if self.name else f"the {self.kind}"
 
     def job(self) -> dict[str, Any]:
-        """As the worker reads it."""
+        """As JSON for the worker."""
         if self.kind == "view":
             return {"kind": self.kind, "camera": self.name}
         return {
@@ -73,7 +74,7 @@ class Receiver:
         }
 
     def record(self) -> dict[str, Any]:
-        """JSON for the manifest; what is as it was before there was a choice is left out."""
+        """JSON for the manifest; defaults of settings that older captures do not have are left out."""
         record: dict[str, Any] = {"kind": self.kind, "name": self.name, "uv_layer": self.uv_layer}
         if self.also:
             record["also"] = list(self.also)
@@ -83,7 +84,7 @@ class Receiver:
 
 
 def captures_of(receivers: Sequence[Receiver], separate: bool = False) -> list[Receiver]:
-    """The captures that `receivers` make: all lightmaps share one atlas, unless `separate`; views and vertices have each their own.
+    """One receiver per capture: all lightmaps share one atlas, unless `separate`; each view and vertex list has its own.
 
     InputError where one is named twice.
     """
@@ -99,18 +100,18 @@ def captures_of(receivers: Sequence[Receiver], separate: bool = False) -> list[R
 
 
 def folder_names(receivers: Sequence[Receiver]) -> list[str]:
-    """A folder for each of several captures: the object's or camera's name, made fit for any file system, numbered where two are alike."""
+    """A folder name for each of several captures: the object's or camera's, valid on any file system, numbered where equal."""
     names: list[str] = []
     for receiver in receivers:
         stem = re.sub(r"[^\w. -]", "_", receiver.name or receiver.kind).strip(". ") or receiver.kind
-        alike = sum(1 for name in names if name.lower().rpartition("~")[0] == stem.lower() or name.lower() == stem.lower())
-        names.append(f"{stem}~{alike + 1}" if alike else stem)
+        equal = sum(1 for name in names if name.lower().rpartition("~")[0] == stem.lower() or name.lower() == stem.lower())
+        names.append(f"{stem}~{equal + 1}" if equal else stem)
     return names
 
 
 @dataclass(frozen=True)
 class BakeSettings:
-    """All that decides a capture's pixels, apart from the scene and Blender's version. Sizes in texels, angles in radians."""
+    """All settings that affect a capture's pixels, besides the scene and Blender's version. Sizes in texels, angles in radians."""
 
     receiver: Receiver
     width: int = 256
@@ -127,8 +128,8 @@ class BakeSettings:
     keep_scene_lights: bool = False
     light_list: Path | None = None
     transport: Transport = "combined"
-    points: PointGrid | None = None  # lamps instead of directional lights
-    no_shadow: tuple[str, ...] = ()  # objects that light passes
+    points: PointGrid | None = None  # point lights instead of directional ones
+    no_shadow: tuple[str, ...] = ()  # objects that cast no shadow
     denoise: bool = False  # of a view's train images
     scene: str | None = None  # of the .blend's scenes; None: the active one
 
@@ -140,27 +141,33 @@ class BakeSettings:
             if not getattr(self, name) >= 0:
                 raise InputError(f"expected {name.replace('_', ' ')} of 0 or more, found {getattr(self, name)}")
         if self.samples == "auto" and (self.validation < 1 or self.holdout_samples < 2):
-            raise InputError("--samples auto judges by validation lights of at least 2 samples, found none; leave --validation as it is")
+            raise InputError(
+                "expected validation lights of 2 samples or more with `samples=auto`, which needs them, found none; leave `validation` out"
+            )
         if self.denoise and (self.samples == "auto" or self.receiver.kind != "view" or self.transport != "combined"):
-            raise InputError("--denoise is for views of transport combined and a given number of samples, found another; take it off")
+            raise InputError(
+                "expected a view of combined transport and a fixed number of `samples` with `denoise`, found another; leave `denoise` out"
+            )
         if max(self.width, self.height) > LARGEST_SIDE:
-            raise InputError(f"expected a size of at most {LARGEST_SIDE} texels a side, found {self.width}x{self.height}")
+            raise InputError(f"expected a size of at most {LARGEST_SIDE} texels per side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
         if self.transport == "indirect" and self.receiver.kind == "vertices":
             raise InputError("expected vertices with transport combined, found indirect: rays have no footprint to spread over at a point")
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
-                raise InputError("expected point lights without --light-list and --sun-angle, which are of directional ones")
+                raise InputError("expected point lights without `light_list` and `sun_angle`, which belong to directional ones")
             if self.samples == "auto":
-                raise InputError("expected a number of samples with point lights, found auto, which judges by fits of directional ones")
+                raise InputError("expected a number of `samples` with point lights, found auto, which measures by fits of directional ones")
             if self.transport != "combined":
-                raise InputError("expected --transport combined with point lights: only a sun's direct light is taken apart")
+                raise InputError(
+                    "expected `transport=combined` with point lights, found indirect: only a sun's direct light can be left out"
+                )
 
     def with_matched_sun(self) -> BakeSettings:
-        """The same with a sun as large as the train lights stand apart: penumbrae as soft as that many lights can resolve."""
+        """The settings with a sun angle of the train lights' mean spacing: penumbrae as soft as that many lights can resolve."""
         if self.points is not None:
-            raise InputError("expected directional lights for a matched sun, found point lights; leave --sun-angle away")
+            raise InputError("expected directional lights for a matched sun, found point lights; leave `sun_angle` out")
         train = [light.place for light in plan_lights(self) if light.role == "train"]
         return replace(self, sun_angle=min(mean_spacing(np.array(train)), float(np.pi)))
 
@@ -171,7 +178,7 @@ class BakeSettings:
         record["no_shadow"] = list(self.no_shadow)
         for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None)):
             if record[name] == old:
-                del record[name]  # captures of before there was a choice stay what they were
+                del record[name]  # as in captures older than these settings
         del record["points"]
         if self.points is not None:
             for directional in ("lights", "domain", "sun_angle", "light_list"):
@@ -185,7 +192,7 @@ class BakeSettings:
 
 @dataclass(frozen=True)
 class PlannedLight:
-    """A light to bake: where in the capture, its direction or position (m), role, samples a texel, the seed of its own noise, its kind."""
+    """A light to bake: index in the capture, unit direction or position (m), role, samples per texel, seed of its noise, kind."""
 
     index: int
     place: tuple[float, float, float]
@@ -204,16 +211,12 @@ class PlannedLight:
         return f"direct/{self.index:04d}.exr"
 
     def placed(self) -> dict[str, Any]:
-        """Its kind and where it is, as manifest and worker read them."""
+        """Its kind and its direction or position, as JSON for manifest and worker."""
         return {"kind": self.kind, ("direction" if self.kind == "directional" else "position"): list(self.place)}
-
-    def job(self) -> dict[str, Any]:
-        """As the worker reads it."""
-        return {"index": self.index, **self.placed(), "samples": self.samples, "seed": self.seed}
 
 
 def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
-    """Train lights (Hammersley, the light list's, or a grid of lamps), then validation, then holdout: uniform random, of more samples."""
+    """Train lights (Hammersley, the light list's, or a grid of point lights), then validation and holdout: uniform random, more samples."""
     kind: LightKind = "directional"
     if settings.points is not None:
         kind = "point"

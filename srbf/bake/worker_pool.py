@@ -1,4 +1,4 @@
-"""Several workers at one list of lights: each asked in turn, replaced when it dies, hangs or has grown old; no light is lost by that."""
+"""Several workers on one list of lights, replaced when they die, hang or have rendered many lights; no light is lost by that."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy import ndarray
 
+from srbf.bake.request import Rendered, RenderRequest
 from srbf.bake.settings import PlannedLight
 from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.errors import BakeError
 from srbf.io import files
 
-AHEAD = 2  # lights asked of a worker at once: it renders one while we write the other
-TRIES = 2  # of a light, before it is reported and the rest goes on
-OPENING = 3600.0  # seconds that a scene may take to open, before anything is known of it
+AHEAD = 2  # requests sent to a worker at once: it renders one while the host writes the other
+TRIES = 2  # of a light, before it is given up and reported
+OPENING = 3600.0  # seconds that a scene may take to open
 FIRST_LIGHT = 3600.0
 PATIENCE = 10.0  # times the slowest sample seen so far
 LEAST_PATIENCE = 30.0  # seconds
@@ -32,7 +33,8 @@ LEAST_PATIENCE = 30.0  # seconds
 class Task:
     """One pass of a light: `samples` more of it, by their own `seed`, to what `before` passes gave.
 
-    `squares`: its sum of squares is wanted too. `keep`: the sum is, since more may come.
+    `squares`: its sum of squares is wanted too. `keep`: keep the sum, since more passes may follow. `denoise`: the response is to be
+    denoised. `direct`: its direct light is wanted too.
     """
 
     light: PlannedLight
@@ -42,15 +44,18 @@ class Task:
     squares: bool = False
     keep: bool = False
     denoise: bool = False
+    direct: bool = False
 
-    def job(self) -> dict[str, Any]:
-        """As the worker reads it."""
-        return {**self.light.job(), "samples": self.samples, "seed": self.seed, "denoise": self.denoise}
+    @property
+    def request(self) -> RenderRequest:
+        """What the worker is asked for."""
+        channels: tuple[Rendered, ...] = ("response", "direct") if self.direct else ("denoised",) if self.denoise else ("response",)
+        return RenderRequest(self.light, self.samples, self.seed, channels=channels)
 
 
 @dataclass(frozen=True)
 class Response:
-    """What a worker rendered for a task; `direct` where the capture keeps the direct light apart."""
+    """What a worker rendered for a task, (H, W, 3) float32; `direct`: its direct light, of an indirect capture."""
 
     whole: ndarray
     direct: ndarray | None
@@ -59,7 +64,7 @@ class Response:
 
 @dataclass(frozen=True)
 class RemoteResult:
-    """What another machine says of a task: its pass is in the folder, after so many seconds; or `error` kept it from that."""
+    """What another machine reports of a task: its pass is in the folder, after so many seconds; or the `error` that prevented it."""
 
     seconds: float
     error: str | None = None
@@ -83,15 +88,15 @@ class Renderer(Protocol):
 
 @dataclass(frozen=True)
 class WorkerPoolSettings:
-    """How the work is spread, none of which changes a pixel."""
+    """How the work is spread over processes; no setting changes a pixel."""
 
     workers: int = 1
-    lights_per_worker: int = 500  # then its process is replaced: Blender's memory grows
-    worker_timeout: float | None = None  # seconds without an answer; by default learned from the lights before
+    lights_per_worker: int = 500  # after which its process is replaced: Blender's memory grows
+    worker_timeout: float | None = None  # seconds without an event; None: learned from the lights before
 
 
 class Patience:
-    """How long an answer may take: PATIENCE times the slowest so far, by the sample."""
+    """How long a light may take: PATIENCE times the slowest so far, per sample."""
 
     def __init__(self, fixed: float | None) -> None:
         self._fixed = fixed
@@ -108,7 +113,10 @@ class Patience:
 
 
 class WorkerPool:
-    """Workers of one bake, alive until it is left. `start` makes one in a scratch folder, `ready` sees all its events until it serves."""
+    """The workers of one bake, terminated on exit.
+
+    start: makes a worker in a scratch folder. ready: gets every event of a worker, and its scratch folder, until it serves.
+    """
 
     def __init__(
         self,
@@ -145,18 +153,18 @@ class WorkerPool:
                 self._open(self._slots[0])
 
     def stop(self) -> None:
-        """Begin no other light; `render` returns once those at hand are done."""
+        """Begin no other light; `render` returns once those begun are done."""
         with self._lock:
             self._stop = True
             self._waiting.clear()
 
     def render(self, tasks: Sequence[Task], take: Take) -> None:
-        """Have every task rendered and hand over its answer, from the threads of several workers; lights given up are in `failed`.
+        """Have every task rendered and pass its result to `take`, in the threads of several workers; lights given up are in `failed`.
 
-        The first error of scene, disk or `take` ends all of it. KeyboardInterrupt lets the lights at hand finish, then is raised.
+        The first error of scene, disk or `take` ends all of it. KeyboardInterrupt lets the lights begun finish, then is raised.
         """
         self._waiting.extend(tasks)
-        # Events, not joins: Python 3.11 takes a thread for ended whose join a Ctrl-C interrupts.
+        # Events, not joins: Python 3.11 treats a thread as ended whose join a Ctrl-C interrupts.
         ended = [threading.Event() for _ in self._slots]
         for slot, event in zip(self._slots, ended, strict=True):
             threading.Thread(target=self._serve, args=(slot, take, event), daemon=True).start()
@@ -172,7 +180,7 @@ class WorkerPool:
                         slot.close()
                     raise
                 interrupt = pressed
-                self._say("finishing the light at hand; press again to stop at once")
+                self._say("finishing the light begun; press again to stop at once")
                 self.stop()
         if self._error is not None:
             raise self._error
@@ -183,7 +191,7 @@ class WorkerPool:
         try:
             while self._work(slot, take):
                 pass
-        except BaseException as error:  # noqa: BLE001 - raised again by `render`, in the thread that asked
+        except BaseException as error:  # noqa: BLE001 - raised again by `render`, in the calling thread
             with self._lock:
                 self._error = self._error or error
             self.stop()
@@ -191,25 +199,25 @@ class WorkerPool:
             ended.set()
 
     def _work(self, slot: _Slot, take: Take) -> bool:
-        """Ask and take until the list is empty (False) or the worker is to be replaced (True)."""
+        """Send requests and take results until the list is empty (False) or the worker is to be replaced (True)."""
         asked: deque[Task] = deque()
         try:
             while True:
-                while len(asked) < AHEAD and slot.answered + len(asked) < self._settings.lights_per_worker:
+                while len(asked) < AHEAD and slot.rendered + len(asked) < self._settings.lights_per_worker:
                     task = self._next()
                     if task is None:
                         break
                     if slot.worker is None:
-                        asked.append(task)  # put back should the opening fail
+                        asked.append(task)  # put back if the opening fails
                         self._open(slot)
                         asked.pop()
                     assert slot.worker is not None
-                    slot.worker.ask(task.job())
+                    slot.worker.ask(task.request)
                     asked.append(task)
                 if self._stop and len(asked) > 1 and slot.worker is not None:
-                    slot.worker.end()  # drops what it has not begun
+                    slot.worker.end()  # drops requests not begun
                 if not asked:
-                    if slot.answered >= self._settings.lights_per_worker:
+                    if slot.rendered >= self._settings.lights_per_worker:
                         slot.close()
                         return True
                     return False
@@ -245,17 +253,21 @@ class WorkerPool:
         raise BakeError("Blender's worker ended before it was ready")
 
     def _response(self, slot: _Slot, task: Task) -> Response | None:
-        """The next image; None where the worker was told to end before it began the task."""
+        """The next result; None where the worker ended before it began the task."""
         assert slot.worker is not None
         while (event := slot.worker.event(self._patience.of(task.samples))) is not None:
             if event["event"] == "warning":
                 self._say(event["message"])
-            elif event["event"] == "image":
-                if event["light"] != task.light.index:
-                    raise BakeError(f"expected light {task.light.index} from Blender, found {event['light']}")
-                slot.answered += 1
-                direct = _taken(slot.scratch / event["direct"]) if "direct" in event else None
-                return Response(_taken(slot.scratch / event["file"]), direct, event["seconds"])
+            elif event["event"] == "rendered":
+                wanted = task.request.channels
+                if event["light"] != task.light.index or set(event["files"]) != set(wanted):
+                    raise BakeError(
+                        f"expected {', '.join(wanted)} of light {task.light.index} from Blender, "
+                        f"found {', '.join(event['files'])} of light {event['light']}"
+                    )
+                slot.rendered += 1
+                images = {name: _taken(slot.scratch / file) for name, file in event["files"].items()}
+                return Response(images[wanted[0]], images.get("direct"), event["seconds"])
         return None
 
     def _next(self) -> Task | None:
@@ -263,34 +275,34 @@ class WorkerPool:
             return self._waiting.popleft() if self._waiting and not self._stop else None
 
     def _died(self, asked: deque[Task], error: WorkerDiedError) -> None:
-        """The light at hand is tried again, or given up; those behind it go back to the list."""
+        """Try the current light again, or give it up; put those after it back on the list."""
         if not asked:
             raise error
-        if self._lost_openings:  # it never came to a light
+        if self._lost_openings:  # it rendered no light
             with self._lock:
                 self._waiting.extendleft(reversed(asked))
             return
-        at_hand = asked.popleft()
+        current = asked.popleft()
         with self._lock:
             self._waiting.extendleft(reversed(asked))
-            self._deaths[at_hand.light.index] += 1
-            again = self._deaths[at_hand.light.index] < TRIES
+            self._deaths[current.light.index] += 1
+            again = self._deaths[current.light.index] < TRIES
             if again:
-                self._waiting.appendleft(at_hand)
+                self._waiting.appendleft(current)
             else:
-                self.failed[at_hand.light.index] = str(error)
-        what = "tried again" if again else "given up; the rest goes on"
-        self._say(f"light {at_hand.light.index}: {error}; {what}")
+                self.failed[current.light.index] = str(error)
+        what = "tried again" if again else "given up; the other lights are rendered"
+        self._say(f"light {current.light.index}: {error}; {what}")
 
 
 @dataclass
 class _Slot:
     scratch: Path
     worker: Worker | None = None
-    answered: int = 0
+    rendered: int = 0
 
     def close(self) -> None:
-        worker, self.worker, self.answered = self.worker, None, 0
+        worker, self.worker, self.rendered = self.worker, None, 0
         if worker is not None:
             worker.close()
         with suppress(OSError):
@@ -301,6 +313,6 @@ def _taken(path: Path) -> ndarray:
     try:
         array = np.load(path)
     except (OSError, ValueError, EOFError) as error:
-        raise WorkerDiedError(f"Blender's process handed over {path.name}, which cannot be read: {error}") from error
+        raise WorkerDiedError(f"Blender's process wrote {path.name}, which cannot be read: {error}") from error
     path.unlink()
     return array

@@ -1,1 +1,1 @@
-"""Function spaces on the sphere of light directions, one a file."""
+"""Function spaces on the sphere of light directions, one per file."""

@@ -64,7 +64,7 @@ def r_table(spread: float) -> Float32[ndarray, " n"]:
     """R as a table: entry j is R at cos theta = -1 + 2 j / (n - 1), the smallest power of two n within TABLE_TOLERANCE.
 
     Below about 0.11 rad, and above about 1 rad where R has a square-root cusp at cos theta = -1, MAX_TABLE_SIZE entries do not
-    reach the tolerance: they are used all the same, with a warning that says the error.
+    reach the tolerance; the table then has them and a warning states its error.
     """
     n = 16
     while True:
@@ -83,7 +83,7 @@ def r_table(spread: float) -> Float32[ndarray, " n"]:
 
 
 def interpolation_error(table: Float32[ndarray, " n"], spread: float) -> float:
-    """Largest absolute error of the linearly interpolated table, on 16 points an entry, denser at both ends."""
+    """Largest absolute error of the linearly interpolated table, on 16 points per entry, denser at both ends."""
     n = len(table)
     h = 2 / (n - 1)
     ends = np.geomspace(h * 1e-4, h, 64)
@@ -92,7 +92,7 @@ def interpolation_error(table: Float32[ndarray, " n"], spread: float) -> float:
 
 
 def lookup(table: Float32[ndarray, " n"], cos_theta: Float[ndarray, "*shape"]) -> Float64[ndarray, "*shape"]:
-    """R from the table by fetch and mix, as every shader does it [Wong2005, fig. 9]; cos_theta is clipped to [-1, 1]."""
+    """R from the table by fetch and mix, as in the shaders [Wong2005, fig. 9]; cos_theta is clipped to [-1, 1]."""
     n = len(table)
     x = (np.clip(np.asarray(cos_theta, np.float64), -1, 1) + 1) * (0.5 * (n - 1))
     j = np.minimum(x.astype(np.int64), n - 2)

@@ -1,4 +1,4 @@
-"""Baselines that others use for the same job: spherical and hemispherical harmonics, polynomial texture maps."""
+"""Basis functions of other methods, as baselines: spherical and hemispherical harmonics, polynomial texture maps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 from numpy import ndarray
-from scipy.special import lpmv
 
 from srbf.arrays import Float, Float64
 from srbf.errors import InputError
@@ -26,7 +25,7 @@ class SphericalHarmonics:
 
     def __post_init__(self) -> None:
         if isqrt(self.k) ** 2 != self.k:
-            raise InputError(f"expected -k 1, 4, 9, 16, 25 … for {self.kind}, found {self.k}")
+            raise InputError(f"expected `k` of 1, 4, 9, 16, 25 … for {self.kind}, found {self.k}")
 
     def evaluate(self, directions: Float[ndarray, "N 3"]) -> Float64[ndarray, "N K"]:
         """All functions at unit directions."""
@@ -48,14 +47,14 @@ class HemisphericalHarmonics(SphericalHarmonics):
 
 @dataclass(frozen=True)
 class PolynomialTextureMap:
-    """1, x, y, xy, x^2, y^2 of the light direction [Malzbender2001]: six functions, meant for lights on the hemisphere."""
+    """1, x, y, xy, x^2, y^2 of the light direction [Malzbender2001]: six functions, for lights on the hemisphere."""
 
     k: int = PTM_TERMS
     kind: HarmonicKind = "ptm"
 
     def __post_init__(self) -> None:
         if self.k != PTM_TERMS:
-            raise InputError(f"expected -k {PTM_TERMS} for ptm, found {self.k}")
+            raise InputError(f"expected `k` of {PTM_TERMS} for ptm, found {self.k}")
 
     def evaluate(self, directions: Float[ndarray, "N 3"]) -> Float64[ndarray, "N K"]:
         """All functions at unit directions."""
@@ -72,6 +71,8 @@ HARMONICS = {
 
 def _harmonics(cosine: Float64[ndarray, " N"], azimuth: Float64[ndarray, " N"], order: int) -> Float64[ndarray, "N K"]:
     """Real harmonics, degree by degree, m from -l to l, without the Condon-Shortley phase."""
+    from scipy.special import lpmv
+
     columns = []
     for degree in range(order + 1):
         for m in range(-degree, degree + 1):

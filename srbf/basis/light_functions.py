@@ -16,8 +16,8 @@ from srbf.basis.gaussian import weight
 class LightFunctions:
     """F functions w_f(L, c) = sum_b coefficient[f, b, c] exp(-acos(L . Q_b)^2 / (2 spread_f^2)) over B shared centers.
 
-    Each function has a spread of its own, of few distinct ones: what changes slowly with the light is averaged over many images, and
-    what changes fast is not blurred. Every unit direction has an answer.
+    Each function has one of a few spreads: slow changes with the light are averaged over many images, and fast ones are not
+    blurred. The functions are defined for every unit direction.
     """
 
     centers: Float64[ndarray, "B 3"]
@@ -32,8 +32,8 @@ class LightFunctions:
             values[:, chosen] = (weights @ coefficients).reshape(len(directions), -1, 3)
         return values
 
-    def fold(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
-        """sum_n color_n w_f(direction_n): what many lights, or the texels of an environment, come to together."""
+    def project(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
+        """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map."""
         projected = np.empty((len(self.spreads), 3))
         for chosen, weights in self._by_spread(directions):
             projected[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)

@@ -12,8 +12,8 @@ from srbf.basis.gaussian import weight
 from srbf.basis.light_functions import LightFunctions
 from srbf.sphere import Domain, fibonacci, mean_spacing
 
-REPRODUCING = 0.7  # of the centers' spacing: Gaussians as wide reproduce wider ones to about 1e-3
-DENSITY = 4  # directions to a center by which one set of Gaussians is replaced by another
+REPRODUCING = 0.7  # center spacings: Gaussians of this spread reproduce wider ones within about 1e-3
+DENSITY = 4  # directions per center in the replacement of one set of Gaussians by another
 DAMPING = 1e-9  # of the mean squared weight, in that replacement
 
 
@@ -21,8 +21,8 @@ DAMPING = 1e-9  # of the mean squared weight, in that replacement
 class LightKernel:
     """K(x, y) = sum_b over shared centers of the mean of R_b(x) R_b(y) for one spread (rad), or for two, weighted by `wide_share`.
 
-    `wide` None: one spread, as it stands. Else both parts are scaled to a mean of 1 at the lights: K = (1 - s) K_narrow + s K_wide. The
-    wide part explains what changes slowly, and the narrow one keeps a highlight that few lights see from rippling through the rest.
+    `wide` None: one spread, unscaled. Otherwise both parts are scaled to a mean of 1 at the lights: K = (1 - s) K_narrow + s K_wide. The
+    wide part explains slow changes; the narrow one prevents oscillations around a highlight that few lights show.
     """
 
     narrow: float
@@ -45,8 +45,8 @@ class LightKernel:
     ) -> LightFunctions:
         """w_f(x, c) = K(x, lights) solved, column 3 f + c of N = 3 F, as Gaussians of one spread on the centers.
 
-        Of two spreads the Gaussians of the wide one are replaced by those of the narrow, by least squares over the domain and as far
-        below the horizon as there are centers.
+        With two spreads, the wide Gaussians are replaced by narrow ones, by least squares over the domain and as far below the horizon
+        as the centers extend.
         """
         parts = self.parts(lights, centers)
         spread = parts[0][0]
@@ -83,5 +83,5 @@ def replacement(wide: float, narrow: float, centers: Float64[ndarray, "B 3"], do
 
 
 def narrowest(centers: Float64[ndarray, "B 3"]) -> float:
-    """The least spread (rad) whose Gaussians on these centers reproduce wider ones."""
+    """The smallest spread (rad) whose Gaussians on these centers reproduce wider ones."""
     return REPRODUCING * mean_spacing(centers)

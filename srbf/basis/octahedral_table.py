@@ -1,4 +1,4 @@
-"""Light functions as small octahedral tables, for receivers that each see a lamp from a direction of their own."""
+"""Light functions as small octahedral tables, for point lights, whose direction differs per receiver."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from srbf.basis.light_functions import LightFunctions
 from srbf.sphere import Domain, all_around, octahedral_decode, octahedral_encode
 
 SIZES = (17, 33, 65, 129)
-TABLE_ERROR = 2.0**-5  # rms of the mixed table's error over the rms of the functions: 30 dB below them, where captures hold 20 to 35
-TABLE_BYTES = 32 << 20  # that a table may take at most, as RGBA halves
-PROBES, PROBED = 4096, 64  # directions, and functions of many, on which the error is taken
+TABLE_ERROR = 2.0**-5  # rms of the interpolation error over the rms of the functions: 30 dB, where captures reach 20 to 35
+TABLE_BYTES = 32 << 20  # largest size of a table, as RGBA halves
+PROBES, PROBED = 4096, 64  # directions, and functions, used to measure the error
 NODE_BATCH = 512
 
 
 def table_directions(size: int) -> Float64[ndarray, "n n 3"]:
     """The unit direction of every node: row i, column j at octahedral coordinates -1 + 2 j / (n - 1), -1 + 2 i / (n - 1).
 
-    Nodes stand on the borders, where partners across a fold are one direction: mixing needs no neighbor outside the tile.
+    Border nodes across a fold share their direction, so interpolation needs no neighbor outside the tile.
     """
     line = np.linspace(-1, 1, size)
     return octahedral_decode(*np.meshgrid(line, line))
@@ -31,7 +31,7 @@ def table_directions(size: int) -> Float64[ndarray, "n n 3"]:
 class OctahedralTable:
     """F functions in one atlas: tile f, size x size nodes, has its top-left texel at row (f div columns) size, column (f mod columns) size.
 
-    `error`: rms of the mixed table less the functions, over the rms of the functions.
+    `error`: rms of the interpolated table minus the functions, over the rms of the functions.
     """
 
     atlas: Float16[ndarray, "rows columns 3"]
@@ -41,8 +41,8 @@ class OctahedralTable:
 
 
 def octahedral_table(functions: LightFunctions, domain: Domain, sizes: tuple[int, ...] = SIZES) -> OctahedralTable:
-    """The smallest of `sizes` at which the mixed table keeps within TABLE_ERROR of the functions over the domain, or the largest that
-    TABLE_BYTES hold."""
+    """The smallest of `sizes` whose interpolated table is within TABLE_ERROR of the functions over the domain, or the largest within
+    TABLE_BYTES."""
     count = len(functions.spreads)
     some = np.unique(np.linspace(0, count - 1, min(PROBED, count)).astype(np.int64))
     probed = LightFunctions(functions.centers, functions.spreads[some], functions.coefficients[some])
@@ -63,7 +63,7 @@ def octahedral_table(functions: LightFunctions, domain: Domain, sizes: tuple[int
 def lookup(
     atlas: Float[ndarray, "rows columns 3"], size: int, columns: int, function: Int[ndarray, "*p"], directions: Float[ndarray, "*p 3"]
 ) -> Float32[ndarray, "*p 3"]:
-    """Function `function` at unit directions by four fetches and a mix, as every shader does it."""
+    """Function `function` at unit directions by four fetches and a mix, as in the shaders."""
     u, v = octahedral_encode(directions)
     x, y = (u + 1) * (0.5 * (size - 1)), (v + 1) * (0.5 * (size - 1))
     j, i = (np.clip(t.astype(np.int64), 0, size - 2) for t in (x, y))

@@ -1,4 +1,4 @@
-"""The command line: one command a file; each parses, calls, prints."""
+"""The command line: one command a file, imported when it is called; each parses, calls, prints."""
 
 from __future__ import annotations
 
@@ -7,12 +7,29 @@ from typing import Annotated
 import typer
 
 import srbf
-from srbf.cli import bake, demo, evaluate, export, fit, import_, info, mesh, relight, report, view
-from srbf.cli.terminal import Commands
+from srbf.cli.group import Commands
 
-app = typer.Typer(
-    cls=Commands, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=srbf.__doc__, rich_markup_mode=None
-)
+COMMANDS = {  # where each is, and what the list of commands says of it
+    "bake": ("srbf.cli.bake:bake", "Render a Blender scene under many lights: a capture."),
+    "import": ("srbf.cli.import_:import_capture", "Make a capture of images and a light list."),
+    "fit": ("srbf.cli.fit:fit", "Compress a capture: an asset."),
+    "relight": ("srbf.cli.relight:relight", "Light an asset by any number of lights: an image."),
+    "evaluate": ("srbf.cli.evaluate:evaluate", "Print the error of an asset."),
+    "report": ("srbf.cli.report:report", "Write a page about an asset: errors and figures."),
+    "export": ("srbf.cli.export:export", "Write an asset as an engine loads it."),
+    "mesh": ("srbf.cli.mesh:mesh", "Write a Blender scene as one .glb."),
+    "view": ("srbf.cli.view:view", "Show an asset in the browser and move its lights."),
+    "info": ("srbf.cli.info:info", "Print what a capture or an asset holds."),
+    "demo": ("srbf.cli.demo:demo", "Bake, fit and report a scene that comes with srbf."),
+}
+
+
+class _Srbf(Commands):
+    FUNCTIONS = {name: function for name, (function, _) in COMMANDS.items()}
+    SUMMARIES = {name: summary for name, (_, summary) in COMMANDS.items()}
+
+
+app = typer.Typer(cls=_Srbf, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def _version(value: bool) -> None:
@@ -23,17 +40,4 @@ def _version(value: bool) -> None:
 
 @app.callback()
 def main(version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False) -> None:
-    """Render a scene once under many lights, compress what it answers, relight it in real time."""
-
-
-app.command("bake")(bake.bake)
-app.command("import")(import_.import_capture)
-app.command("fit")(fit.fit)
-app.command("relight")(relight.relight)
-app.command("evaluate")(evaluate.evaluate)
-app.command("report")(report.report)
-app.command("export")(export.export)
-app.command("mesh")(mesh.mesh)
-app.command("view")(view.view)
-app.command("info")(info.info)
-app.command("demo")(demo.demo)
+    """Render a scene once under many lights, compress the results, relight it in real time."""

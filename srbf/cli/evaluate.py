@@ -1,4 +1,4 @@
-"""`srbf evaluate`: an asset against its capture's images, or against true lamps inside its scene."""
+"""`srbf evaluate`: an asset against its capture's images, or against true point lights inside its scene."""
 
 from __future__ import annotations
 
@@ -10,92 +10,71 @@ import typer
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
-from srbf.cli.fit_parameters import (
-    Basis,
-    Budget,
-    Centers,
-    Clusters,
-    Domain,
-    Encoding,
-    Maps,
-    Method,
-    Psnr,
-    Ridge,
-    Scalars,
-    Spread,
-    Weighting,
-)
+from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
-from srbf.errors import InputError
+from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
-from srbf.fitting.options import method_for, method_of, settings_of
+from srbf.fitting.options import method_for
 from srbf.relighting.direct_light import Added, chosen
 
+COMMAND = FitCommand
 
+
+@with_method_flags
 def evaluate(
     asset: AssetFolder,
+    method: str | None,
+    settings: dict[str, Any],
     reference: Annotated[
         Path | None,
-        typer.Argument(help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
+        typer.Argument(metavar="REFERENCE", help="A capture's folder; with --point-reference the .blend it came from.", show_default=False),
     ] = None,
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="ASSET is a CAPTURE: fit it to all lights but one, for each, by the flags of srbf fit.")
     ] = False,
     point_reference: Annotated[
-        int | None, typer.Option(help="Compare with N true Cycles lamps inside the scene.", show_default=False)
+        int | None,
+        typer.Option(
+            metavar="COUNT", parser=COUNT, help="Compare with so many true point lights of Cycles inside the scene.", show_default=False
+        ),
     ] = None,
     direct: Annotated[
         Literal["none", "ray", "shadow-map"] | None,
         typer.Option(
-            help="Direct light added to an indirect asset, to compare with the combined answer; default none, with lamps ray.",
+            help="Direct light added to an indirect asset, to compare with the combined response; default none, with point lights ray.",
             show_default=False,
         ),
     ] = None,
-    samples: Annotated[int, typer.Option(help="Samples a texel of --point-reference.")] = 64,
-    seed: Annotated[int, typer.Option(help="Of the lamps' places.")] = 0,
-    method: Method = None,
-    k: Maps = None,
-    basis: Basis = None,
-    centers: Centers = None,
-    scalars: Scalars = None,
-    clusters: Clusters = None,
-    weighting: Weighting = None,
-    domain: Domain = "auto",
-    spread: Spread = "auto",
-    ridge: Ridge = "auto",
-    encoding: Encoding = None,
-    budget: Budget = None,
-    psnr: Psnr = None,
+    samples: Annotated[int, typer.Option(metavar="COUNT", parser=COUNT, help="Samples per texel of --point-reference.")] = 64,
+    seed: Annotated[int, typer.Option(metavar="NUMBER", parser=COUNT_OR_NONE, help="Random seed of the point lights' positions.")] = 0,
     blender: Blender = None,
     json: Json = False,
 ) -> None:
-    """Print the error by role, by distance from true lamps, or at lights left out of a fit."""
-    given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
-    given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
+    """Print the error by role, by distance from true point lights, or at lights left out of a fit."""
     if leave_one_out:
         if reference is not None or point_reference is not None or direct is not None:
-            raise InputError("expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct")
-        kind = method_of(method, given)
-        settings = settings_of(kind, given, domain, spread, ridge)
+            raise typer.BadParameter(
+                "expected --leave-one-out CAPTURE and flags of srbf fit, found a second path, --point-reference or --direct"
+            )
         with progress_bar("leave one out") as update:
-            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, kind, settings).encode(c), update), json)
+            _print_errors(errors_left_out(Capture.open(asset), lambda c: method_for(c, method, settings).encode(c), update), json)
         return
     if reference is None:
-        raise InputError("expected an asset and a capture, found one path; or add --leave-one-out to fit a capture")
-    if any(value is not None for value in given.values()) or (method, domain, spread, ridge) != (None, "auto", "auto", "auto"):
-        raise InputError("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
+        raise typer.BadParameter("expected an asset and a capture, found one path; or add --leave-one-out to fit a capture")
+    if method is not None or settings:
+        raise typer.BadParameter("expected flags of srbf fit with --leave-one-out alone, found them with an asset that is fitted already")
     opened = Asset.open(asset)
     if point_reference is not None:
-        with Added(opened, chosen(opened, direct)) as added, progress_bar("point_lights") as update:
+        with Added(opened, chosen(opened, direct)) as added, progress_bar("point lights") as update:
             point_lights = compare_with_point_lights(
                 opened, reference, point_reference, samples, seed, update, note, blender, added.response
             )
         if json:
-            print_json(point_lights)
+            print_json(point_lights | {"lamps": point_lights["point_lights"]})  # its former key, for one version; words: ok
             return
-        typer.echo(f"{point_reference} true lamps against the point relighter, relative RMSE (at the best scale of each falloff)")
+        typer.echo(f"{point_reference} true point lights against the point relighter, relative RMSE (at the best scale of each falloff)")
         typer.echo(f"{'distance, m':>16} {'inverse-square':>18} {'linear':>18} {'texels':>10}")
         for row in point_lights["by_distance"]:
             cells = [f"{row[name]['relative_rmse']:.3f} ({row[name]['scaled']:.3f})" for name in ("inverse-square", "linear")]

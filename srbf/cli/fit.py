@@ -10,47 +10,25 @@ import typer
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
-from srbf.cli.fit_parameters import (
-    Basis,
-    Budget,
-    Centers,
-    Clusters,
-    Domain,
-    Encoding,
-    Maps,
-    Method,
-    Psnr,
-    Ridge,
-    Scalars,
-    Spread,
-    Weighting,
-)
+from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import CaptureFolder, Dask, Force, Output
 from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
-from srbf.errors import InputError
-from srbf.evaluation.errors_by_role import TrainWatch, evaluate
-from srbf.fitting.options import encode, method_for, method_of, more_maps_than_lights, settings_of
+from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
+from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
+from srbf.methods import FitRun, method_of
+
+COMMAND = FitCommand
 
 
+@with_method_flags
 def fit(
     capture: CaptureFolder,
     output: Output,
-    method: Method = None,
-    k: Maps = None,
-    basis: Basis = None,
-    centers: Centers = None,
-    scalars: Scalars = None,
-    clusters: Clusters = None,
-    weighting: Weighting = None,
-    domain: Domain = "auto",
-    spread: Spread = "auto",
-    ridge: Ridge = "auto",
-    encoding: Encoding = None,
-    budget: Budget = None,
-    psnr: Psnr = None,
+    method: str | None,
+    settings: dict[str, Any],
     dask: Dask = None,
     stitch: Annotated[
         bool, typer.Option("--stitch/--no-stitch", help="Make the two sides of UV seams agree, where the capture has any.")
@@ -59,29 +37,26 @@ def fit(
 ) -> None:
     """Fit an asset to the train lights and measure its error on every role of the capture.
 
+    Without flags: the best within 16 bytes per texel. -k N fits relighting maps, --components N an eigen map, --clusters N a clustered
+    one; --budget and --psnr choose among them.
+
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
-    they are many: `srbf evaluate` reads them all again. With --dask other machines fit tiles of rows, and train is read once more here.
+    they are many: `srbf evaluate` reads them all again. With --dask other machines fit blocks of rows, and train is read once more here.
     """
-    given: dict[str, Any] = {"k": k, "basis": basis, "centers": centers, "scalars": scalars, "clusters": clusters, "weighting": weighting}
-    given |= {"encoding": encoding, "budget": budget, "psnr": psnr}
-    kind = method_of(method, given)
-    if dask is not None and kind != "relighting-map":
-        raise InputError(f"expected --dask with --method relighting-map, whose tiles are independent, found it with {kind}")
-    settings = settings_of(kind, given, domain, spread, ridge)
     check_replaceable(output, force, MANIFEST)
     opened = Capture.open(capture)
     started = time.perf_counter()
-    chosen = method_for(opened, kind, settings, note)
+    chosen = method_for(opened, method, settings, note)
     watch = None
     if dask is not None:
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
-            asset = encode(chosen, opened, update, stitched=stitch, tiles=partial(_tiles, cluster))
+            asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster)), stitch)
     else:
-        watch = TrainWatch(opened)
+        watch = TrainErrorAccumulator(opened)
         with progress_bar("fit") as update:
-            asset = encode(chosen, opened, update, watch.look, stitch)
+            asset = encode(chosen, opened, FitRun(update, watch.look), stitch)
     fitted = time.perf_counter()
-    if (caution := more_maps_than_lights(chosen, opened)) is not None:
+    if (caution := chosen.caution(opened)) is not None:
         note(caution)
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
@@ -98,18 +73,11 @@ def fit(
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
 
 
-def _tiles(cluster: Cluster, capture: Capture, lights: list[int], matrix: Any, ridge: float, progress: Any) -> Any:
+def _solve_rows(cluster: Cluster, capture: Capture, lights: list[int], matrix: Any, ridge: float, progress: Any) -> Any:
     return fit_tiles(capture, lights, matrix, ridge, cluster.map, cluster.threads, progress)
 
 
 def _summary(asset: Asset) -> str:
-    facts = asset.manifest["source"]["fit"]
-    chosen = f", chosen by {facts['chosen_by']}" if "chosen_by" in facts else ""
-    size = f"{asset.bytes_per_texel()['directional']} bytes a texel"
-    if asset.method != "relighting-map":
-        clusters = f"{asset.clusters} clusters of " if asset.method == "clustered-eigen-map" else ""
-        return f"{clusters}{asset.scalars} scalars ({size}{chosen})"
-    condition = f"{facts['condition_number']:.3g}" if facts["condition_number"] is not None else "infinite"
-    spread = f"spread {asset.basis.spread:.4g} rad, " if asset.manifest["basis"]["kind"] == "gaussian" else ""
-    model = f"{spread}ridge {facts['ridge']:.3g}{chosen}"
-    return f"{asset.k} maps ({size}; {model}; condition {condition}, rank {facts['rank']}, residual {facts['relative_residual']:.3g})"
+    rule = asset.manifest["source"]["fit"].get("chosen_by")
+    chosen = f"; spread and ridge chosen by {rule}" if rule else ""
+    return f"{method_of(asset).summary(asset)} ({asset.bytes_per_texel()['directional']} bytes per texel{chosen})"

@@ -13,24 +13,27 @@ from srbf.importing.photographs import LightListImport
 
 
 def import_capture(
-    lp: Annotated[Path, typer.Option("--lp", help="Light list: a count, then `name x y z` a line.", show_default=False)],
+    lp: Annotated[Path, typer.Option("--lp", metavar="FILE", help="Light list: a count, then `name x y z` a line.", show_default=False)],
     output: Output,
     transfer: Annotated[
         Literal["srgb", "linear"], typer.Option(help="srgb: decode the curve; linear: stored values as they are.", show_default=False)
     ],
     holdout_lp: Annotated[
-        Path | None, typer.Option("--holdout-lp", help="Light list of images to test by, not to fit.", show_default=False)
+        Path | None, typer.Option("--holdout-lp", metavar="FILE", help="Light list of held-out images, not to fit.", show_default=False)
     ] = None,
-    mask: Annotated[Path | None, typer.Option(help="Image that becomes coverage: white is real.", show_default=False)] = None,
+    mask: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Image that becomes coverage: white is real.", show_default=False)
+    ] = None,
     light_kind: Annotated[
         Literal["directional", "point"], typer.Option(help="Whether the lists hold directions, or positions in meters.")
     ] = "directional",
     quantity: Annotated[Literal["radiance", "irradiance"], typer.Option(help="What the images measure.")] = "radiance",
     layer: Annotated[
-        str | None, typer.Option(help="Layer or part of multilayer EXR files, where several may be meant.", show_default=False)
+        str | None,
+        typer.Option(metavar="NAME", help="Layer or part of multilayer EXR files, where several may be meant.", show_default=False),
     ] = None,
     images: Annotated[
-        Path | None, typer.Option(help="Folder of the images, where they are not beside the list.", show_default=False)
+        Path | None, typer.Option(metavar="FOLDER", help="Folder of the images, where they are not beside the list.", show_default=False)
     ] = None,
     force: Force = False,
 ) -> None:

@@ -13,7 +13,7 @@ from srbf.info import describe
 
 
 def info(
-    path: Annotated[Path, typer.Argument(help="Folder of a capture or an asset.", show_default=False)],
+    path: Annotated[Path, typer.Argument(metavar="PATH", help="Folder of a capture or an asset.", show_default=False)],
     json: Json = False,
 ) -> None:
     """Print size, lights, fit, error and memory; checks every file on the way."""

@@ -10,26 +10,25 @@ import numpy as np
 
 from srbf import schemas
 from srbf.errors import InputError
-from srbf.importing.pictures import read_picture, said_once
 from srbf.io import files
 from srbf.lights import DirectionalLight, EnvironmentLight, Falloff, Light, PointLight, SpotLight
 
 
 def parse_directional(text: str) -> DirectionalLight:
     """`X,Y,Z[,R,G,B]`: towards the light, then its irradiance."""
-    n = _numbers(text, (3, 6), "--directional X,Y,Z[,R,G,B]")
+    n = _numbers(text, (3, 6), "`directional` X,Y,Z[,R,G,B]")
     return DirectionalLight(_xyz(n, 0), **_color(n, 3))
 
 
 def parse_point(text: str, a0: float, falloff: Falloff) -> PointLight:
     """`X,Y,Z[,R,G,B]`: position in meters, then irradiance at the distance a0."""
-    n = _numbers(text, (3, 6), "--point X,Y,Z[,R,G,B]")
+    n = _numbers(text, (3, 6), "`point` X,Y,Z[,R,G,B]")
     return PointLight(_xyz(n, 0), a0=a0, falloff=falloff, **_color(n, 3))
 
 
 def parse_spot(text: str, a0: float, falloff: Falloff) -> SpotLight:
     """`X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]`: position, where it shines, half-angles in radians, color."""
-    n = _numbers(text, (8, 11), "--spot X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]")
+    n = _numbers(text, (8, 11), "`spot` X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]")
     return SpotLight(_xyz(n, 0), direction=_xyz(n, 3), inner=n[6], outer=n[7], a0=a0, falloff=falloff, **_color(n, 8))
 
 
@@ -60,6 +59,8 @@ def _light(entry: dict[str, Any], folder: Path) -> Light:
 
 
 def _environment(path: Path) -> np.ndarray:
+    from srbf.importing.pictures import read_picture, said_once
+
     picture = read_picture(path, "linear")
     for line in said_once([(path.name, picture.notes)]):
         warnings.warn(line, stacklevel=2)

@@ -14,15 +14,21 @@ from srbf.export.scene_mesh import write_scene_mesh
 
 
 def mesh(
-    scene: Annotated[Path, typer.Argument(help="The .blend; it is not changed, and nothing in it runs.", show_default=False)],
-    output: Annotated[Path, typer.Option("-o", "--output", help="The .glb to write.", show_default=False)],
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="The .blend; it is not changed, and nothing in it runs.", show_default=False)
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The .glb to write.", show_default=False)],
     capture: Annotated[
-        Path | None, typer.Option(help="Of a lightmap: its receivers get the lightmap's UVs and its albedo.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Of a lightmap: its receivers get the lightmap's UVs and its albedo.", show_default=False),
     ] = None,
     scene_name: Annotated[
         str | None,
         typer.Option(
-            "--scene", help="Which scene of the .blend; default: the capture's, else the one it was saved in.", show_default=False
+            "--scene",
+            metavar="NAME",
+            help="Which scene of the .blend; default: the capture's, else the one it was saved in.",
+            show_default=False,
         ),
     ] = None,
     blender: Blender = None,

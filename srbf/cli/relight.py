@@ -11,16 +11,17 @@ import typer
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.cli.flags import flags_alone
 from srbf.cli.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
-from srbf.errors import InputError
+from srbf.cli.values import POSITIVE, Number
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
 from srbf.lights import Light
-from srbf.methods.receivers import outside_domain
+from srbf.methods import outside_domain
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
-from srbf.relighting.direct_light import Added, chosen
+from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
 
 FRAMES_MARKER = "0000.exr"
@@ -28,20 +29,38 @@ FRAMES_MARKER = "0000.exr"
 
 def relight(
     asset: AssetFolder,
-    output: Annotated[Path, typer.Option("-o", "--output", help="OUT.exr, OUT.png, or with --lights a folder.", show_default=False)],
-    directional: Annotated[list[str] | None, typer.Option(help="X,Y,Z[,R,G,B] towards the light. Repeats.", show_default=False)] = None,
-    point: Annotated[list[str] | None, typer.Option(help="X,Y,Z[,R,G,B] position. Repeats.", show_default=False)] = None,
-    spot: Annotated[list[str] | None, typer.Option(help="X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]. Repeats.", show_default=False)] = None,
-    environment: Annotated[list[Path] | None, typer.Option(help="Equirectangular image. Repeats.", show_default=False)] = None,
-    a0: Annotated[float, typer.Option(help="Distance (m) at which a point or spot light has its color.")] = 1.0,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="PATH", help="OUT.exr, OUT.png, or with --lights a folder.", show_default=False)
+    ],
+    directional: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z[,R,G,B]", help="Towards the light, its color. Repeats.", show_default=False)
+    ] = None,
+    point: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z[,R,G,B]", help="Position in meters, color. Repeats.", show_default=False)
+    ] = None,
+    spot: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]",
+            help="Position, where it shines, half-angles in radians, color. Repeats.",
+            show_default=False,
+        ),
+    ] = None,
+    environment: Annotated[
+        list[Path] | None, typer.Option(metavar="IMAGE", help="Equirectangular environment map. Repeats.", show_default=False)
+    ] = None,
+    reference_distance: Annotated[
+        float, typer.Option(metavar="METERS", parser=POSITIVE, help="Distance a0 at which a point or spot light has its color.")
+    ] = 1.0,
     falloff: Annotated[Literal["linear", "inverse-square"], typer.Option(help="Of point and spot lights.")] = "linear",
-    lights: Annotated[Path | None, typer.Option(help="FRAMES.json: a folder of images, one a frame.", show_default=False)] = None,
+    lights: Annotated[Path | None, typer.Option(metavar="FRAMES.json", help="A folder of images, one a frame.", show_default=False)] = None,
+    ambient_only: Annotated[bool, typer.Option("--ambient-only", help="No light: the ambient light that the scene itself emits.")] = False,
     direct: Annotated[
         Literal["none", "ray", "shadow-map"] | None,
         typer.Option(help="Direct light added to an indirect asset; default: ray, without embreex shadow-map.", show_default=False),
     ] = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
-    exposure: Annotated[float, typer.Option(help="Stops, for PNG.")] = 0.0,
+    exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
     alpha: Annotated[
         Alpha,
         typer.Option(
@@ -55,54 +74,64 @@ def relight(
 
     A view with an empty background gets its coverage as a fourth channel, A, and 0 where nothing is seen; lightmaps stay RGB.
     """
-    if not abs(exposure) <= 100:
-        raise InputError(f"expected an exposure within ±100 stops, found {exposure:g}")
-    flags: list[Light] = [
-        *map(parse_directional, directional or []),
-        *(parse_point(text, a0, falloff) for text in point or []),
-        *(parse_spot(text, a0, falloff) for text in spot or []),
-        *map(read_environment, environment or []),
-    ]
-    if lights is not None:
-        if flags:
-            raise InputError("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
-        frames = read_frames(lights)
-        opened = Asset.open(asset)
-        opacity = alpha_of(opened)
-        with (
-            Added(opened, chosen(opened, direct)) as added,
-            atomic_folder(output, force, FRAMES_MARKER) as folder,
-            progress_bar("relight") as update,
-        ):
-            for number, frame in enumerate(frames):
-                for line in outside_domain(opened, frame):
-                    note(f"frame {number}: {line}")
-            for number, image in enumerate(_render(opened, frames, renderer, added)):
-                write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
-                update(number + 1, len(frames))
-            for line in added.notes([light for frame in frames for light in frame]):
-                note(line)
-        note(f"wrote {len(frames)} images into {output}")
-        return
-    if output.suffix.lower() not in (".exr", ".png"):
-        raise InputError(f"expected an output named .exr or .png, found {output.name!r}")
-    picture = output.suffix.lower() == ".png"
+    with flags_alone():
+        placed: list[Light] = [
+            *map(parse_directional, directional or []),
+            *(parse_point(text, reference_distance, falloff) for text in point or []),
+            *(parse_spot(text, reference_distance, falloff) for text in spot or []),
+        ]
+    has_light = bool(placed or environment)
+    if lights is not None and has_light:
+        raise typer.BadParameter("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
+    if ambient_only and (has_light or lights is not None):
+        raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
+    if not (has_light or ambient_only or lights is not None):
+        raise typer.BadParameter("expected a light, found none; add --directional, --point, --spot, --environment or --ambient-only")
+    picture = lights is None and output.suffix.lower() == ".png"
+    if lights is None and output.suffix.lower() not in (".exr", ".png"):
+        raise typer.BadParameter(f"expected an output named .exr or .png, found {output.name!r}")
     if picture and alpha == "premultiplied":
-        raise InputError("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
+        raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
+    if lights is not None:
+        _relight_frames(asset, output, read_frames(lights), direct, renderer, alpha, force)
+        return
+    placed += map(read_environment, environment or [])
     check_image_output(output, force)
     opened = Asset.open(asset)
     opacity = alpha_of(opened)
-    for line in outside_domain(opened, flags):
+    for line in outside_domain(opened, placed):
         note(line)
     with Added(opened, chosen(opened, direct)) as added:
-        (image,) = _render(opened, [flags], renderer, added)
-        for line in added.notes(flags):
+        (image,) = _render(opened, [placed], renderer, added)
+        for line in added.notes(placed):
             note(line)
     if picture:
         write_png(output, image, None if alpha == "none" else opacity, exposure)
     else:
         write_image(output, with_alpha(image, opacity, alpha), "float")
     note(f"wrote {output}")
+
+
+def _relight_frames(
+    asset: Path, output: Path, frames: list[list[Light]], direct: Direct | None, renderer: str, alpha: Alpha, force: bool
+) -> None:
+    """An image of each frame's lights in the folder `output`."""
+    opened = Asset.open(asset)
+    opacity = alpha_of(opened)
+    with (
+        Added(opened, chosen(opened, direct)) as added,
+        atomic_folder(output, force, FRAMES_MARKER) as folder,
+        progress_bar("relight") as update,
+    ):
+        for number, frame in enumerate(frames):
+            for line in outside_domain(opened, frame):
+                note(f"frame {number}: {line}")
+        for number, image in enumerate(_render(opened, frames, renderer, added)):
+            write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
+            update(number + 1, len(frames))
+        for line in added.notes([light for frame in frames for light in frame]):
+            note(line)
+    note(f"wrote {len(frames)} images into {output}")
 
 
 def check_image_output(path: Path, force: bool) -> None:

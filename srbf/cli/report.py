@@ -10,7 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture
+from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.cli.parameters import AssetFolder, CaptureFolder, Force
 from srbf.cli.relight import check_image_output
 from srbf.cli.terminal import note, progress_bar
@@ -18,7 +19,6 @@ from srbf.errors import SrbfError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.io.files import atomic_folder, check_replaceable, write_text
 from srbf.relighting.direct_light import Direct
-from srbf.report import write_report
 
 PAGE = "index.html"
 WITH_DIRECT: dict[str, Direct] = {"direct_ray": "ray", "direct_shadow_map": "shadow-map"}
@@ -28,11 +28,16 @@ def report(
     asset: AssetFolder,
     capture: CaptureFolder,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="OUT.html, or a folder that gets the pictures as files too.", show_default=False)
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="PATH", help="OUT.html, or a folder that gets the pictures as files too.", show_default=False
+        ),
     ],
     force: Force = False,
 ) -> None:
-    """Write one page to look at: errors at unseen lights, by bytes and in motion, and the article's figures, all inside it."""
+    """Write one page to look at: errors at held-out lights, by bytes and in motion, and the article's figures, all inside it."""
+    from srbf.report import write_report
+
     single = output.suffix.lower() in (".html", ".htm")
     if single:
         check_image_output(output, force)

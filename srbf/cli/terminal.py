@@ -1,72 +1,49 @@
-"""What all commands share of the terminal: errors as one line and exit 1, notes and progress on stderr, JSON alone on stdout."""
+"""What all commands share of the terminal: an error as one line, notes and progress on stderr, JSON alone on stdout."""
 
 from __future__ import annotations
 
 import json
-import os
 import sys
 import time
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from srbf.errors import SrbfError
+from srbf.cli.flags import in_flags
 
-STDERR = Console(stderr=True, highlight=False, soft_wrap=True)
-
-
-FORMER_FLAGS = {  # hidden aliases, for one version
-    "--hang-after": "--worker-timeout",
-    "--keep-lamps": "--keep-scene-lights",
-    "--lights-a-worker": "--lights-per-worker",
-    "--texels-per-metre": "--texels-per-meter",
-}
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
-def renamed(argument: str) -> str:
-    """The argument with a former flag's present name."""
-    flag, equals, value = argument.partition("=")
-    return FORMER_FLAGS.get(flag, flag) + equals + value
+_parameters: Sequence[Any] = ()  # of the command that runs
 
 
-class Commands(typer.core.TyperGroup):
-    """A command group that turns the project's errors into one line on stderr and exit 1; wrong usage exits 2 as click has it."""
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        return super().parse_args(ctx, [renamed(argument) for argument in args])
-
-    def invoke(self, ctx: Any) -> Any:
-        warnings.showwarning = lambda message, *_args, **_kwargs: note(str(message))
-        try:
-            return super().invoke(ctx)
-        except SrbfError as error:
-            fail(str(error))
-        except OSError as error:
-            if isinstance(error, BrokenPipeError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                raise typer.Exit(1) from None
-            where = f" at {error.filename}" if error.filename else ""
-            fail(f"the system refused{where}: {error.strerror or error}; free space, or choose a place that can be read and written")
-        except MemoryError:
-            fail("expected enough memory, found none left; use fewer maps or smaller images")
-        except KeyboardInterrupt:
-            fail("stopped; the same command goes on with a bake, other outputs were not written")
+def name_flags_of(parameters: Sequence[Any]) -> None:
+    """From now on lines name a library's arguments by the flags of the command whose `parameters` these are."""
+    global _parameters
+    _parameters = parameters
 
 
-def fail(message: str) -> None:
-    """Say it in one line, exit 1."""
-    STDERR.print("srbf: " + " ".join(message.split()), style="bold red", markup=False)
-    raise typer.Exit(1)
+@cache
+def stderr() -> Console:
+    """Rich's view of stderr, imported with the first line."""
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def fail(message: str, status: int = 1) -> NoReturn:
+    """Say it in one line and exit: 1 where the work failed, 2 on wrong usage."""
+    stderr().print("srbf: " + " ".join(in_flags(message, _parameters).split()), style="bold red", markup=False)
+    raise typer.Exit(status)
 
 
 def note(message: str) -> None:
     """A line on stderr."""
-    STDERR.print("srbf: " + message, markup=False)
+    stderr().print("srbf: " + in_flags(message, _parameters), markup=False)
 
 
 def print_json(value: Any) -> None:
@@ -77,6 +54,8 @@ def print_json(value: Any) -> None:
 @contextmanager
 def progress_bar(what: str) -> Iterator[Callable[..., None]]:
     """A bar with the time left on stderr (nothing where stderr is no terminal); yields update(done, total, text)."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -85,7 +64,7 @@ def progress_bar(what: str) -> Iterator[Callable[..., None]]:
         TextColumn("left"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=STDERR, transient=True, disable=not STDERR.is_terminal) as bar:
+    with Progress(*columns, console=stderr(), transient=True, disable=not stderr().is_terminal) as bar:
         task = bar.add_task(what, total=None)
 
         def update(done: float, total: float, text: str = what) -> None:

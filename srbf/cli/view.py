@@ -1,22 +1,22 @@
-"""`srbf view`: an asset in the browser, its lights to be dragged."""
+"""`srbf view`: an asset in the browser, its lights to be moved."""
 
 from __future__ import annotations
 
-import webbrowser
 from pathlib import Path
-from threading import Thread
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from srbf.capture import MANIFEST as CAPTURE_MANIFEST
 from srbf.cli.parameters import Force
 from srbf.cli.terminal import note
-from srbf.errors import InputError, OutputExistsError
+from srbf.cli.values import Number
+from srbf.errors import OutputExistsError
 from srbf.io.files import write_text
-from srbf.viewer.contents import Content, contents_of
-from srbf.viewer.server import ViewerServer
-from srbf.viewer.single_file import single_file
+
+if TYPE_CHECKING:
+    from srbf.viewer.contents import Content
+
+PORT = Number(whole=True, low=0, high=65535)
 
 
 def view(
@@ -29,20 +29,27 @@ def view(
         ),
     ],
     mesh: Annotated[
-        Path | None, typer.Option(help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FILE", help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False),
     ] = None,
-    port: Annotated[int, typer.Option(help="On 127.0.0.1; 0: any that is free.", min=0, max=65535)] = 0,
+    port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
-        Path | None, typer.Option(help="Write one HTML file that opens from the disk, and serve nothing.", show_default=False)
+        Path | None,
+        typer.Option(metavar="FILE", help="Write one HTML file that opens from the disk, and serve nothing.", show_default=False),
     ] = None,
     force: Force = False,
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
-    """Show an asset in the browser under lights that are dragged; Ctrl-C ends it."""
+    """Show an asset in the browser and move its lights; Ctrl-C ends it."""
+    from srbf.capture import MANIFEST as CAPTURE_MANIFEST
+    from srbf.viewer.contents import contents_of
+
     assets = [folder for folder in folders if not (folder / CAPTURE_MANIFEST).is_file()]
     captures = [folder for folder in folders if folder not in assets]
     if not assets or len(captures) > 1:
-        raise InputError(f"expected an asset or more, and at most one capture, found {len(assets)} and {len(captures)}; name them again")
+        raise typer.BadParameter(
+            f"expected an asset or more, and at most one capture, found {len(assets)} and {len(captures)}; name them again"
+        )
     capture = captures[0] if captures else None
     if save is not None:
         _save(save, contents_of(assets, None, mesh), capture, force)
@@ -52,6 +59,10 @@ def view(
 
 def serve(contents: dict[str, Content], port: int = 0, browser: bool = True) -> None:
     """Hand out `contents` until Ctrl-C, and open the page."""
+    from threading import Thread
+
+    from srbf.viewer.server import ViewerServer
+
     server = ViewerServer(contents, port)
     try:
         typer.echo(server.url)
@@ -69,10 +80,14 @@ def _save(path: Path, contents: dict[str, Content], capture: Path | None, force:
         raise typer.BadParameter("expected --save without a capture: one file does not hold its images")
     if path.exists() and not (force and path.is_file()):
         raise OutputExistsError(f"expected no {path} yet, found one; choose another name, or add --force")
+    from srbf.viewer.single_file import single_file
+
     write_text(path, single_file(contents))
     note(f"wrote {path}, {path.stat().st_size / (1 << 20):.1f} MiB")
 
 
 def _open(url: str) -> None:
+    import webbrowser
+
     if not webbrowser.open(url):
         note("no browser was found: open the address yourself")

@@ -1,1 +1,1 @@
-"""Where work runs: threads of this machine, and workers of a Dask cluster."""
+"""Parallel work: threads of this machine, and workers of a Dask cluster."""

@@ -1,4 +1,4 @@
-"""Threads over the cores there are: numpy and OpenImageIO let go of Python's lock while they work."""
+"""Threads over all cores: numpy and OpenImageIO release Python's lock while they work."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def cores() -> int:
 
 
 def each(work: Callable[[int], None], count: int) -> None:
-    """work(0) … work(count - 1), a thread a core at them; the first error in their order, once all have ended."""
+    """Run work(0) … work(count - 1) with one thread per core; raises the first error in that order after all have ended."""
     with ThreadPoolExecutor(cores()) as workers:
         pending = [workers.submit(work, i) for i in range(count)]
     for done in pending:
@@ -24,7 +24,7 @@ def each(work: Callable[[int], None], count: int) -> None:
 
 
 def one_blas_thread() -> AbstractContextManager[Any]:
-    """While entered, numpy's matrix products keep to the thread that calls them; without threadpoolctl they do as they like."""
+    """A context in which numpy's matrix products use the calling thread only; without effect if threadpoolctl is missing."""
     controller = _controller()
     return nullcontext() if controller is None else controller.limit(limits=1, user_api="blas")
 

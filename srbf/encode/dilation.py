@@ -1,16 +1,17 @@
-"""Filling what lies outside a receiver from its nearest covered texel, so that filtering at a chart's edge meets no hole."""
+"""Dilation: texels outside a receiver get the value of the nearest covered texel, so that filtering at a chart's edge reads no hole."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage
 
 from srbf.arrays import Float32, Int
 
 
 def nearest_covered(coverage: Float32[ndarray, "H W"]) -> Int[ndarray, "H W"] | None:
-    """Flat index of the nearest texel with any coverage; None where all or none are covered and nothing is to fill."""
+    """Flat index of the nearest texel with any coverage; None if all or none are covered."""
+    from scipy import ndimage
+
     covered = coverage > 0
     if covered.all() or not covered.any():
         return None

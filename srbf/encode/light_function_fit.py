@@ -13,26 +13,25 @@ from srbf.arrays import Float64
 from srbf.basis.light_functions import LightFunctions
 from srbf.basis.light_kernel import LightKernel, kernel_of_spread, mean_variance, narrowest
 from srbf.compute.threads import each, one_blas_thread
-from srbf.encode.cross_validation import HeldOut
-from srbf.encode.model_selection import NARROWEST, WIDEST, Rule, TexelSample
+from srbf.encode.model_selection import MAX_SPREAD, MIN_SPREAD, Rule, TexelSample
+from srbf.light_domain import LightDomain
 from srbf.solve.kernel_ridge import KernelPath
-from srbf.sphere import Domain, mean_spacing, point_set
+from srbf.sphere import mean_spacing
 
-SPREADS = (0.5, 0.7, 1.0, 1.42, 2.0, 2.8, 4.0)  # of the lights' spacing
+SPREADS = (0.5, 0.7, 1.0, 1.42, 2.0, 2.8, 4.0)  # light spacings
 NARROW, WIDE = (0.5, 0.7, 1.0), (1.42, 2.0, 2.8)  # of kernels of two spreads
 WIDE_SHARES = (0.7, 0.9, 0.99, 0.999)
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-6, 1.1))  # of the kernel's mean variance
 USUAL, USUAL_SHARE, USUAL_RIDGE = (0.7, 2.0), 0.99, 3  # narrow and wide, share of the wide, which of RIDGES
-MARGIN = 1.5  # times the squared error of the best, geometric mean over lights, that the usual pair may have
-FEW = 8  # validation lights that change nothing about the margin
-APART = 1.3  # times as wide at least is the wide one
+MARGIN = 1.5  # times the squared error of the best (geometric mean over lights), up to which the usual pair is kept
+FEW_LIGHTS = 8  # validation lights that leave the margin unchanged
+MIN_WIDTH_RATIO = 1.3  # of the wide spread over the narrow one
 LEAST_CENTERS = 100
-BELOW = 3.0  # spacings: how far the centers go on below the horizon, or the cosine bends there
 
 
 @dataclass(frozen=True)
 class FunctionModel:
-    """The kernel and the ridge of light functions, the rule that chose them, and the mean squared error that it saw."""
+    """The kernel and the ridge of light functions, the rule that chose them, and its mean squared error."""
 
     kernel: LightKernel
     ridge: float
@@ -40,17 +39,9 @@ class FunctionModel:
     error: float
 
 
-def dense_centers(directions: Float64[ndarray, "L 3"], domain: Domain) -> Float64[ndarray, "B 3"]:
-    """Centers for functions that may follow every light: as dense as the lights (at least LEAST_CENTERS), Fibonacci.
-
-    On the hemisphere they go on for BELOW spacings under the horizon, where a cosine would otherwise be bent towards zero.
-    """
-    count = max(len(directions), LEAST_CENTERS)
-    if domain == "sphere":
-        return point_set("fibonacci", count, "sphere")
-    spacing = np.sqrt(2 * np.pi / count)
-    points = point_set("fibonacci", 2 * count, "sphere")
-    return points[points[:, 2] > -np.sin(min(BELOW * spacing, np.pi / 2))]
+def dense_centers(coordinates: Float64[ndarray, "L d"], domain: LightDomain) -> Float64[ndarray, "B d"]:
+    """Centers for functions that may follow every light: as dense as the lights, at least LEAST_CENTERS."""
+    return domain.dense_centers(coordinates, LEAST_CENTERS)
 
 
 def choose_functions(
@@ -58,17 +49,17 @@ def choose_functions(
 ) -> FunctionModel:
     """One kernel and one ridge for all light functions of a capture: the usual ones, unless others predict much better.
 
-    Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation`). It is one choice
-    for all functions and texels: a choice for each function follows its noise, and is off by several dB where few lights see a highlight.
-    Left-out lights are a rough measure of the gaps between lights: a kernel that fills those with ripples may predict the lights well.
-    So the usual pair, good on most sets, stays unless another has less than 1 / MARGIN of its squared error; of many validation lights the
-    word counts for more, and the margin shrinks. A number for `spread` (rad) or `ridge` (added to K's diagonal)
-    fixes it; the kernel has one spread then.
+    The criterion is the error at left-out train lights, single and in bands, and at validation lights (`cross_validation`). There is one
+    choice for all functions and texels: separate choices follow noise, and lose several dB where few lights show a highlight.
+    Left-out lights are a rough measure of the gaps between lights: a kernel that oscillates there may still predict the lights well.
+    The usual pair, good on most sets, is therefore kept unless another has less than 1 / MARGIN of its squared error. With many
+    validation lights the margin shrinks. A number for `spread` (rad) or `ridge` (added to K's diagonal) fixes it; the kernel then has
+    one spread.
     """
-    held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
+    held_out = sample.held_out()
     rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
     usual = _usual_kernel(sample, centers)
-    kernels = list(_candidates(sample.directions, sample.train, centers, spread, ridge is not None))
+    kernels = list(_candidates(sample.coordinates, sample.train, centers, spread, ridge is not None))
     found: list[list[tuple[float, FunctionModel]]] = [[] for _ in kernels]
 
     def work(i: int) -> None:
@@ -85,15 +76,15 @@ def choose_functions(
         each(work, len(kernels))
     best = min((scored for models in found for scored in models), key=lambda scored: scored[0])
     of_usual = [models[USUAL_RIDGE] for (kernel, _), models in zip(kernels, found, strict=True) if kernel == usual and ridge is None]
-    margin = np.log(MARGIN) * min(1.0, FEW / max(1, len(sample.directions) - sample.train))
+    margin = np.log(MARGIN) * min(1.0, FEW_LIGHTS / max(1, len(sample.coordinates) - sample.train))
     if of_usual and of_usual[0][0] < best[0] + margin:
         return of_usual[0][1]
     return best[1]
 
 
 def _usual_kernel(sample: TexelSample, centers: Float64[ndarray, "B 3"]) -> LightKernel:
-    spacing, least = _spacing(sample.directions[: sample.train]), max(NARROWEST, narrowest(centers))
-    narrow, wide = (float(np.clip(factor * spacing, least, WIDEST)) for factor in USUAL)
+    spacing, least = _spacing(sample.coordinates[: sample.train]), max(MIN_SPREAD, narrowest(centers))
+    narrow, wide = (float(np.clip(factor * spacing, least, MAX_SPREAD)) for factor in USUAL)
     return LightKernel(narrow, wide, USUAL_SHARE)
 
 
@@ -104,25 +95,25 @@ def _spacing(lights: Float64[ndarray, "L 3"]) -> float:
 def functions_through(
     sample: TexelSample,
     values: Float64[ndarray, "L F 3"],
-    domain: Domain,
+    domain: LightDomain,
     spread: Literal["auto"] | float = "auto",
     ridge: Literal["auto"] | float = "auto",
 ) -> tuple[LightFunctions, dict[str, Any]]:
-    """Smooth functions through `values` at the sample's train lights, and what the manifest says of how they were chosen."""
-    centers = dense_centers(sample.directions[: sample.train], domain)
+    """Smooth functions through `values` at the sample's train lights, and the manifest's record of the choice."""
+    centers = dense_centers(sample.coordinates[: sample.train], domain)
     model = choose_functions(sample, centers, None if spread == "auto" else spread, None if ridge == "auto" else ridge)
     kernel = {key: value for key, value in asdict(model.kernel).items() if model.kernel.wide is not None or key == "narrow"}
     return fit_functions(sample, values, model, centers, domain), {"chosen_by": model.rule, "kernel": kernel, "ridge": model.ridge}
 
 
 def fit_functions(
-    sample: TexelSample, values: Float64[ndarray, "L F 3"], model: FunctionModel, centers: Float64[ndarray, "B 3"], domain: Domain
+    sample: TexelSample, values: Float64[ndarray, "L F 3"], model: FunctionModel, centers: Float64[ndarray, "B 3"], domain: LightDomain
 ) -> LightFunctions:
     """Smooth functions through `values` at the train lights."""
-    lights = sample.directions[: sample.train]
+    lights = sample.coordinates[: sample.train]
     path = KernelPath(model.kernel.between(lights, lights, centers))
     solved = path.solve(model.ridge, values.reshape(len(values), -1))
-    return model.kernel.functions(solved, lights, centers, domain)
+    return model.kernel.functions(solved, lights, centers, domain.manifest()["domain"])
 
 
 def _candidates(
@@ -134,10 +125,10 @@ def _candidates(
         yield LightKernel(spread), kernel_of_spread(spread, directions, lights, centers)
         return
     spacing = _spacing(lights)
-    least = max(NARROWEST, narrowest(centers))
+    least = max(MIN_SPREAD, narrowest(centers))
     computed = {}
     for factor in SPREADS:
-        width = float(np.clip(factor * spacing, least, WIDEST))
+        width = float(np.clip(factor * spacing, least, MAX_SPREAD))
         if width not in computed:
             computed[width] = kernel_of_spread(width, directions, lights, centers)
             yield LightKernel(width), computed[width]
@@ -146,8 +137,8 @@ def _candidates(
     scaled = {width: matrix / mean_variance(width, lights, centers) for width, matrix in computed.items()}
     seen: set[tuple[float, float]] = set()
     for narrow_factor, wide_factor in ((n, w) for n in NARROW for w in WIDE):
-        narrow, wide = (float(np.clip(factor * spacing, least, WIDEST)) for factor in (narrow_factor, wide_factor))
-        if (narrow, wide) in seen or wide <= APART * narrow:
+        narrow, wide = (float(np.clip(factor * spacing, least, MAX_SPREAD)) for factor in (narrow_factor, wide_factor))
+        if (narrow, wide) in seen or wide <= MIN_WIDTH_RATIO * narrow:
             continue
         seen.add((narrow, wide))
         for share in WIDE_SHARES:

@@ -1,4 +1,4 @@
-"""One spread and one ridge for a capture, chosen by what they predict: its validation lights, or lights left out."""
+"""Choice of one spread and one ridge for a capture, by the errors at validation lights and at left-out lights."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from srbf.capture import COVERED, STRIP, Capture
 from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.cross_validation import HeldOut
 from srbf.errors import InputError
+from srbf.light_domain import LightDomain, domain_of_capture
 from srbf.solve.kernel_ridge import KernelPath
 
 Rule = Literal["validation", "leave-one-light-out"]
 
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-5, 1.51, 0.5))
 SPREADS = tuple(float(s) for s in np.geomspace(0.6, 2.4, 16))  # of the mean distance between neighboring centers
-WIDEST = 1.0  # rad: past it the R table has a cusp
+MAX_SPREAD = 1.0  # rad; beyond, the R table has a cusp
 USUAL_SPREAD, USUAL_RIDGE = 0.85, RIDGES[7]  # of the mean distance between neighboring centers; on the diagonal
-NARROWEST = 0.05  # rad
+MIN_SPREAD = 0.05  # rad
 SAMPLE_TEXELS = 1 << 13
-MARGIN = 2.0  # times the squared error of the best, geometric mean over lights, that the usual choice may have
-SURE = 2.0  # the margin is whole where there are fewer than so many lights to a function
+MARGIN = 2.0  # times the squared error of the best (geometric mean over lights), up to which the usual choice is kept
+FULL_MARGIN = 2.0  # lights per function, below which the margin is not reduced
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A spread (rad) and a ridge, the rule that chose them, and the mean squared error that it saw."""
+    """A spread (rad) and a ridge, the rule that chose them, and its mean squared error."""
 
     spread: float
     ridge: float
@@ -42,17 +43,18 @@ class Choice:
 class TexelSample:
     """Rows of T for some covered texels, the train lights first: what every choice is made on.
 
-    answers (n, L + V, 3) float32, of L train and V validation lights at `directions` (L + V, 3).
+    `responses` (n, L + V, 3) float32 to L train and V validation lights at `coordinates` (L + V, d) of the light `domain`.
     """
 
     texels: Int[ndarray, " n"]
     responses: Float32[ndarray, "n M 3"]
-    directions: Float64[ndarray, "M 3"]
+    coordinates: Float64[ndarray, "M d"]
     train: int
+    domain: LightDomain
 
     @staticmethod
     def of(capture: Capture, count: int = SAMPLE_TEXELS, share: float = 0.25, seed: int = 0) -> TexelSample:
-        """`count` covered texels, or all; from large images only `share` of the rows is read, in even strips."""
+        """`count` covered texels, or all; of large images only a `share` of the rows is read, in even strips."""
         train, validation = capture.indices("train"), capture.indices("validation")
         covered = capture.coverage() >= COVERED
         if not covered.any():
@@ -62,18 +64,23 @@ class TexelSample:
             runs = np.arange(count + 1) * len(texels) // count
             texels = texels[(runs[:-1] + np.random.default_rng(seed).random(count) * np.diff(runs)).astype(np.int64)]
         lights = [*train, *validation]
-        return TexelSample(texels, capture.sample(lights, texels), capture.directions(lights), len(train))
+        domain = domain_of_capture(capture)
+        return TexelSample(texels, capture.sample(lights, texels), domain.captured(capture, lights), len(train), domain)
 
     @property
     def validated(self) -> bool:
-        """Whether there are validation lights to choose by."""
-        return len(self.directions) > self.train
+        """Whether there are validation lights."""
+        return len(self.coordinates) > self.train
 
     @property
     def gram(self) -> Float64[ndarray, "M M"]:
-        """Inner products of the lights' images, mean over texels and colors: all that a linear fit's error depends on."""
+        """Inner products of the lights' images, mean over texels and colors: the error of a linear fit depends on these only."""
         images = self.responses.transpose(1, 0, 2).reshape(self.responses.shape[1], -1)
         return (images @ images.T).astype(np.float64) / images.shape[1]
+
+    def held_out(self) -> HeldOut:
+        """Errors at lights left out, singly and in the groups of the light domain, and at validation lights."""
+        return HeldOut.of(self.gram, self.domain.left_out_groups(self.coordinates[: self.train]), self.train)
 
 
 def choose(
@@ -83,14 +90,14 @@ def choose(
     noise: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     usual: tuple[float, float] | None = None,
 ) -> Choice:
-    """The candidate, (spread, basis functions at the sample's lights), and the ridge > 0 that predict best what they did not see.
+    """The candidate, (spread, basis functions at the sample's lights), and the ridge > 0 with the least cross-validation error.
 
-    The `usual` (spread, ridge), if it is among them, stays unless another has less than 1 / MARGIN of its squared error. The more lights
-    there are to a function, the surer is what they show, and the smaller the margin.
-    Compared is what train lights that are left out, singly and in bands, and validation lights show (`cross_validation.HeldOut.score`).
-    `noise(operator, weights)` adds a variance a light: what the maps' encoding loses.
+    The `usual` (spread, ridge), if it is among them, is kept unless another has less than 1 / MARGIN of its squared error. The margin
+    shrinks with the number of lights per function, since more lights give a more reliable score.
+    The criterion is the error at left-out train lights, single and in bands, and at validation lights (`cross_validation.HeldOut.score`).
+    `noise(operator, weights)` adds a variance per light: the loss of the maps' encoding.
     """
-    held_out = HeldOut.of(sample.gram, sample.directions, sample.train)
+    held_out = sample.held_out()
     middles = np.concatenate([groups[:, 0] for groups in held_out.groups])
     train = sample.train
     rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
@@ -115,7 +122,7 @@ def choose(
     scored = [one for choices in found for one in choices]
     assert scored, "no spread or no ridge to choose from"
     best = min(scored, key=lambda one: one[0])
-    margin = np.log(MARGIN) * min(1.0, SURE * tried[0][1].shape[1] / train) ** 2
+    margin = np.log(MARGIN) * min(1.0, FULL_MARGIN * tried[0][1].shape[1] / train) ** 2
     for score, choice in scored:
         if (choice.spread, choice.ridge) == usual and score < best[0] + margin:
             return choice
@@ -123,12 +130,12 @@ def choose(
 
 
 def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:
-    """Spreads around `typical` (rad) within the R table's reach."""
-    return sorted({float(np.clip(typical * f, NARROWEST, WIDEST)) for f in factors})
+    """Spreads around `typical` (rad) within the range of the R table."""
+    return sorted({float(np.clip(typical * f, MIN_SPREAD, MAX_SPREAD)) for f in factors})
 
 
 def _in_strips(covered: Bool[ndarray, "H W"], count: int, share: float) -> Bool[ndarray, "H W"]:
-    """`covered`, of large images in every few strips of rows alone, so that the rest need not be read."""
+    """`covered`, restricted to every few strips of rows in large images, so that the rest is not read."""
     height = len(covered)
     every = max(1, int(share and 1 / share))
     chosen = covered.copy()

@@ -1,4 +1,4 @@
-"""Fitted layers as they are stored: float, half or byte, with the one rule value = stored * scale + bias."""
+"""Storage of fitted layers as float, half or byte, with one rule: value = stored * scale + bias."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from srbf.arrays import Float32, Float64
 from srbf.compute.threads import each
 from srbf.io.image import HALF_MAX, Encoding
 
-HALF_DIM = 2.0**-6  # below it a hundredth of a layer's largest value is already a subnormal half
+HALF_DIM = 2.0**-6  # of a layer's largest value; below, a hundredth of it is a subnormal half
 VALUE_BATCH = 1 << 12
-RANGED_VALUES = 1 << 16  # of a layer, looked at for its range
+RANGED_VALUES = 1 << 16  # of a layer, sampled to find its range
 CLIPPED = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)  # shares of values at either end that may be clipped
-LEAST_SEEN = 1e-4  # of a function's rms: what a sum of functions counts at least
+MIN_VISIBLE = 1e-4  # of a function's rms, the least weight of a function in sums
 BYTE_STEP = 1 / 255
 HALF_STEP = 2.0**-11  # relative, half a step either way
 
@@ -24,7 +24,7 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
     """(stored, scale, bias) with values ~ stored * scale + bias; a uint8 counts as byte / 255.
 
     float and half keep scale 1 and bias 0, unless a half would overflow (then that layer's channel is scaled down, with a warning) or
-    is so dim that half floats thin out.
+    is so small that half floats lose precision.
     """
     n, channels = len(values), values.shape[3]
     scale, bias = np.ones((n, channels), np.float32), np.zeros((n, channels), np.float32)
@@ -40,7 +40,7 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
             scale[too_large] = (largest[too_large] / (HALF_MAX * 0.999)).astype(np.float32)
             warnings.warn(
                 f"coefficients reach {largest.max():.3g}, past half float's {HALF_MAX:.0f}: scaled, but such maps cancel each other "
-                "and lose the picture in any half or 8-bit file; add --ridge, or match --domain to the lights",
+                "and lose precision in any half or 8-bit file; add a `ridge`, or match the `domain` to the lights",
                 stacklevel=2,
             )
 
@@ -56,7 +56,7 @@ def quantize(values: Float32[ndarray, "N H W C"], encoding: Encoding) -> tuple[n
 
 
 def round_alone(values: Float32[ndarray, "N H W C"], scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]) -> ndarray:
-    """The nearest bytes, (N, H, W, C), in ranges that are given; 0 where a scale is 0."""
+    """The nearest bytes, (N, H, W, C), in given ranges; 0 where a scale is 0."""
     stored = np.empty(values.shape, np.uint8)
 
     def bytes_of(i: int) -> None:
@@ -70,11 +70,11 @@ def round_alone(values: Float32[ndarray, "N H W C"], scale: Float32[ndarray, "N 
 def quantize_together(
     values: Float32[ndarray, "K H W C"], functions: Float64[ndarray, "M K"]
 ) -> tuple[ndarray, Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
-    """`quantize` to bytes, of layers that are only ever seen through sums weighed by `functions`, which overlap.
+    """`quantize` to bytes with error feedback, for layers that are visible only through sums weighted by overlapping `functions`.
 
-    What rounding one layer loses is made up for by the layers still to be rounded: Babai's nearest plane in the lattice of bytes under the
-    functions' own metric [Babai1986]. With functions = Q R, layer k then errs by at most half a step times |R_kk|, not times its whole
-    length, which for overlapping Gaussians is many times more. Work: K^2 / 2 multiplications a value.
+    The layers still to be rounded compensate for the rounding errors of the others: Babai's nearest plane in the lattice of bytes under
+    the metric of the functions [Babai1986]. With functions = Q R, the error of layer k is at most half a step times |R_kk|, instead of
+    half a step times its length, which is many times larger for overlapping Gaussians. Cost: K^2 / 2 multiplications per value.
     """
     scale, bias = ranges_together(values, functions)
     return round_together(values, functions, scale, bias), scale, bias
@@ -83,7 +83,7 @@ def quantize_together(
 def ranges_together(
     values: Float32[ndarray, "K H W C"], functions: Float64[ndarray, "M K"]
 ) -> tuple[Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
-    """(scale, bias) of every layer and channel that lose least where layers are rounded together."""
+    """(scale, bias) of every layer and channel with the least loss under rounding with error feedback."""
     upper = metric(functions)
     low, high = _ranges(values, np.diag(upper) ** 2, (upper**2).sum(axis=0))
     return np.where(high > low, (high - low) / 255, 1).astype(np.float32) * np.float32(255), low
@@ -95,11 +95,11 @@ def round_together(
     scale: Float32[ndarray, "K C"],
     bias: Float32[ndarray, "K C"],
 ) -> ndarray:
-    """Bytes of layers in ranges that are given, each making up for what those after it have lost."""
+    """Bytes of layers in given ranges; each layer compensates for the errors of those after it."""
     k, channels = len(values), values.shape[3]
     upper = metric(functions)
     low, step = bias, scale / np.float32(255)
-    passed_on = np.triu(upper / np.diag(upper)[:, None], 1).astype(np.float32)  # (K, K): error of layer j seen in layer k < j
+    passed_on = np.triu(upper / np.diag(upper)[:, None], 1).astype(np.float32)  # (K, K): error of layer j passed to layer k < j
     flat = values.reshape(k, -1, channels)
     stored = np.empty(flat.shape, np.uint8)
 
@@ -118,9 +118,9 @@ def round_together(
 def _ranges(
     values: Float32[ndarray, "K H W C"], rounding: Float64[ndarray, " K"], clipping: Float64[ndarray, " K"]
 ) -> tuple[Float32[ndarray, "K C"], Float32[ndarray, "K C"]]:
-    """The range of every layer and channel that loses least: a few outliers clipped, all else in finer steps.
+    """The range of every layer and channel with the least loss: clipping a few outliers makes the steps finer.
 
-    `rounding` and `clipping` say how much is seen of a squared error of either kind: others make up for the one, not for the other.
+    `rounding` and `clipping` are the visible shares of squared errors: other layers compensate for rounding, not for clipping.
     """
     k, channels = len(values), values.shape[3]
     low, high = np.empty((k, channels), np.float32), np.empty((k, channels), np.float32)
@@ -141,20 +141,20 @@ def _ranges(
     each(find, k)
     exact = _extremes(values)
     for found, extreme, share in ((low, exact[0], np.minimum), (high, exact[1], np.maximum)):
-        unclipped = found == share(found, extreme)  # a sample's own extreme stands for that of all
+        unclipped = found == share(found, extreme)  # the sample's extreme represents that of all values
         found[unclipped] = extreme[unclipped]
     return low, high
 
 
 def metric(functions: Float64[ndarray, "M K"]) -> Float64[ndarray, "K K"]:
-    """Upper triangle R with R^T R the functions' mean products, and a trace of the identity that keeps R_kk from 0."""
+    """Upper triangle R with R^T R the functions' mean products, plus a small multiple of the identity that keeps R_kk above 0."""
     k = functions.shape[1]
-    faint = LEAST_SEEN * np.sqrt((functions**2).mean()) * np.eye(k)
+    faint = MIN_VISIBLE * np.sqrt((functions**2).mean()) * np.eye(k)
     return np.asarray(np.linalg.qr(np.concatenate([functions / np.sqrt(len(functions)), faint]), mode="r"))
 
 
 def rounding_variance(low: Float64[ndarray, "*shape"], high: Float64[ndarray, "*shape"], encoding: Encoding) -> Float64[ndarray, "*shape"]:
-    """Variance of what storing loses of values between `low` and `high`: uniform in a byte's step, or at most that of the largest half."""
+    """Variance of the storage error of values from `low` to `high`: uniform within a byte's step, or that of the largest half."""
     if encoding == "float":
         return np.zeros_like(low)
     step = (high - low) * BYTE_STEP if encoding == "uint8" else 2 * HALF_STEP * np.maximum(np.abs(low), np.abs(high))
@@ -162,7 +162,7 @@ def rounding_variance(low: Float64[ndarray, "*shape"], high: Float64[ndarray, "*
 
 
 def _extremes(values: Float32[ndarray, "N H W C"]) -> tuple[Float32[ndarray, "N C"], Float32[ndarray, "N C"]]:
-    """Least and largest value of every layer and channel; down the rows first, where memory is contiguous."""
+    """Least and largest value of every layer and channel; rows first, since memory is contiguous."""
     n, channels = len(values), values.shape[3]
     low, high = np.empty((n, channels), np.float32), np.empty((n, channels), np.float32)
 

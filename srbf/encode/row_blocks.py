@@ -1,4 +1,4 @@
-"""A fit of a huge capture by tiles of rows, which are independent once the small matrix is known: on other machines, or here."""
+"""A fit of a large capture by tiles of rows, which are independent once the small matrix is known, on this or on other machines."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ from srbf.errors import SrbfError
 from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.solve.streamed_product import TASK_COLUMNS
 
-TILES_PER_THREAD = 3  # so that a slow machine holds up few
-RESULT_BYTES = 128 << 20  # of a tile's maps, which travel
+TILES_PER_THREAD = 3  # so that a slow machine delays few tiles
+RESULT_BYTES = 128 << 20  # of a tile's maps, which are sent over the network
 
-# Has work(*items[i]) done somewhere, in any order: (i, its answer, or the error that stands for it).
+# Runs work(*items[i]) on some machine and yields (i, its result or its error), in any order.
 Distribute = Callable[[Callable[..., Any], Sequence[tuple]], Iterator[tuple[int, Any]]]
+
+# (capture, train lights, matrix (L, K), ridge, progress) -> (maps (K, 3 P), report): `fit_tiles` with its machines
+SolveRows = Callable[[Capture, list[int], ndarray, float, Callable[[int, int], None]], tuple[ndarray, LeastSquaresReport]]
 
 
 @dataclass(frozen=True)
 class TileFit:
-    """Maps of the texels of some rows, and what the report needs of them: |B|^2, and of the rows of U^T B."""
+    """Maps of the texels of some rows, and their energies for the report: |B|^2, and that of each row of U^T B."""
 
     coefficients: Float32[ndarray, "K M"]
     energy: float
@@ -33,7 +36,7 @@ class TileFit:
 
 
 def fit_rows(capture: Capture, lights: list[int], matrix: ndarray, ridge: float, begin: int, end: int) -> TileFit:
-    """`StreamedLeastSquares` of rows begin … end - 1, fed by the same blocks of lights as a fit of the whole."""
+    """`StreamedLeastSquares` of rows begin … end - 1, fed by the same blocks of lights as a fit of all rows."""
     solve = StreamedLeastSquares(matrix, ridge)
     for first, block in capture.stream(lights, rows=[(begin, end)]):
         solve.add(first, block)
@@ -49,11 +52,11 @@ def fit_tiles(
     threads: int,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[Float32[ndarray, "K M"], LeastSquaresReport]:
-    """The maps and the report of all tiles, put together.
+    """The maps of all tiles, assembled, and their report.
 
-    Where tiles can begin where a piece of columns of `StreamedProduct` does (every width that is a multiple of a high enough power of two)
-    and the machines' matrix products are the same, the maps are those of a fit of the whole to the bit. Elsewhere a column's sum may be
-    taken by another kernel: they differ by float32's rounding of a sum over lights.
+    If tiles can start at the pieces of columns of `StreamedProduct` (every width that is a multiple of a large enough power of two) and
+    the machines' matrix products are the same, the maps are bit-identical to those of a fit of all rows. Otherwise another kernel may
+    compute a column's sum, and the maps differ by the float32 rounding of a sum over lights.
     """
     capture = replace(capture, folder=capture.folder.resolve())
     tiles = tiles_of(capture.height, capture.width, matrix.shape[1], threads)
@@ -72,7 +75,7 @@ def fit_tiles(
 
 
 def tiles_of(height: int, width: int, k: int, threads: int) -> list[tuple[int, int]]:
-    """(begin, end) of tiles of rows, in order: whole strips of the files, and where at least two fit, whole pieces of columns."""
+    """(begin, end) of tiles of rows, in order: whole strips of the files, and whole pieces of columns if at least two fit."""
     unit = lcm(STRIP, TASK_COLUMNS // gcd(TASK_COLUMNS, 3 * width))
     if 2 * unit > height:
         unit = STRIP

@@ -1,4 +1,4 @@
-"""Whether clusters show: error, and jumps of error, across their borders against those inside."""
+"""Visibility of cluster borders: the error, and its jumps, across borders against the same beside them."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
-from srbf.methods import directional_responses
+from srbf.light_domain import domain_of_capture
+from srbf.methods import responses
 
 
 @dataclass(frozen=True)
-class Seams:
-    """Root mean squares over lights of one role, colors and pairs of neighboring covered texels; e = relit - reference, clamped at 0.
+class ClusterBorders:
+    """Root mean squares over the lights of one role, colors and pairs of neighboring covered texels; e = relit - reference, clamped at 0.
 
-    border       share of the pairs whose texels are of different clusters
-    error        rms of e on either side of a border, and on the texels of the pairs next to them within one cluster
-    jump         rms of e's change over a border, and over those next pairs
-    contrast     rms of the reference's own change over a border: what hides a jump
+    border       share of the pairs whose texels belong to different clusters
+    error        rms of e on both sides of a border, and on the texels of adjacent pairs within one cluster
+    jump         rms of the change of e across a border, and across those adjacent pairs
+    contrast     rms of the reference's change across a border, which masks a jump
 
-    A seam is a jump over the border beyond what e changes by from texel to texel just beside it: `jump_ratio` near 1 is none.
+    A border is visible if e jumps across it by more than it changes beside it. A `jump_ratio` near 1 means an invisible border.
     """
 
     border: float
@@ -40,14 +42,14 @@ class Seams:
 
     @property
     def jump_ratio(self) -> float:
-        """Jump of the error over a border, over its change beside it."""
+        """Jump of the error across a border, over its change beside it."""
         return self.jump_at_border / max(self.jump_beside, 1e-30)
 
 
-def seams(asset: Asset, capture: Capture, role: Role = "holdout", index: ndarray | None = None) -> Seams:
-    """Seams of a clustered asset; with another's `cluster_index` (H, W) of any asset, at the same places, for comparison.
+def cluster_borders(asset: Asset, capture: Capture, role: Role = "holdout", index: ndarray | None = None) -> ClusterBorders:
+    """Errors at the borders of a clustered asset, or of any asset at the borders of `index`, another asset's `cluster_index` (H, W).
 
-    InputError where there are no clusters, or no lights of the role.
+    InputError without clusters or without lights of the role.
     """
     clusters = asset.tables.get("cluster_index") if index is None else index
     if clusters is None:
@@ -57,9 +59,10 @@ def seams(asset: Asset, capture: Capture, role: Role = "holdout", index: ndarray
         raise InputError(f"expected {role} lights in {capture.folder}, found none")
     covered = capture.coverage() >= COVERED
     pairs = [_masks(clusters, covered, axis) for axis in (0, 1)]
+    coordinates = domain_of_capture(capture).captured(capture, lights)
     sums = np.zeros(5)
     for first, block in capture.blocks(lights):
-        relit = np.maximum(directional_responses(asset, capture.directions(lights[first : first + len(block)])), 0)
+        relit = np.maximum(responses(asset, coordinates[first : first + len(block)]), 0)
         true = np.maximum(block.reshape(relit.shape), 0)
         for error, reference in zip(relit - true, true, strict=True):
             for axis, (border, beside) in enumerate(pairs):
@@ -73,11 +76,11 @@ def seams(asset: Asset, capture: Capture, role: Role = "holdout", index: ndarray
     at, next_to = (sum(int(mask[k].sum()) for mask in pairs) for k in (0, 1))
     every = sum(int(_both(covered, axis).sum()) for axis in (0, 1))
     counts = 3 * len(lights) * np.maximum([2 * at, 2 * next_to, at, next_to, at], 1)
-    return Seams(at / max(every, 1), *np.sqrt(sums / counts).tolist())
+    return ClusterBorders(at / max(every, 1), *np.sqrt(sums / counts).tolist())
 
 
 def _masks(clusters: ndarray, covered: Bool[ndarray, "H W"], axis: int) -> tuple[ndarray, ndarray]:
-    """Pairs along an axis over a border, and those within a cluster that share a texel with such a pair."""
+    """Masks of the pairs along an axis across a border, and of those within a cluster that share a texel with such a pair."""
     near, far = _sides(clusters, axis)
     both = _both(covered, axis)
     border = (near != far) & both

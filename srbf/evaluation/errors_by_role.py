@@ -12,19 +12,21 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, ROLES, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
 from srbf.io.float16 import finite_to_float32
+from srbf.light_domain import domain_of_capture
 from srbf.lights import PointLight
-from srbf.methods import directional_responses, linear_response
+from srbf.methods import linear_response, responses
 from srbf.relighting.direct_light import Added, Direct
 
 PEAK_QUANTILE = 0.999
-WATCHED_BYTES = 192 << 20  # half answers of all covered texels to all train lights, where they fit: 256² under 500 lights
-SAMPLE_TEXELS = 1 << 15  # watched where they do not, or fewer under very many lights
-PIECE = 1 << 14  # values whose squares are summed in float32
-LIGHT_BATCH = 16  # relit on the watched texels by one thread
+MEMORY_BYTES = 192 << 20  # of half responses of all covered texels to all train lights: 256² under 500 lights
+SAMPLE_TEXELS = 1 << 15  # of larger captures, or fewer under very many lights
+FLOAT32_SUM = 1 << 14  # values whose squares are summed in float32
+LIGHT_BATCH = 16  # lights relit by one thread
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,8 @@ class RoleError:
 class PeakHistogram:
     """Quantiles of non-negative values from a histogram over their float32 bits: exact on half floats, 2^-11 relative on others.
 
-    Told `total`, how many values will come, and the quantile `q` that will be asked for, it looks only at values that can still matter: not
-    at those below a bin that enough others have reached. The answer is the same, and soon most of an image is passed over.
+    With `total`, the number of values to come, and `q`, the requested quantile, it skips values that cannot affect the result: those
+    below a bin that enough values have reached. The result is the same, and most of an image is soon skipped.
     """
 
     SHIFT = 13  # mantissa bits dropped: ten are left, as many as a half float has
@@ -54,7 +56,7 @@ class PeakHistogram:
     def __init__(self, total: int | None = None, q: float = 0.0) -> None:
         self._counts: Int[ndarray, " bins"] = np.zeros(1 << (31 - self.SHIFT), np.int64)
         self._wanted = None if total is None else total - int(np.floor(q * (total - 1)))  # the rank of the quantile from the top
-        self._floor = 0  # the first bin that can matter
+        self._floor = 0  # the first bin that can affect the result
         self._lock = Lock()
 
     def add(self, values: Float[ndarray, "*shape"], rows: Bool[ndarray, " P"] | None = None) -> None:
@@ -81,14 +83,14 @@ class PeakHistogram:
                     self._floor = len(self._counts) - 1 - int(np.searchsorted(above, self._wanted))
 
     def _may_matter(self, values: ndarray) -> ndarray:
-        """Which values reach the floor's bin, or the half float below it."""
+        """Mask of the values in or above the floor's bin, or the half float below it."""
         least = np.array([(self._floor - 1) << self.SHIFT], np.uint32).view(np.float32)
         if values.dtype == np.float16:  # positive halves are in the order of their bits, negative ones below
             return values.view(np.int16) >= least.astype(np.float16).view(np.int16)
         return values >= least
 
     def quantile(self, q: float) -> float:
-        """Linear interpolation between order statistics, as numpy.quantile has it."""
+        """Linear interpolation between order statistics, as in numpy.quantile."""
         cumulative = np.cumsum(self._counts)
         rank = q * (cumulative[-1] - 1)
         bins = [int(np.searchsorted(cumulative, r, side="right")) for r in (np.floor(rank), np.ceil(rank))]
@@ -96,12 +98,12 @@ class PeakHistogram:
         return float(low + (high - low) * (rank - np.floor(rank)))
 
 
-class TrainWatch:
-    """What the error of the train lights needs, taken while a fit streams them, so that they are not read a second time.
+class TrainErrorAccumulator:
+    """Accumulates the error of the train lights while a fit streams their images, so that they are read once.
 
-    `look`, given to a method's `encode`, counts every covered value for the peak (exact) and keeps the answers of every covered texel where
-    WATCHED_BYTES hold them, else of SAMPLE_TEXELS, one at random out of each of equal runs of them.
-    InputError where nothing is covered.
+    `look` is the image callback of a method's `encode`. It counts every covered value for the peak (exact) and keeps the responses of all
+    covered texels if they fit MEMORY_BYTES, otherwise of SAMPLE_TEXELS, one at random from each of equal runs of them.
+    InputError if nothing is covered.
     """
 
     def __init__(self, capture: Capture) -> None:
@@ -109,7 +111,7 @@ class TrainWatch:
         covered = _covered(capture)
         self._rows = None if covered.all() else covered
         texels = np.flatnonzero(covered)
-        held = max(1, WATCHED_BYTES // (6 * max(1, len(self.lights))))
+        held = max(1, MEMORY_BYTES // (6 * max(1, len(self.lights))))
         self.exact = len(texels) <= held
         if not self.exact:
             count = min(held, SAMPLE_TEXELS)
@@ -121,20 +123,20 @@ class TrainWatch:
         self._combined = capture.combined() if capture.transport == "indirect" and capture.has_direct else None
 
     def look(self, row: int, image: Float[ndarray, "P 3"]) -> None:
-        """See the answer to train light `row`, as stored."""
+        """Add the image of train light `row`, as stored."""
         self._responses[row] = image[self.texels]
         whole = image if self._combined is None else self._combined.image(self.lights[row]).reshape(-1, 3)
         self.peaks.add(whole, self._rows)
 
     def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
-        """Sums of squared differences and of squared references, a light, over `texels`, both clamped at `floor`."""
+        """Sums of squared differences and of squared references, per light, over `texels`, both clamped at `floor`."""
         picked = asset.at(self.texels)
-        directions = capture.directions(self.lights)
+        coordinates = domain_of_capture(capture).captured(capture, self.lights)
         sums = np.empty((2, len(self.lights)))
 
         def compare(task: int) -> None:
             rows = range(task * LIGHT_BATCH, min((task + 1) * LIGHT_BATCH, len(self.lights)))
-            relit = directional_responses(picked, directions[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            relit = responses(picked, coordinates[rows.start : rows.stop])[:, 0]  # (b, n, 3)
             for row, response in zip(rows, relit, strict=True):
                 reference = self._responses[row]
                 if reference.dtype == np.float16:
@@ -152,16 +154,16 @@ def evaluate(
     progress: Callable[[int, int], None] = lambda done, total: None,
     direct: Direct = "none",
     roles: Sequence[Role] = ROLES,
-    watch: TrainWatch | None = None,
+    watch: TrainErrorAccumulator | None = None,
 ) -> dict[str, Any]:
     """Relight every light of `capture` and compare: {role: RoleError as a dict} and `lights`, one {file, role, rmse} each.
 
     The peak is the 99.9 % quantile of the combined train references (1 for 8-bit sources). A role without lights is left out,
-    and all but `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the clamp
-    comes after the direct light; with it, against the combined answer. A capture under point lights tells how far true lamps are from what
-    directional lights foretell, its train lights being as unseen as the rest. With a `watch` that has seen the train images they are
-    not read again: peak, validation and holdout are the same, and train's error is that of the watched texels, whose number stands beside
-    it as `texels` where they are not all. InputError where asset and capture cannot be compared.
+    and so are roles not in `roles`. An indirect asset without `direct` light is compared with an indirect capture, unclamped, since the
+    clamp follows the addition of direct light; with direct light, it is compared with the combined response. A capture under point lights
+    measures the approximation by directional lights, and all its lights are held out. With a `watch` that has accumulated the train images,
+    these are not read again: peak, validation and holdout are the same, and the train error is that of the kept texels, whose number is in
+    `texels` if they are not all. InputError if asset and capture cannot be compared.
     """
     reference, peak_source = _references(asset, capture, direct)
     if (asset.width, asset.height) != (capture.width, capture.height):
@@ -173,8 +175,8 @@ def evaluate(
     if watch is None and (peak_source is not reference or "train" not in roles):
         for _, block in peak_source.blocks(peak_source.indices("train")):
             peaks.add(block[:, covered])
-    squares: dict[int, float] = {}  # sum of squared differences a light
-    powers: dict[int, float] = {}  # sum of squared references a light
+    squares: dict[int, float] = {}  # sum of squared differences per light
+    powers: dict[int, float] = {}  # sum of squared references per light
     if watch is not None:
         samples["train"] = len(watch.texels) * 3
         for light, square, power in zip(watch.lights, *watch.squares(asset, capture, floor), strict=True):
@@ -210,9 +212,9 @@ def evaluate(
 
 
 def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) -> Iterator[Float32[ndarray, "P 3"]]:
-    """The asset's answer to each of a capture's lights, before the clamp, with what direct light is to be added.
+    """The asset's response to each of a capture's lights, before the clamp, with its direct light.
 
-    A point light is relit as such, inverse-square and of unit irradiance at 1 m, as it was captured.
+    A captured point light is relit as a point light, inverse-square and with unit irradiance at 1 m.
     """
     if capture.kind == "point":
         for position in capture.positions(lights):
@@ -220,10 +222,11 @@ def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) 
             response, direct = linear_response(asset, point_light), added.response(point_light)
             yield (response if direct is None else response + direct).reshape(-1, 3)
         return
-    directions = capture.directions(lights)
-    for direction, response in zip(directions, directional_responses(asset, directions), strict=True):
-        lit = added.directional(direction[None])
-        yield (response if isinstance(lit, float) else response + lit[0]).reshape(-1, 3)
+    domain = domain_of_capture(capture)
+    coordinates = domain.captured(capture, lights)
+    for own, response in zip(coordinates, responses(asset, coordinates), strict=True):
+        direct = added.response([domain.light(own)])
+        yield (response if direct is None else response + direct).reshape(-1, 3)
 
 
 def _covered(capture: Capture) -> Bool[ndarray, " P"]:
@@ -241,16 +244,16 @@ def squared_errors(response: Float32[ndarray, "n 3"], reference: Float32[ndarray
 
 
 def _energy(values: Float32[ndarray, "n 3"]) -> float:
-    """Sum of squares: float32 within a piece, float64 over pieces."""
+    """Sum of squares: float32 within FLOAT32_SUM values, float64 over them."""
     flat = values.ravel()
-    return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + PIECE] for start in range(0, len(flat), PIECE)))
+    return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + FLOAT32_SUM] for start in range(0, len(flat), FLOAT32_SUM)))
 
 
 def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture, Capture]:
-    """(what the relit images are compared with, what the peak is taken of)."""
+    """(the capture to compare with, the capture that defines the peak)."""
     if asset.transport == "combined":
         if direct != "none":
-            raise InputError(f"expected an indirect asset for --direct {direct}, found a combined one: it holds the direct light already")
+            raise InputError(f"expected an indirect asset for `direct={direct}`, found a combined one: it holds the direct light already")
         combined = capture.combined()
         return combined, combined
     whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
@@ -258,14 +261,14 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
         if capture.transport == "combined":
             raise InputError(
                 f"expected an indirect capture for an indirect asset alone, found a combined one at {capture.folder}; "
-                "add its direct light: --direct ray or shadow-map"
+                "add its direct light: `direct=ray` or shadow-map"
             )
         return capture, whole
     return capture.combined(), whole
 
 
 def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], samples: int, peak: float) -> RoleError:
-    """RoleError from sums of squared differences and of squared references, a light, each over `samples` values."""
+    """RoleError from sums of squared differences and of squared references, per light, each over `samples` values."""
     per_image = np.sqrt(squares / samples)
     rmse = float(np.sqrt(squares.sum() / (samples * len(squares))))
     reference = float(np.sqrt(powers.sum() / (samples * len(powers))))
@@ -278,7 +281,7 @@ def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], 
     )
 
 
-MAX_PSNR = 200.0  # dB: stands for "no difference", where the formula has infinity and JSON has none
+MAX_PSNR = 200.0  # dB, of equal images: the formula has infinity, which JSON lacks
 
 
 def psnr(peak: float, rmse: float) -> float:

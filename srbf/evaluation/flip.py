@@ -1,4 +1,4 @@
-"""How different two linear pictures look when one flips to the other: HDR-FLIP, by NVIDIA's flip-evaluator where it is installed."""
+"""Perceived difference of two linear images: HDR-FLIP, by NVIDIA's flip-evaluator if it is installed."""
 
 from __future__ import annotations
 
@@ -10,28 +10,26 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float32
 from srbf.errors import MissingLibraryError
 
-STOPS = (-2.0, 2.0)  # about the exposure that is asked for
+STOPS = (-2.0, 2.0)  # around `exposure`
 EXPOSURES = 3
-PPD = 67.0  # pixels a degree: a 0.7 m wide 4K screen seen from 0.7 m, the package's own default
+PPD = 67.0  # pixels per degree: a 0.7 m wide 4K screen seen from 0.7 m, the package's default
 
 
 @dataclass(frozen=True)
 class Flip:
-    """HDR-FLIP at EXPOSURES exposures from STOPS[0] to STOPS[1] about `exposure` (EV), ACES tone mapping, PPD pixels a degree."""
+    """HDR-FLIP at EXPOSURES exposures from STOPS[0] to STOPS[1] around `exposure` (EV), ACES tone mapping, PPD pixels per degree."""
 
     exposure: float
 
     def sentence(self) -> str:
-        """The exposures and viewing conditions, stated."""
+        """The exposures and viewing conditions as a sentence."""
         low, high = (self.exposure + stop for stop in STOPS)
-        return (
-            f"HDR-FLIP at {EXPOSURES} exposures from {low:+.1f} to {high:+.1f} EV, ACES, {PPD:.0f} pixels a degree; 0 is equal, 1 the most."
-        )
+        return f"HDR-FLIP at {EXPOSURES} exposures {low:+.1f} to {high:+.1f} EV, ACES, {PPD:.0f} pixels per degree; 0 is equal, 1 maximal."
 
     def error_map(
         self, reference: Float32[ndarray, "H W 3"], test: Float32[ndarray, "H W 3"], covered: Bool[ndarray, "H W"]
     ) -> Float32[ndarray, "H W"]:
-        """The largest error over the exposures, in [0, 1], of pictures clamped at 0; both are black where nothing is covered.
+        """The largest error over the exposures, in [0, 1], of images clamped at 0; both are black outside `covered`.
 
         MissingLibraryError without flip-evaluator.
         """
@@ -44,12 +42,3 @@ class Flip:
         parameters = {"startExposure": low, "stopExposure": high, "numExposures": EXPOSURES, "ppd": PPD, "tonemapper": "aces"}
         errors, _, _ = flip_evaluator.evaluate(*pictures, "HDR", False, False, False, parameters)
         return np.asarray(errors, np.float32).reshape(covered.shape)
-
-
-def has_flip() -> bool:
-    """Whether flip-evaluator is installed."""
-    try:
-        import flip_evaluator  # noqa: F401
-    except ImportError:
-        return False
-    return True

@@ -1,4 +1,4 @@
-"""Pictures under light that a fit has not seen: one held-out light at a time, and sums of several, with the worst and the shadow edges."""
+"""Errors under held-out lights, one at a time and in sums of several: mean, worst image, shadow edges, FLIP, clamped light."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.flip import Flip
 
 LIGHTS = (1, 2, 8)  # at once
-SUMS = 16  # pictures of several lights
-DIMMEST = 0.25  # of a channel of a light's random color, before the sum's colors are brought to a mean of 1
-EDGES = 0.05  # of the covered texels: those where the light changes most from one to the next
-DARK = 0.1  # of the mean picture's mean: added to it before the picture is divided by it
-FLIP_PIXELS = 8 << 16  # that are looked at by FLIP in a row of the table: eight pictures of 256²
+SUMS = 16  # images of several lights
+MIN_COLOR = 0.25  # of a channel of a light's random color, before the colors of a sum are normalized to a mean of 1
+EDGE_SHARE = 0.05  # of the covered texels: those where the light changes most to a neighbor
+DIVISOR_FLOOR = 0.1  # of the mean image's mean, added to the mean image before the division by it
+FLIP_PIXELS = 8 << 16  # evaluated by FLIP per row of the table: eight images of 256²
 
 
 @dataclass(frozen=True)
-class UnseenError:
-    """Error of n pictures of `lights` lights each, over covered texels, both clamped at 0.
+class HeldOutError:
+    """Error of `pictures` images of `lights` lights each, over covered texels, both clamped at 0.
 
-    `psnr` (dB) is the mean over pictures, `worst` the lowest of one, `edges` the mean at shadow edges. `flip` is the mean of
-    `flip_pictures` of them, the picture of lowest PSNR and others in order, `worst_flip` the largest of one; None without flip-evaluator.
+    `psnr` (dB) is the mean over images, `worst` the lowest, `edges` the mean at shadow edges. `flip` is the mean over
+    `flip_pictures` of them, the image of lowest PSNR and others in order, `worst_flip` the largest; None without flip-evaluator.
     """
 
     lights: int
@@ -41,10 +41,11 @@ class UnseenError:
 def sums_of_lights(
     images: tuple[Float32[ndarray, "S H W 3"], Float32[ndarray, "S H W 3"]], lights: int, rng: np.random.Generator
 ) -> tuple[Float32[ndarray, "n H W 3"], Float32[ndarray, "n H W 3"]]:
-    """The same SUMS random sums of `lights` pictures of both stacks, or for one light the stacks as they are.
+    """The same SUMS random sums of `lights` images of both stacks; for one light, the stacks unchanged.
 
-    Light is linear: a sum of pictures times colors is the picture under those lights. Lights are drawn without repetition where there
-    are enough; their colors are uniform in [DIMMEST, 1] a channel, over their sum's mean channel: as bright as one white light.
+    Relighting is linear: a sum of images times colors is the image under those lights. Lights are drawn without repetition if there
+    are enough. Their colors are uniform in [MIN_COLOR, 1] per channel, divided by the mean channel of their sum, so that a sum is as
+    bright as one white light.
     """
     if lights == 1:
         return images
@@ -52,7 +53,7 @@ def sums_of_lights(
     sums = tuple(np.empty((SUMS, *stack.shape[1:]), np.float32) for stack in images)
     for row in range(SUMS):
         chosen = rng.choice(count, lights, replace=count < lights)
-        colors = rng.uniform(DIMMEST, 1, (lights, 3))
+        colors = rng.uniform(MIN_COLOR, 1, (lights, 3))
         colors /= colors.sum(axis=0).mean()
         for target, stack in zip(sums, images, strict=True):
             target[row] = np.einsum("mhwc,mc->hwc", stack[chosen], colors.astype(np.float32), optimize=True)
@@ -62,13 +63,13 @@ def sums_of_lights(
 def shadow_edges(
     reference: Float32[ndarray, "H W 3"], mean: Float32[ndarray, "H W 3"], covered: Bool[ndarray, "H W"]
 ) -> Bool[ndarray, "H W"]:
-    """The EDGES of the covered texels where light changes most from a texel to its neighbors, which is where shadows end.
+    """The EDGE_SHARE of the covered texels where light changes most to a neighbor: the shadow edges.
 
-    What changes is the luminance of the reference over that of the mean picture plus DARK of its mean: the surfaces' own colors and
-    outlines divide out. Steps to uncovered texels do not count. The definition is ours.
+    The measure is the channel sum of the reference over that of the mean image plus DIVISOR_FLOOR of its mean, so that the
+    colors and outlines of surfaces cancel. Steps to uncovered texels do not count. The definition is ours.
     """
     whole = mean.sum(axis=2)
-    floor = DARK * float(whole[covered].mean()) if covered.any() else 0.0
+    floor = DIVISOR_FLOOR * float(whole[covered].mean()) if covered.any() else 0.0
     relative = np.where(covered, np.maximum(reference, 0).sum(axis=2) / np.maximum(whole + floor, 1e-30), np.nan)
     step = np.zeros(covered.shape, np.float32)
     for axis in (0, 1):
@@ -76,11 +77,11 @@ def shadow_edges(
         near, far = (slice(None),) * axis + (slice(None, -1),), (slice(None),) * axis + (slice(1, None),)
         step[near] = np.maximum(step[near], change)
         step[far] = np.maximum(step[far], change)
-    least = float(np.quantile(step[covered], 1 - EDGES)) if covered.any() else 0.0
+    least = float(np.quantile(step[covered], 1 - EDGE_SHARE)) if covered.any() else 0.0
     return covered & (step >= least) & (step > 0)
 
 
-def unseen_error(
+def held_out_error(
     references: Float32[ndarray, "S H W 3"],
     relit: Float32[ndarray, "S H W 3"],
     covered: Bool[ndarray, "H W"],
@@ -89,10 +90,10 @@ def unseen_error(
     flip: Flip,
     seed: int = 0,
     floor: float = 0.0,
-) -> UnseenError:
-    """Error under `lights` of the S held-out lights at once; `relit` before the clamp, which is at `floor`.
+) -> HeldOutError:
+    """Error under `lights` of the S held-out lights at once; `relit` before the clamp at `floor`.
 
-    Memory: 2 x SUMS pictures beside the stacks.
+    Memory: 2 x SUMS images in addition to the stacks.
     """
     mean = references.mean(axis=0)
     true, shown = sums_of_lights((references, relit), lights, np.random.default_rng([seed, lights]))
@@ -109,7 +110,7 @@ def unseen_error(
         flips = [float(flip.error_map(true[i], shown[i], covered)[covered].mean()) for i in looked]
     except MissingLibraryError:
         flips = []
-    return UnseenError(
+    return HeldOutError(
         lights=lights,
         pictures=len(true),
         psnr=float(np.mean(whole)),
@@ -123,7 +124,7 @@ def unseen_error(
 
 @dataclass(frozen=True)
 class Negative:
-    """How much of relit pictures is clamped: the share of values below 0, and their share of the sum of squares and of the brightness."""
+    """The clamped part of relit images: the share of values below 0, and their share of the sum of squares and of the brightness."""
 
     values: float
     energy: float
@@ -131,7 +132,7 @@ class Negative:
 
 
 def negative(relit: Float32[ndarray, "S H W 3"], covered: Bool[ndarray, "H W"]) -> Negative:
-    """What the clamp at 0 takes of pictures relit one light at a time, over covered texels."""
+    """The part that the clamp at 0 removes from images relit one light at a time, over covered texels."""
     below = squares = cut_squares = total = cut = 0.0
     for image in relit:
         values = image[covered].astype(np.float64)

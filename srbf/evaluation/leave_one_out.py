@@ -1,4 +1,4 @@
-"""Error at lights that were left out: for captures, photographs above all, that have no others to be tested by."""
+"""Leave-one-out error, for captures without held-out lights, mostly photographs."""
 
 from __future__ import annotations
 
@@ -9,38 +9,41 @@ from typing import Any
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture, Role
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, role_error, squared_errors
-from srbf.methods import directional_responses
+from srbf.light_domain import domain_of_capture
+from srbf.methods import responses
 
-KEPT_BYTES = 2 << 30  # answers in memory; of more, that many texels are tried
+MEMORY_BYTES = 2 << 30  # of responses; larger captures use a sample of texels
 
 
 def leave_one_out(
     capture: Capture, encode: Callable[[Capture], Asset], progress: Callable[[int, int], None] = lambda done, total: None
 ) -> dict[str, Any]:
-    """Fit to all train lights but one, everything that is chosen chosen anew, and relight that one; so for each.
+    """For each train light: fit to all others, with all automatic choices made again, and relight that light.
 
-    {"leave_one_out": RoleError as a dict, "lights": one {file, role, rmse} each}, on all covered texels, or as many, drawn at random, as
-    KEPT_BYTES hold: their number stands in `texels` then. Validation and holdout lights play no part. A light without near neighbors is
-    extrapolated to: this is an upper bound of the error between the lights. Work: a fit a light.
-    InputError where there are fewer than three train lights.
+    {"leave_one_out": RoleError as a dict, "lights": one {file, role, rmse} each}, on all covered texels, or on as many random
+    ones as fit MEMORY_BYTES, whose number is then in `texels`. Validation and holdout lights are not used. A light without close neighbors
+    is an extrapolation, so the result is an upper bound of the error between the lights. Cost: one fit per light.
+    InputError with fewer than three train lights.
     """
     lights = capture.indices("train")
     if len(lights) < 3:
         raise InputError(f"expected at least 3 train lights in {capture.folder}, found {len(lights)}")
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
-    most = max(1, KEPT_BYTES // (12 * len(capture.lights)))
+    most = max(1, MEMORY_BYTES // (12 * len(capture.lights)))
     texels = covered if len(covered) <= most else np.sort(np.random.default_rng(0).choice(covered, most, replace=False))
     roles: list[Role | None] = [role if (role := light.role) == "train" else None for light in capture.lights]
-    kept = capture.kept(texels).with_roles(roles)
+    kept = capture.load(texels).with_roles(roles)
+    domain = domain_of_capture(kept)
     peaks = PeakHistogram()
     squares, powers = np.empty(len(lights)), np.empty(len(lights))
     for left in range(len(lights)):
         rest = kept.with_roles([None if i == left else "train" for i in range(len(lights))])
         asset = encode(rest)
-        response = directional_responses(asset, kept.directions([left]))[0].reshape(-1, 3)
+        response = responses(asset, domain.captured(kept, [left]))[0].reshape(-1, 3)
         reference = kept.image(left).reshape(-1, 3)
         peaks.add(reference)
         squares[left], powers[left] = squared_errors(response, reference)

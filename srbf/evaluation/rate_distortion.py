@@ -1,4 +1,4 @@
-"""What a byte buys: the error of methods on one capture against what they keep of a texel, and the baselines that they must beat."""
+"""Error by bytes: the error of methods on one capture against their bytes per texel, and the baselines."""
 
 from __future__ import annotations
 
@@ -6,47 +6,35 @@ import time
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import Capture, Role
+from srbf.capture import Capture
+from srbf.captured_light import Role
 from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.temporal_stability import Reference, dense_reference
-from srbf.methods import directional_responses
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap
-from srbf.methods.eigen_map import EigenMap
-from srbf.methods.relighting_map import RelightingMap
+from srbf.light_domain import domain_of_capture
+from srbf.methods import Method, method_of
+from srbf.methods import responses as asset_responses
+from srbf.registry import all_methods
 
-IMAGE_BYTES = 8  # of an RGBA half texel: what one captured image costs where it is shipped as it is
+IMAGE_BYTES = 8  # per RGBA half texel of one uncompressed image
 ALL, NEAREST = "all images interpolated", "nearest image"
 
 
-@runtime_checkable
-class Method(Protocol):
-    """A fit with its settings."""
-
-    def encode(self, capture: Capture) -> Asset:
-        """The asset of a capture."""
-        ...
-
-
-METHODS: tuple[Method, ...] = (  # that a report compares
-    *(RelightingMap(k=k) for k in (9, 25, 49)),
-    *(RelightingMap(k=k, basis="spherical-harmonics") for k in (4, 9, 16)),
-    *(EigenMap(scalars=s, encoding="uint8") for s in (8, 16, 32)),
-    *(ClusteredEigenMap(clusters=64, scalars=s, encoding="uint8") for s in (4, 8, 16)),
-)
+def compared_methods() -> tuple[Method, ...]:
+    """The methods that a report compares: a few settings of each."""
+    return tuple(fit for method in all_methods() for fit in method.compared())
 
 
 @dataclass(frozen=True)
 class Score:
-    """Error on the lights of one role at a number of bytes a texel; `seconds` of the fit, None where there was none.
+    """Error on the lights of one role at a number of bytes per texel; `seconds` of the fit, None without a fit.
 
-    `family` joins the points of one curve, `name` tells them apart. `psnr` and `relative_rmse` are those of
+    `family` names the curve, `name` the point on it. `psnr` and `relative_rmse` are those of
     `srbf.evaluation.errors_by_role.RoleError`.
     """
 
@@ -61,10 +49,10 @@ class Score:
 def contest(
     sample: Capture, methods: Sequence[Method], role: Role, peak: float, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Score]:
-    """Each method fitted to the train lights of a sample and asked for those of `role`, and the baselines; in the order given.
+    """Scores of each method, fitted to the train lights of a sample and tested on those of `role`, in order; then the baselines.
 
-    `sample` is a capture kept in memory, of a few thousand texels. Clusters hold the few texels that a sample leaves them a little better
-    than the many of the whole. What settings warn of is passed over.
+    `sample` is a capture in memory, of a few thousand texels. Clusters fit the few texels of a sample slightly better than the many of
+    the whole image. Warnings of the settings are ignored.
     """
     scores = []
     for done, method in enumerate(methods):
@@ -79,12 +67,12 @@ def contest(
 
 def score_asset(asset: Asset, capture: Capture, role: Role, peak: float, seconds: float | None = None) -> Score:
     """The score of an asset on a capture of its texels."""
-    error = error_of(lambda directions: directional_responses(asset, directions).reshape(len(directions), -1, 3), capture, role, peak)
+    error = error_of(lambda coordinates: asset_responses(asset, coordinates).reshape(len(coordinates), -1, 3), capture, role, peak)
     return Score(family_of(asset), name_of(asset), float(texel_bytes(asset)), *error, seconds)
 
 
 def baselines(capture: Capture, role: Role, peak: float) -> list[Score]:
-    """What all N train images give without any compression, at the N images' bytes: the nearest one, and all of them interpolated."""
+    """Scores of the N uncompressed train images, at the bytes of all N: the nearest image, and all interpolated."""
     texels = np.arange(capture.width * capture.height)
     every = IMAGE_BYTES * len(capture.indices("train"))
     responses = ((NEAREST, nearest_image(capture, texels)), (ALL, dense_reference(capture, texels)))
@@ -92,24 +80,26 @@ def baselines(capture: Capture, role: Role, peak: float) -> list[Score]:
 
 
 def nearest_image(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
-    """Each direction answered by the train image closest to it. Memory: (L, n, 3) float32."""
+    """The response of each direction is that of the nearest train image. Memory: (L, n, 3) float32."""
     train = capture.indices("train")
     responses = capture.sample(train, texels)
-    towards = capture.directions(train).T
-    return lambda directions: responses[:, (directions @ towards).argmax(axis=1)].transpose(1, 0, 2)
+    domain = domain_of_capture(capture)
+    among = domain.captured(capture, train)
+    return lambda coordinates: responses[:, domain.nearest(coordinates, among)].transpose(1, 0, 2)
 
 
 def error_of(responses: Reference, capture: Capture, role: Role, peak: float) -> tuple[float, float]:
-    """(PSNR in dB, mean over images, and relative rmse) of answers to the lights of `role`.
+    """(PSNR in dB, mean over images, and relative rmse) of responses to the lights of `role`.
 
-    Both are clamped at 0, but where the capture is of indirect light: there the clamp comes after the direct light.
+    Both images are clamped at 0, except for indirect captures, whose clamp follows the addition of direct light.
     """
     floor = -np.inf if capture.transport == "indirect" else 0.0
     indices = capture.indices(role)
+    coordinates = domain_of_capture(capture).captured(capture, indices)
     squares: list[float] = []
     power = 0.0
     for first, block in capture.blocks(indices):
-        relit = np.maximum(responses(capture.directions(indices[first : first + len(block)])), floor)
+        relit = np.maximum(responses(coordinates[first : first + len(block)]), floor)
         for response, reference in zip(relit, np.maximum(block, floor), strict=True):
             squares.append(float(((response - reference) ** 2).mean(dtype=np.float64)))
             power += float((reference**2).mean(dtype=np.float64))
@@ -117,9 +107,9 @@ def error_of(responses: Reference, capture: Capture, role: Role, peak: float) ->
 
 
 def spectrum(sample: Capture) -> Float64[ndarray, " r"]:
-    """Singular values of all train answers as a (texels, lights x colors) matrix less its mean texel, largest first.
+    """Singular values of all train responses as a (texels, lights x colors) matrix minus its mean texel, largest first.
 
-    They are what the best scalar planes could hold, one a plane; all colors share a plane and weigh alike, as all lights do.
+    They bound any components shared by the colors; all colors and all lights have equal weight.
     Work: the smaller side squared times the larger.
     """
     texels = sample.width * sample.height
@@ -127,40 +117,31 @@ def spectrum(sample: Capture) -> Float64[ndarray, " r"]:
 
 
 def singular_values(responses: Float32[ndarray, "n m"]) -> Float64[ndarray, " r"]:
-    """Singular values of `answers` less their mean row, largest first; by the smaller side's Gram matrix, good to 1e-6 of the first."""
-    centerd: Float32[ndarray, "n m"] = responses - responses.mean(axis=0, dtype=np.float64).astype(np.float32)
-    smaller = centerd.T if len(centerd) > centerd.shape[1] else centerd
+    """Singular values of `responses` minus the mean row, largest first; by the smaller side's Gram matrix, within 1e-6 of the first."""
+    centered: Float32[ndarray, "n m"] = responses - responses.mean(axis=0, dtype=np.float64).astype(np.float32)
+    smaller = centered.T if len(centered) > centered.shape[1] else centered
     double = smaller.astype(np.float64)
     gram = double @ double.T
     return np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[::-1], 0))
 
 
 def planes_bound(values: Float64[ndarray, " r"], responses: int, peak: float) -> Float64[ndarray, " r"]:
-    """PSNR (dB, pooled over `answers` values) of the best 0 … r - 1 scalar planes on the very answers they come from, before a clamp."""
-    left = np.cumsum((values**2)[::-1])[::-1]  # beyond the first s planes
+    """PSNR (dB, pooled over `responses` values) of the best 0 … r - 1 components on these responses, before a clamp."""
+    left = np.cumsum((values**2)[::-1])[::-1]  # beyond the first s components
     return np.array([psnr(peak, float(np.sqrt(energy / responses))) for energy in left])
 
 
-def components_of(asset: Asset) -> int:
-    """Numbers that an asset keeps of a texel."""
-    return 3 * asset.k if asset.method == "relighting-map" else asset.scalars
-
-
 def texel_bytes(asset: Asset) -> int | float:
-    """Bytes that a shader reads of a texel's own data under a directional light."""
+    """Bytes per texel that a shader reads under a directional light."""
     return asset.bytes_per_texel()["directional"]
 
 
 def family_of(asset: Asset) -> str:
-    """The curve that an asset lies on: its method, or its basis where a method has several."""
-    kind = asset.manifest.get("basis", {}).get("kind", "gaussian")
-    method = asset.method.replace("-", " ")
-    return method if kind == "gaussian" else kind.replace("-", " ")
+    """The name of an asset's curve: its method, or its basis if that is not Gaussian."""
+    return method_of(asset).family(asset)
 
 
 def name_of(asset: Asset) -> str:
-    """What tells an asset from its siblings: how many numbers a texel, and its encoding where it is not half floats."""
+    """The label of an asset on its curve: its numbers per texel, and its encoding unless half."""
     encoding = {"half": "", "float": ", float", "uint8": ", bytes", "bc7": ", BC7", "bc1": ", BC1"}[asset.encoding]
-    if asset.method == "relighting-map":
-        return f"{asset.k} maps{encoding}"
-    return f"{asset.scalars} scalars" + (f", {asset.clusters} clusters" if asset.clusters > 1 else "") + encoding
+    return method_of(asset).label(asset) + encoding

@@ -1,4 +1,4 @@
-"""How a relit picture moves while one light sweeps between the captured directions: pops, pulsing brightness, ghosts of shadow edges."""
+"""Temporal stability under one light that sweeps between the captured directions: popping, flicker, ghosting of shadow edges."""
 
 from __future__ import annotations
 
@@ -18,47 +18,45 @@ from srbf.capture import BLOCK_BYTES, COVERED, MANIFEST, Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods import directional_responses
+from srbf.light_domain import Directions, domain_of_capture
+from srbf.methods import responses
 from srbf.solve.least_squares import StreamedLeastSquares
-from srbf.sphere import Domain, domain_of, point_set
+from srbf.sphere import Domain
 
-Reference = Callable[[np.ndarray], np.ndarray]  # (b, 3) unit directions -> (b, P, 3) true answers of the swept texels
+Reference = Callable[[np.ndarray], np.ndarray]  # (b, 3) unit directions -> (b, P, 3) true responses of the swept texels
 
 FRAMES = 240
-CIRCLES: dict[str, int] = {"hemisphere": 3, "sphere": 2}
-LOWEST = np.radians(15)  # of a sweep over a hemisphere, above its horizon
-TEXELS = 4096  # a sweep looks at: its curves differ by a per cent or so from those of all texels
-DIM = 0.25  # of the reference's greatest mean brightness: below it the relative error of brightness is not asked for
-STEEP = 2.0  # times as fast as any unshadowed Lambert surface can change: a shadow edge passes
-DENSE_SPREAD, DENSE_RIDGE = 0.9, 0.1  # of a dense reference: spread over the lights' spacing, ridge
-BELOW = 3.0  # spacings of the lights: how far below the horizon a dense reference continues its centers
+TEXELS = 4096  # in a sweep; its curves differ by about 1 % from those of all texels
+BRIGHT_SHARE = 0.25  # of the reference's largest mean brightness; dimmer frames are left out of the relative brightness error
+EDGE_RATE = 2.0  # of the fastest change of an unshadowed Lambert surface; a faster change is a passing shadow edge
+DENSE_SPREAD, DENSE_RIDGE = 0.9, 0.1  # of a dense reference: spread over light spacing, ridge
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What a sweep of C great circles by F frames showed of n texels, whose answers a are clamped at 0; steps join frames of a circle.
+    """Measures of a sweep of C great circles by F frames over n texels with responses a, clamped at 0; a step joins two frames.
 
-    change         |a_{s+1} - a_s| over texels and colors, of the relit picture and of the reference (C, F-1)
+    change         |a_{s+1} - a_s| over texels and colors, of the relit image and of the reference (C, F-1)
     brightness     mean of a over texels and colors, of both (C, F)
-    ripple         relit less reference brightness, high-passed: less the best affine function of direction a circle, over the mean
-                   reference brightness (C, F)
+    flicker        relit minus reference brightness, high-passed: minus its best affine function of direction per circle, over the
+                   mean reference brightness (C, F)
     ghost, edge    sums over texels and steps of |change of relit - change of reference| at shadow-edge texels while no edge passes, and
-                   of |change of reference| while one does (C, F-1)
+                   of |change of reference| while one passes (C, F-1)
 
-    The figures of a perfect relighter are 1, 1, 0, 0, 0, 1:
+    Ideal values, in the order below: 1, 1, 0, 0, 0, 1.
 
-    change_ratio         rms relit change over rms reference change: above 1 it boils and pops, below 1 it drags
-    largest_step         the largest relit change over the reference's own, or its rms where that is larger: a pop
-    brightness_error     largest |relit / reference - 1| of brightness, where the reference has DIM of its greatest
-    largest_ripple       largest |ripple|: pulsing
-    ghosting             sum of ghost over sum of edge: how much of the shadow edges' contrast comes or goes at the wrong time; 0 where
-                         no edge passed. Sums, not squares: a fade of a shadow over many frames is seen as well as a quick one
-    edge_kept            relit change projected on the reference's while edges pass: how much of the edges' own change is shown when it
-                         is due. Without shadows nothing ghosts, and nothing is kept; 1 where no edge passed
+    change_ratio         rms relit change over rms reference change: above 1 flicker and popping, below 1 lag
+    largest_step         the largest relit change over the reference's, or over its rms where that is larger: popping
+    brightness_error     largest |relit / reference - 1| of brightness, in frames with BRIGHT_SHARE of the reference's maximum
+    largest_flicker      largest |flicker|
+    ghosting             sum of ghost over sum of edge: the share of the shadow edges' contrast that changes at the wrong time; 0 if no
+                         edge passed. Sums instead of squares weight slow fades of a shadow like quick ones
+    edge_kept            relit change projected on the reference's while edges pass: the share of the edges' change at the right time;
+                         1 if no edge passed
 
-    A shadow edge passes a texel in the steps in which the reference changes STEEP times faster than the texel's peak times the angle
-    moved, which bounds every unshadowed Lambert surface (|d cos| <= |d angle|): penumbrae narrower than about 1 / STEEP rad. One step
-    on either side of them still counts as passing. The definitions of ripple and ghosting are ours.
+    A shadow edge passes a texel in the steps in which the reference changes EDGE_RATE times faster than the texel's peak times the
+    angle moved, which bounds every unshadowed Lambert surface (|d cos| <= |d angle|): penumbrae narrower than about 1 / EDGE_RATE rad.
+    One step on either side also counts as passing. The definitions of flicker and ghosting are ours.
     """
 
     directions: Float64[ndarray, "C F 3"]
@@ -66,79 +64,54 @@ class Motion:
     reference_change: Float64[ndarray, "C S"]
     relit_brightness: Float64[ndarray, "C F"]
     reference_brightness: Float64[ndarray, "C F"]
-    ripple: Float64[ndarray, "C F"]
+    flicker: Float64[ndarray, "C F"]
     ghost: Float64[ndarray, "C S"]
     edge: Float64[ndarray, "C S"]
     change_ratio: float
     largest_step: float
     brightness_error: float
-    largest_ripple: float
+    largest_flicker: float
     ghosting: float
     edge_kept: float
-    edge_texels: float  # fraction of the texels that a shadow edge passes
+    edge_texels: float  # share of the texels that a shadow edge passes
 
     def as_dict(self) -> dict[str, Any]:
-        """JSON: curves as nested lists beside the figures."""
+        """The measures as JSON values; curves are nested lists."""
         return {key: value.tolist() if isinstance(value, ndarray) else value for key, value in asdict(self).items()}
 
 
 def great_circles(domain: Domain, frames: int = FRAMES, circles: int | None = None) -> Float64[ndarray, "C F 3"]:
-    """`frames` directions in all along great circles of even speed.
-
-    On the hemisphere arcs over the zenith at evenly spaced azimuths, from LOWEST above the horizon to LOWEST above it beyond; on the
-    sphere whole circles, the last frame of each at its first. InputError where a circle has fewer than 3 frames.
-    """
-    count = CIRCLES[domain] if circles is None else circles
-    each = frames // max(count, 1)
-    if count < 1 or each < 3:
-        raise InputError(f"expected at least one great circle of at least 3 frames, found {frames} frames for {count} circles")
-    i = np.arange(count)
-    if domain == "hemisphere":
-        azimuth = np.pi * (i + 0.3) / count  # off the axes, where point sets have their symmetries
-        start = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros(count)], axis=1)
-        over = np.broadcast_to([0.0, 0.0, 1.0], (count, 3))
-        angle = np.linspace(LOWEST, np.pi - LOWEST, each)
-    else:
-        normals = point_set("fibonacci", count, "sphere")
-        start = np.cross(normals, [0.6, 0.0, 0.8])
-        start /= np.linalg.norm(start, axis=1, keepdims=True)
-        over = np.cross(normals, start)
-        angle = np.linspace(0, 2 * np.pi, each)
-    return start[:, None] * np.cos(angle)[:, None] + over[:, None] * np.sin(angle)[:, None]
+    """`frames` directions in total along great circles, at even speed: `Directions.paths`."""
+    return np.stack([path for _, path in Directions(domain).paths(frames, circles)])
 
 
 def sampled_texels(covered: Bool[ndarray, "H W"], count: int = TEXELS, seed: int = 0) -> Int[ndarray, " n"]:
-    """Row-major indices of at most `count` covered texels, random without repetition, ascending; InputError where none is covered."""
+    """Row-major indices of at most `count` covered texels, random without repetition, ascending; InputError if none is covered."""
     indices = np.flatnonzero(covered)
     if not len(indices):
-        raise InputError("expected covered texels to sweep a light over, found none")
+        raise InputError("expected covered texels, found none")
     if len(indices) > count:
         indices = np.sort(np.random.default_rng(seed).choice(indices, count, replace=False))
     return indices
 
 
 def dense_reference(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
-    """The answers of `texels` by all N train images interpolated: as many Gaussians as lights, spread 0.9 sqrt(area / N), ridge 0.1.
+    """Responses of `texels` interpolated from all N train images: as many Gaussians as lights, spread 0.9 sqrt(area / N), ridge 0.1.
 
-    What a capture knows of directions between its own; where its shadows are narrower than the spacing of its lights it ghosts itself
-    (srbf.evaluation.light_spacing tells), and a ratio to it says how much worse a smaller asset moves than the images themselves would.
-    Centers stand on a Fibonacci set, on a hemisphere continued a little below its horizon: on the lights themselves a Hammersley set's
-    gaps make a Lambert plane's brightness err by 5 % at this ridge, here by 1 %. Memory: about (N, n, 3) float32. InputError without
-    train lights.
+    This is the best reference between the captured directions. Where shadows are narrower than the light spacing
+    (srbf.evaluation.light_spacing measures that), it shows ghosting itself, and a ratio to it compares an asset with the images.
+    Centers are a Fibonacci set, on a hemisphere extended slightly below the horizon. With centers at the lights, the gaps of a
+    Hammersley set give a Lambert plane a brightness error of 5 % at this ridge; here it is 1 %. Memory: about (N, n, 3) float32.
+    InputError without train lights.
     """
     train = capture.indices("train")
     if not train:
         raise InputError(f"expected train lights in {capture.folder}, found none")
-    directions = capture.directions(train)
-    if domain_of(directions) == "hemisphere":
-        spacing = float(np.sqrt(2 * np.pi / len(train)))
-        centers = point_set("fibonacci", 2 * len(train), "sphere")
-        centers = centers[centers[:, 2] > -np.sin(min(BELOW * spacing, np.pi / 2))]
-    else:
-        spacing = float(np.sqrt(4 * np.pi / len(train)))
-        centers = point_set("fibonacci", len(train), "sphere")
-    basis = GaussianBasis(centers, DENSE_SPREAD * spacing)
-    solve = StreamedLeastSquares(basis.evaluate(directions), DENSE_RIDGE)
+    domain = domain_of_capture(capture)
+    coordinates = domain.captured(capture, train)
+    spacing = float(np.sqrt((2 if domain.manifest()["domain"] == "hemisphere" else 4) * np.pi / len(train)))
+    basis = GaussianBasis(domain.dense_centers(coordinates), DENSE_SPREAD * spacing)
+    solve = StreamedLeastSquares(basis.evaluate(coordinates), DENSE_RIDGE)
     for first, block in capture.blocks(train):
         solve.add(first, np.ascontiguousarray(block[:, texels]).reshape(len(block), -1))
     coefficients = solve.solve()  # (K, 3 n)
@@ -148,8 +121,8 @@ def dense_reference(capture: Capture, texels: Int[ndarray, " n"]) -> Reference:
 def sweep(asset: Asset, reference: Reference, texels: Int[ndarray, " n"], directions: Float64[ndarray, "C F 3"] | None = None) -> Motion:
     """Move a white light along `directions` (great circles over the asset's domain by default) and compare with `reference`.
 
-    `texels` are row-major indices; `reference` answers for them alone. All of the frames are relit whole, in blocks; what is kept of
-    both is (C F, n, 3) float32.
+    `texels` are row-major indices; `reference` returns these texels only. All frames are relit completely, in blocks.
+    Memory: twice (C F, n, 3) float32.
     """
     path = great_circles(asset.domain) if directions is None else directions
     flat = path.reshape(-1, 3)
@@ -163,7 +136,7 @@ def sweep(asset: Asset, reference: Reference, texels: Int[ndarray, " n"], direct
 
 
 def compare(directions: Float64[ndarray, "C F 3"], relit: Float32[ndarray, "C F n 3"], reference: Float32[ndarray, "C F n 3"]) -> Motion:
-    """The figures of `Motion` from answers along a sweep; both are clamped at 0 first."""
+    """The measures of `Motion` from responses along a sweep; both are clamped at 0 first."""
     relit, reference = np.maximum(relit, 0), np.maximum(reference, 0)
     relit_steps, reference_steps = np.diff(relit, axis=1), np.diff(reference, axis=1)  # (C, S, n, 3)
     relit_change, reference_change = _norm(relit_steps), _norm(reference_steps)
@@ -171,9 +144,9 @@ def compare(directions: Float64[ndarray, "C F 3"], relit: Float32[ndarray, "C F 
     mean, brightest = float(true_brightness.mean()), float(true_brightness.max())
     rms = float(np.sqrt((reference_change**2).mean()))
     if mean <= 0 or rms <= 0:
-        raise InputError("expected a reference that shines and changes along the sweep, found one that does not; is the capture black?")
-    ripple = _without_affine(directions, brightness - true_brightness) / mean
-    bright = true_brightness >= DIM * brightest
+        raise InputError("expected a reference that changes along the sweep, found a constant or black one; check the capture")
+    flicker = _without_affine(directions, brightness - true_brightness) / mean
+    bright = true_brightness >= BRIGHT_SHARE * brightest
     passing = _passing(directions, reference, reference_steps)  # (C, S, n)
     edge_texels = passing.any(axis=(0, 1))  # (n,)
     wrong = np.abs(relit_steps - reference_steps).sum(axis=-1)
@@ -188,13 +161,13 @@ def compare(directions: Float64[ndarray, "C F 3"], relit: Float32[ndarray, "C F 
         reference_change=reference_change,
         relit_brightness=brightness,
         reference_brightness=true_brightness,
-        ripple=ripple,
+        flicker=flicker,
         ghost=ghost,
         edge=edge,
         change_ratio=float(np.sqrt((relit_change**2).mean())) / rms,
         largest_step=float((relit_change / np.maximum(reference_change, rms)).max()),
         brightness_error=float(np.abs(brightness[bright] / true_brightness[bright] - 1).max()),
-        largest_ripple=float(np.abs(ripple).max()),
+        largest_flicker=float(np.abs(flicker).max()),
         ghosting=float(ghost.sum() / edge.sum()) if edge_texels.any() else 0.0,
         edge_kept=float(np.einsum("csnk,csnk->", due, relit_steps, dtype=np.float64)) / power if power > 0 else 1.0,
         edge_texels=float(edge_texels.mean()),
@@ -202,10 +175,10 @@ def compare(directions: Float64[ndarray, "C F 3"], relit: Float32[ndarray, "C F 
 
 
 def lambert_sweep(encode: Callable[[Capture], Asset], directions: Float64[ndarray, "L 3"]) -> Motion:
-    """What a method makes of an unshadowed Lambert plane facing up, T = max(0, z), captured under lights at unit `directions`.
+    """The sweep of a method on an unshadowed Lambert plane facing up, T = max(0, z), captured under lights at unit `directions`.
 
-    An asset does not say what it would make of another surface: its basis may come from its own images. So the method encodes a
-    capture of the plane, a few texels under the very lights of the capture in question, and is held to the cosine itself.
+    An asset's basis may depend on its images, so it cannot be tested on another surface. The method therefore encodes a capture of the
+    plane, a few texels under the same lights, and is compared with the exact cosine.
     """
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         capture = lambert_capture(Path(name) / "capture", directions)
@@ -215,7 +188,7 @@ def lambert_sweep(encode: Callable[[Capture], Asset], directions: Float64[ndarra
 
 
 def lambert_capture(folder: Path, directions: Float64[ndarray, "L 3"], side: int = 4) -> Capture:
-    """Write the capture of an unshadowed Lambert plane facing up: every light a train light, images of side x side texels."""
+    """Write the capture of an unshadowed Lambert plane facing up: all lights are train lights, the images have side x side texels."""
     files.make_folder(folder / "lights")
     lights = []
     for i, direction in enumerate(directions):
@@ -228,7 +201,7 @@ def lambert_capture(folder: Path, directions: Float64[ndarray, "L 3"], side: int
 
 
 def frames(asset: Asset, directions: Float64[ndarray, "C F 3"] | None = None) -> Iterator[Float32[ndarray, "H W 3"]]:
-    """The pictures of the sweep in order, for a clip: clamped, with ambient; a few are in memory at a time."""
+    """The images of the sweep in order, for a clip: clamped, with ambient; in blocks."""
     path = great_circles(asset.domain) if directions is None else directions
     ambient = asset.images.get("ambient")
     for _, images in _responses(asset, path.reshape(-1, 3)):
@@ -239,7 +212,7 @@ def frames(asset: Asset, directions: Float64[ndarray, "C F 3"] | None = None) ->
 def _responses(asset: Asset, directions: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     at_a_time = max(1, BLOCK_BYTES // (asset.width * asset.height * 12))
     for start in range(0, len(directions), at_a_time):
-        yield start, directional_responses(asset, directions[start : start + at_a_time])
+        yield start, responses(asset, directions[start : start + at_a_time])
 
 
 def _cosines(directions: np.ndarray, texels: int) -> Float32[ndarray, "b n 3"]:
@@ -251,7 +224,7 @@ def _norm(steps: np.ndarray) -> Float64[ndarray, "C S"]:
 
 
 def _without_affine(directions: np.ndarray, values: np.ndarray) -> Float64[ndarray, "C F"]:
-    """`values` along each circle less their least-squares fit by 1, x, y, z: a gain, an offset or a tilt of the light is no pulse."""
+    """`values` along each circle minus their least-squares fit by 1, x, y, z: removes a gain, an offset or a tilt of the light."""
     left = np.empty_like(values)
     for row, path, curve in zip(left, directions, values, strict=True):
         affine = np.column_stack([np.ones(len(path)), path])
@@ -260,10 +233,10 @@ def _without_affine(directions: np.ndarray, values: np.ndarray) -> Float64[ndarr
 
 
 def _passing(directions: np.ndarray, reference: Float[ndarray, "C F n 3"], steps: np.ndarray) -> Bool[ndarray, "C S n"]:
-    """Where a shadow edge passes: the step is steeper than STEEP times the texel's peak times the angle moved; widened by a step."""
+    """Mask of passing shadow edges: the step exceeds EDGE_RATE times the texel's peak times the angle moved; dilated by one step."""
     chord = np.linalg.norm(np.diff(directions, axis=1), axis=-1)  # (C, S), the angle for small steps
     peak = reference.sum(axis=-1).max(axis=(0, 1))  # (n,)
-    steep = np.abs(steps.sum(axis=-1)) > STEEP * peak * chord[:, :, None]
+    steep = np.abs(steps.sum(axis=-1)) > EDGE_RATE * peak * chord[:, :, None]
     passing = steep.copy()
     passing[:, 1:] |= steep[:, :-1]
     passing[:, :-1] |= steep[:, 1:]

@@ -1,4 +1,4 @@
-"""An asset in the form that an engine loads: one target a file, each a function write(asset, folder, settings)."""
+"""An asset in the form that an engine loads: one target per file, each a function write(asset, folder, settings)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from srbf.io.files import atomic_folder, check_replaceable, checksums, write_jso
 __all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
 
 TARGETS: dict[str, str] = {  # by name: the module whose `write` fills a folder, imported when it is asked for
-    **{name: f"srbf.export.{name}" for name in ("exr", "uint8", "dds", "ktx2", "gltf")},
+    **{name: f"srbf.export.{name}" for name in ("exr", "png", "dds", "ktx2", "gltf")},
     **{name: f"srbf.export.{name}" for name in ("godot", "unity", "unreal", "hlsl", "metal", "wgsl")},
     "web": "srbf.viewer.site",
 }
@@ -24,10 +24,10 @@ TARGETS: dict[str, str] = {  # by name: the module whose `write` fills a folder,
 
 @dataclass(frozen=True)
 class Report:
-    """What an export keeps and costs.
+    """Quality and cost of an export.
 
-    `psnr` (dB) of its relit pictures against the asset's, as `loss.relit_psnr` has it. `bytes_per_texel` is what a shader reads of a
-    texel's own layers, `bytes_per_texel_resident` what the layers take of GPU memory for each, mip levels included; `layer_bytes` that
+    `psnr` (dB) compares its relit pictures with the asset's (`loss.relit_psnr`). `bytes_per_texel` is what a shader reads of a
+    texel's own layers, `bytes_per_texel_resident` the layers' GPU memory per texel, mip levels included; `layer_bytes` that
     of all texels, `resident_bytes` everything, tables and geometry included.
     """
 
@@ -44,7 +44,7 @@ class Report:
 
 
 def check_target(target: str) -> None:
-    """InputError on a target that is not known."""
+    """InputError on an unknown target."""
     if target not in TARGETS:
         raise InputError(f"expected a target of {', '.join(TARGETS)}, found {target!r}")
 
@@ -52,7 +52,7 @@ def check_target(target: str) -> None:
 def export(
     asset: Asset, target: str, folder: Path, settings: Settings = PLAIN, force: bool = False, min_psnr: float | None = None
 ) -> Report:
-    """Write `folder` whole or not at all; the loss is measured on the files as they are read back, and stands in `source.export`.
+    """Write `folder` atomically; the loss is measured on the files as read back, and recorded in `source.export`.
 
     InputError on an unknown target, on settings that the target cannot have, and where the loss leaves less than `min_psnr` (dB).
     """
@@ -66,11 +66,11 @@ def export(
         if min_psnr is not None and not psnr >= min_psnr:
             raise InputError(
                 f"expected at least {min_psnr:g} dB of {target} as {exported.encoding}, found {psnr:.2f}; "
-                "nothing was written: take a larger --encoding, or lower --min-psnr"
+                "nothing was written: take a larger `encoding`, or lower `min_psnr`"
             )
         source = exported.manifest.setdefault("source", {})
         source["export"] = {**source.get("export", {}), "target": target, "psnr": round(psnr, 3), "notes": list(written.notes)}
-        exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # what a target has put beside the asset included
+        exported.manifest["sha256"] = checksums(temporary, MANIFEST)  # including files that the target has added
         write_json(temporary / MANIFEST, exported.manifest)
         disk = folder_bytes(temporary)
     return Report(

@@ -1,4 +1,4 @@
-"""What every dialect's writer shares: names, calls, samplers that travel with their textures, lines broken where the pack's are."""
+"""What all dialects' writers share: names, calls, samplers passed with their textures, line breaks as in the pack."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from srbf.export.translation import (
     without,
 )
 
-WIDTH = 140  # of a line of the pack
-SOFTWARE = "SRBF_SAMPLED"  # what only software renderers want: engines get the pack without
+WIDTH = 140  # longest line of the pack
+SOFTWARE = "SRBF_SAMPLED"  # for software renderers only: engines get the pack without it
 
 
 @dataclass
 class Writer(ABC):
-    """Writes parsed GLSL in another dialect: the base of every dialect, which says its own words in the methods below.
+    """Writes parsed GLSL in another dialect: the base class of all dialects, which override the methods below.
 
-    A texture that is filtered somewhere down the calls travels with its sampler, `nameSampler`; one that is only fetched goes alone.
+    A texture that is filtered here or in a callee is passed with its sampler, `nameSampler`; a texture that is only fetched is not.
     """
 
     files: list[PackFile]
     types: Mapping[str, str] = field(default_factory=dict)
-    words: Mapping[str, str] = field(default_factory=dict)  # functions of other names
+    words: Mapping[str, str] = field(default_factory=dict)  # functions with other names
     reserved: frozenset[str] = frozenset()
 
     @cached_property
@@ -53,7 +53,7 @@ class Writer(ABC):
 
     @cached_property
     def sampled(self) -> frozenset[tuple[str, str]]:
-        """(function, parameter) of every texture that is filtered there or further down."""
+        """(function, parameter) of every texture that is filtered there or in a callee."""
         found: set[tuple[str, str]] = set()
         for function in self.functions.values():  # callees come first
             names = {parameter.name for parameter in function.parameters if parameter.type in SAMPLERS}
@@ -67,7 +67,7 @@ class Writer(ABC):
         return frozenset(found)
 
     def file(self, file: PackFile) -> str:
-        """One file in this dialect, its header's `use` in this dialect's own words."""
+        """One file in this dialect, including its header's `use`."""
         text = re.sub(r"\n{3,}", "\n\n", "".join(self.item(item) for item in file.items))
         uses = "\n".join(self.signature(function, 11) for function in file.functions).replace("\n", "\n           ")
         return re.sub(r"(?<=\n   use:    ).+?(?=\n   domain:)", lambda _: uses, text, count=1, flags=re.DOTALL)
@@ -92,14 +92,14 @@ class Writer(ABC):
         """`const type name = value` outside a function."""
 
     def signature(self, item: Function, indent: int = 0) -> str:
-        """`type name(parameters)`, a line broken where the pack's own limit asks for it."""
+        """`type name(parameters)`, broken into lines of the pack's width."""
         head = f"{self.type(item.type)} {item.name}("
         parameters = [text for parameter in item.parameters for text in self.parameter(item, parameter)]
         return head + wrapped(parameters, len(head), WIDTH - indent) + ")"
 
     @abstractmethod
     def parameter(self, function: Function, parameter: Parameter) -> list[str]:
-        """A parameter as this dialect declares it: a texture that is sampled is two."""
+        """A parameter as this dialect declares it: a sampled texture becomes two."""
 
     def body(self, function: Function) -> str:
         return self.expression(without(function.body.inside, SOFTWARE))
@@ -111,7 +111,7 @@ class Writer(ABC):
         return text + "_" if text in self.reserved else text
 
     def expression(self, nodes: Sequence[Node]) -> str:
-        """Nodes in a row, calls by their rules."""
+        """A sequence of nodes, with translated calls."""
         out: list[str] = []
         i = 0
         while i < len(nodes):
@@ -133,7 +133,7 @@ class Writer(ABC):
         return "".join(out)
 
     def call(self, name: str, arguments: list[str]) -> str:
-        """A call whose arguments are already in this dialect, with the spaces that they had."""
+        """A call whose arguments are already in this dialect, with their spaces."""
         target = self.functions.get(name)
         if target is not None:
             pairs = zip(target.parameters, arguments, strict=True)
@@ -142,7 +142,7 @@ class Writer(ABC):
 
 
 def wrapped(parts: Sequence[str], column: int, width: int) -> str:
-    """Parts with commas, on as many lines as it takes, each at `column`."""
+    """Parts joined by commas, wrapped to lines that start at `column`."""
     lines: list[str] = []
     for part in parts:
         if lines and column + len(lines[-1]) + len(part) + 3 <= width:
@@ -153,9 +153,9 @@ def wrapped(parts: Sequence[str], column: int, width: int) -> str:
 
 
 def guarded(file: PackFile, text: str) -> str:
-    """A translated file between include guards, its first line saying where it is from."""
+    """A translated file between include guards; its first line names its source."""
     guard = "SRBF_" + re.sub(r"\W", "_", file.path.removesuffix(".glsl")).upper()
-    body = text.replace("// SPDX-License-Identifier: MIT\n", "", 1).strip()  # the whole include says it once
+    body = text.replace("// SPDX-License-Identifier: MIT\n", "", 1).strip()  # the whole include has it once
     return f"#ifndef {guard}\n#define {guard}\n// from glsl/{file.path}\n{body}\n#endif\n"
 
 

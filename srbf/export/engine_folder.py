@@ -1,17 +1,16 @@
-"""What every engine's export starts from: its static files, and the asset's images in a folder that the engine's own importers pass by."""
+"""The common part of every engine's export: its static files, and the asset's images in a folder that the engine's own importers ignore."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from srbf.asset import GEOMETRY, LAYERS, MANIFEST, Asset
+from srbf.asset import GEOMETRY, MANIFEST, Asset
 from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.settings import Settings, Target
 from srbf.io import files
-
-ENTRIES = ("r_table", "w_table", "light_coefficients", "cluster_index")  # keys of asset.json that hold a file among other things
+from srbf.registry import method_named
 
 
 def engine_root(name: str) -> Path:
@@ -25,7 +24,7 @@ def engine_root(name: str) -> Path:
 
 
 def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, container: Target = exr.write) -> Asset:
-    """The asset by a `container` below `folder`/`data`, its asset.json in `folder`; the asset as it was written is returned."""
+    """Write the asset by a `container` below `folder`/`data`, and its asset.json in `folder`; returns the asset as written."""
     files.make_folder(folder / data)
     container(asset, folder / data, settings)
     written = Asset.open(folder / data)
@@ -35,11 +34,12 @@ def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, conta
 
 
 def below(data: str, manifest: dict[str, Any]) -> dict[str, Any]:
-    """asset.json of files that lie in `data` beside it."""
+    """asset.json for files in `data` beside it."""
     moved = dict(manifest)
-    layers = LAYERS[manifest["method"]]
+    method = method_named(manifest["method"])
+    layers = method.layers
     moved[layers] = [{**entry, "file": f"{data}/{entry['file']}"} for entry in manifest[layers]]
-    for key in ENTRIES:
+    for key in method.tables:
         if key in manifest:
             moved[key] = {**manifest[key], "file": f"{data}/{manifest[key]['file']}"}
     for key in (*GEOMETRY, "scene"):

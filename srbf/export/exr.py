@@ -1,4 +1,4 @@
-"""`exr`: one image a layer, half floats or floats; what every engine's loader reads, and what other exports start from."""
+"""`exr`: one image per layer, half floats or floats; every engine's loader reads it, and other exports start from it."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from srbf.export.settings import PLAIN, Settings, Written, no_levels
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
-    """Fill `folder` with the asset as EXRs, half floats unless told; half floats that are there already stay as they are."""
+    """Fill `folder` with the asset as EXRs, half floats by default; stored half floats stay unchanged."""
     encoding = settings.encoding or "half"
     if encoding != "half" and encoding != "float":
-        raise InputError(f"expected --encoding half or float for EXR files, found {encoding}")
+        raise InputError(f"expected `encoding` half or float for EXR files, found {encoding}")
     no_levels(settings, "EXR files")
     stored, scale, bias = in_encoding(asset, encoding)
     with_layers(asset, "exr", stored, scale, bias, layer_entries(stem(asset), encoding, scale, bias)).write(folder)

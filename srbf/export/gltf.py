@@ -1,4 +1,4 @@
-"""`gltf`: a mesh that any viewer shows with a plain lightmap, and one that knows SRBF_relighting_map relights."""
+"""`gltf`: a mesh that any viewer shows with a plain lightmap, and that viewers with SRBF_relighting_map relight."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ UNLIT = "KHR_materials_unlit"
 MODEL = "model.glb"
 UV_SET = 1  # TEXCOORD_1
 LINEAR_FILTER, CLAMP = 9729, 33071
-SKY = (16, 32)  # texels of the white sky
+ENVIRONMENT_SIZE = (16, 32)  # texels of the white environment map
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill `folder` with the asset, its layers in a .ktx2 file, and `model.glb` that points to it.
 
     The mesh is `settings.mesh`, else rebuilt from the position map, for a view a picture of its size. Its materials carry the extension,
-    {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white sky, unlit.
+    {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white environment map, unlit.
     """
     notes: list[str] = []
     document, lit = _lit_document(asset, settings.mesh, notes)
     if asset.transport == "indirect":
-        notes.append("without the extension a viewer shows the indirect light alone")
+        notes.append("without the extension, viewers show the indirect light only")
     with atomic_path(folder / MODEL) as temporary:
         temporary.write_bytes(document.pack())
     written = texture_array.write(".ktx2", asset, folder, settings)
@@ -45,14 +45,14 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def model(asset: Asset, mesh: Path | None = None) -> bytes:
-    """`model.glb` alone, as `write` writes it."""
+    """Only `model.glb`, as `write` writes it."""
     return _lit_document(asset, mesh, [])[0].pack()
 
 
-def white_sky(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
-    """The asset under a sky of radiance 1/pi, irradiance 1 on an open plane, or of radiance 1, which shows a white one as 1."""
+def under_white(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
+    """The asset under a uniform environment map of radiance 1/pi (irradiance 1 on an open plane), or for radiance assets of radiance 1."""
     radiance = 1 / np.pi if asset.quantity == "irradiance" else 1.0
-    return relight(asset, [EnvironmentLight(np.full((*SKY, 3), radiance, np.float32))])
+    return relight(asset, [EnvironmentLight(np.full((*ENVIRONMENT_SIZE, 3), radiance, np.float32))])
 
 
 def _lit_document(asset: Asset, mesh: Path | None, notes: list[str]) -> tuple[Glb, int]:
@@ -80,9 +80,9 @@ def _given(path: Path) -> Glb:
 def _document(asset: Asset, notes: list[str]) -> Glb:
     """One node of one primitive: a view's picture, or the lightmap's texels. Adds to `notes` which."""
     document = Glb({"asset": {"version": "2.0", "generator": "srbf export"}})
-    kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
+    kind = asset.receiver.get("kind")
     if kind == "vertices":
-        raise InputError("expected a lightmap or a view, found an asset of vertices; give the mesh with a UV for each: --mesh FILE.glb")
+        raise InputError("expected a lightmap or a view, found an asset of vertices; give the `mesh` with a UV for each, a .glb")
     if kind == "view":
         wide, high = asset.width / max(asset.width, asset.height), asset.height / max(asset.width, asset.height)
         around = np.array([[-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]], np.float32)
@@ -90,12 +90,12 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
         normals: np.ndarray | None = np.tile(np.array([0, 0, 1], np.float32), (4, 1))
         uv = np.array([[0, 0], [0, 1], [1, 1], [1, 0]], np.float32)
         triangles = np.array([[0, 1, 2], [0, 2, 3]])
-        notes.append("a view is a picture: its mesh is a rectangle of its shape")
+        notes.append("a view is a picture: its mesh is a rectangle of the same proportions")
     else:
         mesh = texel_mesh(asset)
         positions, uv, triangles = _y_up(mesh.positions), mesh.uv, mesh.triangles
         normals = None if mesh.normals is None else _y_up(mesh.normals)
-        notes.append("the mesh is rebuilt from the lightmap's texels; --mesh FILE.glb takes the scene's own")
+        notes.append("the mesh is rebuilt from the lightmap's texels; `mesh`, a .glb, takes the scene's own")
     attributes = {"POSITION": document.add_accessor(positions, bounds=True)}
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -105,7 +105,7 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
     attributes["TEXCOORD_0"] = document.add_accessor(uv)
     primitive = {"attributes": attributes, "indices": document.add_accessor(triangles.astype(np.uint32).ravel())}
     mesh_index = document.add("meshes", {"primitives": [primitive]})
-    name = asset.manifest.get("source", {}).get("receiver", {}).get("object", "receiver")
+    name = asset.receiver.get("object", "receiver")
     document.json["scenes"] = [{"nodes": [document.add("nodes", {"name": str(name), "mesh": mesh_index})]}]
     document.json["scene"] = 0
     return document
@@ -117,10 +117,10 @@ def _y_up(vectors: Float32[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
 
 
 def _fallback(document: Glb, asset: Asset) -> int:
-    """The asset under a white sky as a texture of the document; its index."""
+    """The asset under a white environment map as a texture of the document; its index."""
     with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
         path = Path(folder) / "lightmap.png"
-        write_png(path, white_sky(asset), alpha_of(asset))
+        write_png(path, under_white(asset), alpha_of(asset))
         view = document.add_view(path.read_bytes())
     image = document.add("images", {"name": "lightmap", "mimeType": "image/png", "bufferView": view})
     sampler = document.add("samplers", {"magFilter": LINEAR_FILTER, "minFilter": LINEAR_FILTER, "wrapS": CLAMP, "wrapT": CLAMP})
@@ -149,7 +149,7 @@ def _light_up(document: Glb, asset: Asset, picture: int, path: Path | None) -> i
             count = document.json["accessors"][primitive.get("indices", attributes["POSITION"])]["count"]
             lit += count // 3
     if not lit:
-        raise InputError(f"expected a mesh with a UV set in {path}, found none; unwrap it, or leave --mesh out")
+        raise InputError(f"expected a mesh with a UV set in {path}, found none; unwrap it, or leave `mesh` out")
     document.use_extension(EXTENSION)
     document.use_extension(UNLIT)
     return lit
@@ -157,9 +157,7 @@ def _light_up(document: Glb, asset: Asset, picture: int, path: Path | None) -> i
 
 def _receivers(document: Glb, asset: Asset) -> set[int]:
     """The meshes of the nodes that are named as the asset's receivers; all of them where none is."""
-    source = asset.manifest.get("source", {})
-    told = [source.get("receiver", {}), *source.get("receivers", [])]
-    names = {receiver["object"] for receiver in told if "object" in receiver}
+    names = {receiver["object"] for receiver in asset.receivers if "object" in receiver}
     named = {node["mesh"] for node in document.json.get("nodes", []) if "mesh" in node and node.get("name") in names}
     return named or set(range(len(document.json["meshes"])))
 

@@ -1,4 +1,4 @@
-"""A look that Blender's worker read off a material, as a physically based material of glTF 2.0 and its Khronos extensions."""
+"""A look that Blender's worker has read from a material, as a physically based material of glTF 2.0 and its Khronos extensions."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 
-CLOSED = 1e-3  # of the area: more than this left over of its vectors, and a surface has a hole
+CLOSED = 1e-3  # of the area: a surface whose area vectors sum to more than this has a hole
 SHORTEST = 1e-6  # m: thinner bodies are walls
 DIGITS = 6
 
 
 def surface(look: dict[str, Any], thickness: float = 0.0, picture: dict[str, int] | None = None, colored: bool = False) -> dict[str, Any]:
-    """The material; `look` as in `blender_bake.looks.Look`.
+    """The material; `look` as in `blender_bake.pbr_material.PbrMaterial`.
 
-    thickness: of a solid body, m (see `mean_thickness`), seen from outside alone; 0 is a thin wall, behind which nothing is displaced
+    thickness: of a solid body, m (see `mean_thickness`), seen from outside only; 0 is a thin wall without refraction
     picture: glTF's texture info of its base color; colored: the vertices hold it. Either makes the base color itself white.
     """
     base = [1.0, 1.0, 1.0] if colored or picture is not None else look["base_color"]

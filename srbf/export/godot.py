@@ -1,4 +1,4 @@
-"""A Godot 4 project: the asset, an addon that lights canvases and meshes by it, and an example that opens at once."""
+"""A Godot 4 project: the asset, an addon that lights canvases and meshes with it, and a ready example."""
 
 from __future__ import annotations
 
@@ -7,19 +7,20 @@ import shutil
 from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
-from srbf.errors import InputError, ShaderError
-from srbf.export import dds, exr, uint8
+from srbf.errors import ShaderError
+from srbf.export import dds, exr, png
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
 from srbf.io import files
+from srbf.methods import method_of
+from srbf.registry import all_methods
 
-DATA = "asset"  # the folder of the asset's images, which Godot's own importers are told to leave alone
-IMPORTED = "asset.srbf"  # what Godot imports instead: the path of asset.json
-MODEL = "model.glb"  # what the example shows in place of the asset's texels
+DATA = "asset"  # the folder of the asset's images, hidden from Godot's own importers
+IMPORTED = "asset.srbf"  # the file that Godot imports: it holds the path of asset.json
+MODEL = "model.glb"  # shown by the example instead of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
-METHODS = {"relighting-map": "relighting_map", "eigen-map": "eigen_map", "clustered-eigen-map": "clustered_eigen_map"}
-WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": dds.write, "bc1": dds.write}
+WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
 _SAMPLER_PRECISION = re.compile(r"\b(?:high|medium|low)p\s+(?=[iu]?sampler)")
@@ -30,14 +31,13 @@ _OUTSIDE = re.compile(r"\blayout\s*\(|^\s*(?:in|out)\s|\bgl_\w+|\bvoid\s+main\b"
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `project.godot`, the addon with the shaders of all methods, `asset.json` with its images below `asset/`.
 
-    Layers are EXRs (half, float), PNGs (uint8) or one DDS (bc7, bc1, and whatever has mip levels); those in memory stay as they are unless
-    `settings` say otherwise. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
+    Layers are EXRs (half, float), PNGs (uint8) or one DDS (bc7, bc1, and whatever has mip levels); the encoding in memory is kept unless
+    `settings` name another. The mesh of `settings`, whose TEXCOORD_1 is the lightmap's, becomes the example's. InputError on relighting
     maps of other functions than Gaussians, which no shader knows.
     """
-    if asset.method == "relighting-map" and asset.manifest["basis"]["kind"] != "gaussian":
-        raise InputError(f"expected relighting maps of Gaussians for Godot, found {asset.manifest['basis']['kind']}; fit without --basis")
+    method_of(asset).shader_parts(asset)  # refuses what no shader knows
     shutil.copytree(engine_root("godot"), folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".godot", "*.uid", "*.import"))
-    for name in METHODS.values():
+    for name in (method.stem() for method in all_methods() if method.has_shader):
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held
@@ -58,14 +58,12 @@ def method_include(name: str) -> str:
     source = f'#include "methods/{name}_lights.glsl"\n#include "combine/mip_level.glsl"\n'
     text = translated(resolve_text(source, name).text)
     guard = f"SRBF_{name.upper()}_INCLUDED"
-    head = (
-        f"// SPDX-License-Identifier: MIT\n// Made of glsl/methods/{name}_lights.glsl and what it includes by srbf export --target godot.\n"
-    )
+    head = f"// SPDX-License-Identifier: MIT\n// From glsl/methods/{name}_lights.glsl and its includes, by srbf export --target godot.\n"
     return f"{head}#ifndef {guard}\n#define {guard}\n{text}#endif\n"
 
 
 def translated(text: str) -> str:
-    """GLSL functions as Godot's shading language takes them: without what only a driver reads, and without precisions of samplers.
+    """GLSL functions in Godot's shading language: without lines for drivers, and without precisions of samplers.
 
     ShaderError on what belongs to a stage (main, in, out, gl_…): Godot writes those itself.
     """
@@ -73,5 +71,5 @@ def translated(text: str) -> str:
         text = rule.sub("", text)
     code = re.sub(r"\([^()]*\)", "()", re.sub(r"/\*.*?\*/|//[^\n]*", "", text, flags=re.DOTALL))  # parameters may be in or out
     if found := _OUTSIDE.search(code):
-        raise ShaderError(f"expected functions alone for Godot, found {found[0].strip()!r}; translate an include of glsl/, not a stage")
+        raise ShaderError(f"expected only functions for Godot, found {found[0].strip()!r}; translate an include of glsl/, not a stage")
     return text

@@ -38,7 +38,7 @@ TYPES = {f"{kind}vec{n}": f"{word}{n}" for kind, word in (("", "float"), ("i", "
 TYPES |= {f"mat{n}": f"float{n}x{n}" for n in (2, 3, 4)}  # the same rows and columns: a matrix times a vector is mul(matrix, vector)
 TEXTURES = {"sampler2D": "Texture2D", "sampler2DArray": "Texture2DArray"}
 WORDS = {"mix": "lerp", "fract": "frac", "inversesqrt": "rsqrt", "uintBitsToFloat": "asfloat", "floatBitsToUint": "asuint"}
-# Words of HLSL that GLSL leaves free: geometry-shader modifiers, storage classes, and what the engines define.
+# Reserved words of HLSL that are names in GLSL: geometry-shader modifiers, storage classes, and the engines' own.
 RESERVED = frozenset(
     {"point", "line", "triangle", "linear", "centroid", "sample", "shared", "groupshared", "pass", "technique", "texture", "sampler"}
     | {"string", "vector", "matrix", "half", "precise", "export", "extern", "volatile", "row_major", "column_major", "packoffset"}
@@ -69,8 +69,8 @@ NUMBER = re.compile(r"-?[\d.]+(?:[eE][+-]?\d+)?")
 def include(paths: Iterable[str], root: Path | None = None) -> str:
     """The functions of some files of the pack, and of all that these include, as one HLSL include.
 
-    What the pack asks for by `#define` (`SRBF_K`, `SRBF_COMPONENTS`) the including shader defines first.
-    Raises ShaderError on GLSL that HLSL has no word for.
+    The including shader must first define the pack's counts (`SRBF_K`, `SRBF_COMPONENTS`).
+    Raises ShaderError on GLSL without an equivalent in HLSL.
     """
     pack = pack_files(paths, root)
     writer = HlslWriter(pack)
@@ -79,8 +79,8 @@ def include(paths: Iterable[str], root: Path | None = None) -> str:
 
 def asset_include(asset: Asset, pairs: bool = False) -> str:
     """Everything that an HLSL shader includes to relight one asset: its numbers, the pack's functions that it needs, and
-    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. One such include a shader. With `pairs`
-    relighting maps take `srbf.gl.textures.pairs_of` their R table in its place.
+    `srbfAssetDirectional`, `srbfAssetPoint`, `srbfAssetLights`. At most one such include per shader. With `pairs`,
+    relighting maps read `srbf.gl.textures.pairs_of` their R table instead of the table.
 
     Raises InputError on an asset that no shader relights.
     """
@@ -123,7 +123,7 @@ class HlslWriter(Writer):
         return ["out " + text if parameter.out else text]
 
     def struct(self, item: Struct) -> str:
-        """The struct, and a function that makes one: HLSL has no constructors of structs."""
+        """The struct and a function that constructs it, since HLSL has no struct constructors."""
         members = [_declared(part) for part in split(item.body.inside, ";") if significant(part)]
         head = f"{item.name} {_maker(item.name)}("
         parameters = wrapped([f"{self.type(kind)} {self.name(name)}" for kind, name in members], len(head), WIDTH)
@@ -146,7 +146,7 @@ class HlslWriter(Writer):
             return f"{image}.Load({self._fetched(place, level)})"
         if name == "textureSize":
             if trimmed[1] != "0":
-                raise ShaderError(f"expected textureSize of level 0, found level {trimmed[1]}; HLSL's helper knows that one alone")
+                raise ShaderError(f"expected textureSize of level 0, found level {trimmed[1]}; HLSL's helper supports no other")
             return f"srbfTextureSize({trimmed[0]})"
         if name == "textureLod":
             image, place, level = trimmed
@@ -161,7 +161,7 @@ class HlslWriter(Writer):
 
     @staticmethod
     def _fetched(place: str, level: str) -> str:
-        """The place and level of a Load; the pack fetches from plain textures alone."""
+        """The place and level of a Load; the pack fetches from plain textures only."""
         parts = re.fullmatch(r"int2\((.+)\)", place)
         return f"int3({parts[1]}, {level})" if parts and _balanced(parts[1]) else f"int3({place}, {level})"
 
@@ -178,7 +178,7 @@ def _multiplied(nodes: Sequence[Node], matrices: frozenset[str]) -> list[Node]:
             start = next((j for j in range(i + 1, len(nodes)) if not _is_space(nodes[j])), len(nodes))
             if start == len(nodes) or not is_sign(nodes[start], "*"):
                 raise ShaderError(
-                    f"expected {node.text} times a vector, found another use of the matrix; HLSL's writer knows that one alone"
+                    f"expected {node.text} times a vector, found another use of the matrix; the HLSL writer supports no other"
                 )
             start = next(j for j in range(start + 1, len(nodes)) if not _is_space(nodes[j]))
             end = start + 1
@@ -210,7 +210,7 @@ def _declared(nodes: Sequence[Node]) -> tuple[str, str]:
 
 
 def _bare(argument: str) -> str:
-    """An argument without brackets about the whole of it."""
+    """An argument without enclosing brackets."""
     text = argument.strip()
     return argument.replace(text, text[1:-1]) if text.startswith("((") and _balanced(text[1:-1]) else argument
 

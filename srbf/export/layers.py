@@ -1,4 +1,4 @@
-"""An asset's layers as another encoding stores them, and what is seen of them together."""
+"""An asset's layers in another encoding, and the functions that weight them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from srbf.asset import Asset
 from srbf.encode.quantization import quantize, quantize_together, ranges_together
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.sphere import all_around
+from srbf.methods import method_of
 
 
 def finite_layers(asset: Asset) -> Float32[ndarray, "N H W C"]:
@@ -23,12 +23,12 @@ def finite_layers(asset: Asset) -> Float32[ndarray, "N H W C"]:
 
 
 def functions_of(asset: Asset) -> Float64[ndarray, "M K"] | None:
-    """What weighs the relighting maps, over the domain; None of planes, which are orthogonal and rounded alone."""
-    return asset.map_functions.evaluate(all_around(asset.domain)) if asset.method == "relighting-map" else None
+    """Functions over the domain through whose sums alone the layers are seen; None where each layer is rounded alone."""
+    return method_of(asset).rounding_functions(asset)
 
 
 def in_encoding(asset: Asset, encoding: Encoding) -> tuple[ndarray, Float32[ndarray, "N C"], Float32[ndarray, "N C"]]:
-    """(stored, scale, bias), as they are where that is their encoding already."""
+    """(stored, scale, bias), unchanged where they have that encoding already."""
     if asset.held == encoding:
         finite_layers(asset)
         return asset.stored, asset.scale, asset.bias
@@ -39,7 +39,7 @@ def in_encoding(asset: Asset, encoding: Encoding) -> tuple[ndarray, Float32[ndar
 
 
 def byte_ranges(asset: Asset, layers: Float32[ndarray, "N H W C"]) -> tuple[Float32[ndarray, "N C"], Float32[ndarray, "N C"]]:
-    """(scale, bias) of the bytes in which `layers` of the asset lose least."""
+    """(scale, bias) of the byte encoding with the least loss for `layers` of the asset."""
     functions = functions_of(asset)
     if asset.held == "uint8":
         return asset.scale, asset.bias
@@ -52,7 +52,7 @@ def byte_ranges(asset: Asset, layers: Float32[ndarray, "N H W C"]) -> tuple[Floa
 def _unused_kept(
     asset: Asset, stored: ndarray, scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"]
 ) -> tuple[ndarray, Float32[ndarray, "N C"], Float32[ndarray, "N C"]]:
-    """Channels of the last image that hold no plane keep scale and bias 0."""
+    """Unused channels of the last image keep scale and bias 0."""
     unused = asset.scale == 0
     scale[unused], bias[unused] = 0, 0
     return stored, scale, bias

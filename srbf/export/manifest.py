@@ -1,4 +1,4 @@
-"""The asset.json of an export: that of the asset, with layers stored another way."""
+"""The asset.json of an export: that of the asset, with layers in another encoding."""
 
 from __future__ import annotations
 
@@ -8,14 +8,8 @@ from typing import Any
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.asset import LAYERS, SCENE_FILE, Asset
-
-TABLE_FILES = {
-    "r_table": "r_table.exr",
-    "light_coefficients": "light_coefficients.exr",
-    "w_table": "w_table.exr",
-    "cluster_index": "cluster_index.png",
-}
+from srbf.asset import SCENE_FILE, Asset
+from srbf.methods import method_of
 
 
 def with_layers(
@@ -26,9 +20,9 @@ def with_layers(
     bias: Float32[ndarray, "N C"],
     entries: list[dict[str, Any]],
 ) -> Asset:
-    """`asset` with other layers and `entries`, every key that a file needs there, whether it was read from one or made in memory.
+    """`asset` with other layers and `entries`, and every key that a file needs, whether it was loaded or made in memory.
 
-    Errors by role were measured on the layers as they were; they go, `source.export` says what was done.
+    Errors by role, which were measured on the original layers, are dropped; `source.export` records the export.
     """
     manifest: dict[str, Any] = {
         "format": "srbf-asset",
@@ -42,12 +36,12 @@ def with_layers(
     }
     for name, table in asset.tables.items():
         told = {"size": table.size} if name == "r_table" else {"mapping": "octahedral"} if name == "w_table" else {}
-        manifest[name] = {**told, **manifest.get(name, {}), "file": TABLE_FILES[name]}
-    manifest[LAYERS[asset.method]] = entries
+        manifest[name] = {**told, **manifest.get(name, {}), "file": method_of(asset).tables[name]}
+    manifest[asset.layers_key] = entries
     manifest["source"] = {**manifest.get("source", {}), "export": {"target": target}}
     return replace(asset, manifest=manifest, stored=stored, scale=scale, bias=bias)
 
 
 def stem(asset: Asset) -> str:
-    """What the files of its layers are called: `map` or `plane`."""
-    return LAYERS[asset.method][:-1]
+    """The stem of its layers' files: `map` or `plane`."""
+    return asset.layers_key[:-1]

@@ -1,4 +1,4 @@
-"""The shader pack as Metal: whole stages by spirv-cross, since no Metal compiler runs outside a Mac to check a text of our own."""
+"""The shader pack as Metal: whole stages by spirv-cross, since no Metal compiler outside macOS could check our own translation."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from srbf.export import exr, spirv
 from srbf.export.asset_shader import counts
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.io import files
+from srbf.methods import method_of
 
 LANGUAGE: spirv.Language = "metal"
 
@@ -19,7 +20,7 @@ def stages_of(asset: Asset) -> dict[str, str]:
     Raises InputError on an asset that no shader relights, MissingLibraryError without glslang and spirv-cross.
     """
     defines = counts(asset)
-    stem = "" if asset.method == "relighting-map" else asset.method.replace("-", "_") + "_"
+    stem = method_of(asset).shader_parts(asset).stages
     names = ["fullscreen.vert", f"{stem}directional.frag", f"{stem}point.frag", "finish.frag"]
     return {name: spirv.cross_compile(spirv.compile_stage(name, defines), LANGUAGE) for name in names}
 
@@ -33,4 +34,4 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     written = exr.write(asset, folder, settings)
     for name, text in texts.items():
         files.write_text(folder / f"{name.replace('.', '_')}.metal", text)
-    return Written((*written.notes, "Metal by spirv-cross: not compiled by Apple's compiler here"))
+    return Written((*written.notes, "Metal by spirv-cross: not compiled with Apple's compiler"))

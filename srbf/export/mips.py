@@ -1,10 +1,11 @@
-"""Mip levels of coefficients: relighting is linear, so that a level relit is the level-0 picture, filtered."""
+"""Mip levels of coefficients: relighting is linear, so a relit level equals the filtered level-0 picture."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage, sparse
 
 from srbf.arrays import Float32
 from srbf.asset import Asset
@@ -12,15 +13,18 @@ from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.io.containers.texture_array import level_size
 
-GUTTER = 2.5  # of a level's texels between two charts: half a texel into one a bilinear sample takes the next, whose nearest is its own
+if TYPE_CHECKING:
+    from scipy import sparse
+
+GUTTER = 2.5  # of a level's texels between two charts: so that bilinear samples of one chart never read the other
 
 
 def smaller_levels(
     layers: Float32[ndarray, "N H W C"], coverage: Float32[ndarray, "H W"], levels: int
 ) -> list[Float32[ndarray, "N h w C"]]:
-    """`layers` and below them `levels` - 1 smaller ones: the mean of the covered texels below each, weighed by area and coverage.
+    """`layers` and `levels` - 1 smaller ones: means of the covered texels, weighted by area and coverage.
 
-    Texels with nothing covered below them take the nearest that has, so that no level has a hole beside a chart.
+    Texels without covered ones take the nearest value, so that no level has a hole beside a chart.
     """
     height, width = coverage.shape
     found = [layers]
@@ -51,6 +55,8 @@ def smaller_levels(
 
 def shares(size: int, smaller: int) -> sparse.csr_matrix:
     """(smaller, size): the share of each texel in each smaller one, which covers size / smaller of them."""
+    from scipy import sparse
+
     edges = np.arange(smaller + 1) * (size / smaller)
     rows, columns, shares = [], [], []
     for i in range(smaller):
@@ -63,15 +69,15 @@ def shares(size: int, smaller: int) -> sparse.csr_matrix:
 
 
 def coverage_of(asset: Asset) -> Float32[ndarray, "H W"]:
-    """What is real of each texel; all of it where the asset says nothing."""
+    """Coverage of each texel; 1 where the asset does not say."""
     return asset.images.get("coverage", np.ones((asset.height, asset.width), np.float32))
 
 
 def levels_without_bleeding(asset: Asset) -> int:
-    """The most levels, full size included, with GUTTER of their own texels between any two charts, so that a bilinear sample of one chart
-    never takes of another; 1 where a texel's neighbor is not its neighbor on the surface (vertices) or means another thing (clusters).
+    """The most levels, full size included, with GUTTER of their own texels between any two charts, so that bilinear samples of one chart
+    never read another; 1 where neighboring texels are not neighbors on the surface (vertices) or differ in meaning (clusters).
     """
-    kind = asset.manifest.get("source", {}).get("receiver", {}).get("kind")
+    kind = asset.receiver.get("kind")
     if "cluster_index" in asset.tables or kind == "vertices":
         return 1
     levels = max(asset.width, asset.height).bit_length()
@@ -87,6 +93,8 @@ def levels_without_bleeding(asset: Asset) -> int:
 
 def chart_gap(coverage: Float32[ndarray, "H W"]) -> int | None:
     """The fewest uncovered texels, across, down or aslant, between two charts (connected covered texels); None of fewer than two."""
+    from scipy import ndimage
+
     covered = coverage > 0
     labels, count = ndimage.label(covered, np.ones((3, 3)))
     if count < 2:

@@ -1,4 +1,4 @@
-"""The pack's preprocessor conditions, taken where an asset's counts are known: for dialects without a preprocessor, and for short texts."""
+"""Evaluates the pack's preprocessor conditions for an asset's counts: for dialects without a preprocessor, and for short texts."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from srbf.errors import ShaderError
 
 
 def preprocess(text: str, path: str, known: set[str], define: Callable[[str, str], str]) -> str:
-    """A file's text with its conditions taken; a `#define` becomes what `define` (name, value) says, and is `known` from there on.
+    """A file's text with evaluated conditions; a `#define` becomes the result of `define` (name, value), and is `known` from there on.
 
-    Raises ShaderError on `#error`, with its words, and on conditions past `#ifdef`, `#ifndef` and `#elif defined(...)`.
+    Raises ShaderError on `#error`, with its message, and on conditions other than `#ifdef`, `#ifndef` and `#elif defined(...)`.
     """
     lines: list[str] = []
-    taken: list[str] = []  # of every open condition: yes, not yet, or no more
+    taken: list[str] = []  # state of every open condition: yes, not yet, or no more
     for line in text.splitlines():
         match = re.match(r"\s*#\s*(\w+)\s*(.*?)\s*(?://.*)?$", line)
         word, rest = (match[1], match[2]) if match else ("", "")

@@ -1,4 +1,4 @@
-"""Layers as BC7 or BC1 blocks: alone, or each making up for what the others lose where only their sums are seen."""
+"""Layers as BC7 or BC1 blocks: each by itself, or with error feedback between layers where only their sums are seen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PASSES = 1  # over all blocks after the first; a second gains 0.1 dB
 def blocks_alone(
     values: Float32[ndarray, "N H W C"], scale: Float32[ndarray, "N C"], bias: Float32[ndarray, "N C"], form: BlockFormat
 ) -> ndarray:
-    """(N, bytes) uint8 of every layer, in ranges that are given."""
+    """(N, bytes) uint8 of every layer, in given ranges."""
     stored = round_alone(values, scale, bias)
     found: list[ndarray] = [np.empty(0, np.uint8)] * len(stored)
 
@@ -35,10 +35,10 @@ def blocks_together(
     bias: Float32[ndarray, "K C"],
     form: BlockFormat,
 ) -> ndarray:
-    """(K, bytes) uint8 of layers that are only seen through sums weighed by `functions`, which overlap.
+    """(K, bytes) uint8 of layers that are only seen in sums weighted by overlapping `functions`.
 
     As `quantization.round_together` [Babai1986], a block's loss in the place of a byte's: what the blocks of one layer lose, the layers
-    still to be compressed make up for. Then once more over all: each layer is compressed anew for what all others lack, and a block
+    still to be compressed make up for. Then once more over all: each layer is compressed again for what all others lack, and a block
     kept where the functions' metric G = R^T R says that less is lost: with errors e, change d of layer i counts 2 d (G e)_i + G_ii d^2.
     """
     height, width = values.shape[1:3]
@@ -70,7 +70,7 @@ def _band(
     errors = np.zeros_like(values)
 
     def compressed(i: int, wanted: ndarray) -> tuple[ndarray, ndarray]:
-        """(blocks, what they lack of the values) of layer i."""
+        """(blocks, their residual) of layer i."""
         found = encode(round_alone(wanted[None], scale[i : i + 1], bias[i : i + 1])[0], form)
         decoded = decode(found[None], form, width, height)[0, ..., :channels]
         return found.reshape(blocks.shape[1:]), values[i] - (decoded / np.float32(255) * scale[i] + bias[i])

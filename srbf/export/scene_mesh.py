@@ -1,4 +1,4 @@
-"""The scene as it is rendered, as one binary glTF: what lightmaps go onto, in its surroundings."""
+"""The scene as rendered, as one binary glTF: the meshes of lightmaps in their surroundings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ATTRIBUTES = {"position": "POSITION", "normal": "NORMAL", "uv": "TEXCOORD_0", "l
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """What was written: how many objects, triangles, materials and bytes, and the names of the receivers among the objects."""
+    """Counts of objects, triangles, materials and bytes, and the names of the receivers among the objects."""
 
     objects: int
     triangles: int
@@ -48,8 +48,8 @@ def write_scene_mesh(
     say: Callable[[str], None] = lambda line: None,
     scene_name: str | None = None,
 ) -> SceneMesh:
-    """Write the objects of a .blend that render as `output`, a .glb, whole or not at all: of its scene `scene_name`, else of the one that
-    the capture was baked of, else of the active one.
+    """Write the rendered objects of a .blend to `output`, a .glb, atomically: of its scene `scene_name`, else of the capture's
+    scene, else of the active one.
 
     With a lightmap's `capture`, its receivers get TEXCOORD_1, and its albedo for a base color. InputError on what cannot be used,
     BakeError where Blender fails or the scene is not the one of the capture, OutputExistsError where `output` may not be replaced.
@@ -57,7 +57,7 @@ def write_scene_mesh(
     if output.suffix.lower() != SUFFIX:
         raise InputError(f"expected -o NAME{SUFFIX}, found {output.name!r}; a binary glTF is written")
     if output.exists() and not (force and output.is_file()):
-        raise OutputExistsError(f"expected no {output} yet, found one; choose another -o, or add --force")
+        raise OutputExistsError(f"expected no {output} yet, found one; choose another, or `force=True`")
     if not scene.is_file():
         raise InputError(f"expected a .blend at {scene}, found {'a folder' if scene.is_dir() else 'no such file'}")
     opened = None if capture is None else Capture.open(capture)
@@ -75,13 +75,13 @@ def write_scene_mesh(
 
 
 def lightmap_receivers(capture: Capture) -> list[dict[str, Any]]:
-    """The objects of a lightmap's capture and their UV layers, as its manifest has them; InputError where it is of another kind."""
+    """The objects of a lightmap's capture and their UV layers, from its manifest; InputError on another kind of capture."""
     manifest = capture.manifest
     found = manifest.get("receivers") or [manifest.get("receiver", {})]
     kinds = {str(one.get("kind", "none")) for one in found}
     if kinds != {"lightmap"} or not all("object" in one and "uv_layer" in one for one in found):
         raise InputError(
-            f"expected a lightmap's capture at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; leave --capture out"
+            f"expected a lightmap's capture at {capture.folder}, found one of kind {', '.join(sorted(kinds))}; leave `capture` out"
         )
     return found
 
@@ -109,7 +109,7 @@ def _ask(
     blender: Path | None,
     say: Callable[[str], None],
 ) -> dict[str, Any]:
-    """What the worker tells of the scene; the arrays are in `scratch`."""
+    """The worker's description of the scene; the arrays are in `scratch`."""
     asked = []
     for i, receiver in enumerate(receivers):
         per_loop = None
@@ -124,16 +124,16 @@ def _ask(
             if event["event"] == "mesh":
                 told = event
     if told is None:
-        raise BakeError("expected the scene's triangles from Blender, found none; run again, and look at the scene if it happens twice")
+        raise BakeError("expected the scene's triangles from Blender, found none; run again, and check the scene if it happens again")
     return told
 
 
 class _Writer:
-    """Puts the document together: a node and a mesh for each object, a primitive for each look and set of attributes."""
+    """Builds the document: a node and a mesh for each object, a primitive for each look and set of attributes."""
 
     def __init__(self, told: dict[str, Any], scratch: Path, albedo: Float32[ndarray, "H W 3"] | None) -> None:
         self.document = Glb({"asset": {"version": "2.0", "generator": "srbf mesh"}})
-        self._looks, self._albedo = told["looks"], albedo
+        self._looks, self._albedo = told["materials"], albedo
         self._materials: dict[tuple[Any, ...], int] = {}
         self._picture: int | None = None
         self._triangles = 0
@@ -154,14 +154,14 @@ class _Writer:
         return SceneMesh(self._objects, self._triangles, len(self._materials), size, tuple(self._receivers), camera)
 
     def _object(self, name: str, parts: list[dict[str, Any]], scratch: Path) -> int:
-        alike: dict[tuple[Any, ...], list[Float32[ndarray, "n C"]]] = {}
+        grouped: dict[tuple[Any, ...], list[Float32[ndarray, "n C"]]] = {}
         for part in parts:
-            key = (part["look"], tuple((column, int(width)) for column, width in part["columns"]))
-            alike.setdefault(key, []).append(np.load(scratch / part["file"]))
-        corners = np.concatenate([rows[:, :3] for group in alike.values() for rows in group]).reshape(-1, 3, 3)
-        glass = any(self._looks[look]["transmission"] > 0 for look, _ in alike)
+            key = (part["material"], tuple((column, int(width)) for column, width in part["columns"]))
+            grouped.setdefault(key, []).append(np.load(scratch / part["file"]))
+        corners = np.concatenate([rows[:, :3] for group in grouped.values() for rows in group]).reshape(-1, 3, 3)
+        glass = any(self._looks[look]["transmission"] > 0 for look, _ in grouped)
         thickness = mean_thickness(corners) if glass else 0.0
-        primitives = [self._primitive(look, columns, np.concatenate(rows), thickness) for (look, columns), rows in alike.items()]
+        primitives = [self._primitive(look, columns, np.concatenate(rows), thickness) for (look, columns), rows in grouped.items()]
         if any("TEXCOORD_1" in primitive["attributes"] for primitive in primitives):
             self._receivers.append(name)
         return self.document.add("nodes", {"name": name, "mesh": self.document.add("meshes", {"name": name, "primitives": primitives})})
@@ -220,7 +220,7 @@ class _Writer:
         return self._picture
 
     def _view(self, camera: dict[str, Any]) -> int:
-        """The scene's camera as a node: Blender's cameras look along -z with y up, as glTF's do."""
+        """The scene's camera as a node: Blender's cameras look along -z with y up, as in glTF."""
         near = max(float(camera["near"]), 0.0)
         reach = {"znear": near, "zfar": max(float(camera["far"]), near + 1e-3)}
         if "yfov" in camera:

@@ -1,4 +1,4 @@
-"""What a target is told, and what it answers."""
+"""Settings and results of a target."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from srbf.errors import InputError
 
 @dataclass(frozen=True)
 class Settings:
-    """`encoding` of the layers, the target's own unless given; mip `levels`, the full size included, `auto`: as many as charts allow.
+    """`encoding` of the layers, by default the target's own; mip `levels`, the full size included, `auto`: as many as charts allow.
 
     `mesh`: a .glb whose lightmap UV set an engine is to use, for targets that write a mesh.
     """
@@ -28,7 +28,7 @@ PLAIN = Settings()
 
 @dataclass(frozen=True)
 class Written:
-    """What is worth saying of a folder that a target has filled, a line each."""
+    """Notes on a folder that a target has filled, one line each."""
 
     notes: tuple[str, ...] = ()
 
@@ -37,6 +37,6 @@ Target = Callable[[Asset, Path, Settings], Written]  # fills an existing empty f
 
 
 def no_levels(settings: Settings, where: str) -> None:
-    """InputError where mip levels are asked of files that hold none."""
+    """InputError on mip levels for files that hold none."""
     if settings.levels not in ("auto", 0, 1):
-        raise InputError(f"expected no mip levels in {where}, found --levels {settings.levels}; export dds or ktx2")
+        raise InputError(f"expected no mip levels in {where}, found `levels={settings.levels}`; export dds or ktx2")

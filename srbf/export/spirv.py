@@ -34,7 +34,7 @@ def available() -> bool:
 
 
 def compile_stage(name: str, defines: Mapping[str, object]) -> bytes:
-    """A stage of the pack as SPIR-V for Vulkan, validated. Raises ShaderError with the compiler's words, MissingLibraryError."""
+    """A stage of the pack as SPIR-V for Vulkan, validated. Raises ShaderError with the compiler's message, MissingLibraryError."""
     source = resolve(f"stages/{name}", version="450", defines=defines)
     return compile_glsl(source, "vert" if name.endswith(".vert") else "frag")
 
@@ -51,7 +51,7 @@ def compile_glsl(source: ShaderSource, stage: Literal["vert", "frag"]) -> bytes:
 
 
 def compile_hlsl(text: str, stage: Literal["vert", "frag"] = "frag", entry: str = "main") -> bytes:
-    """HLSL as SPIR-V, validated. ShaderError with the compiler's words."""
+    """HLSL as SPIR-V, validated. ShaderError with the compiler's message."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "shader.hlsl"
         path.write_text(text, encoding="utf-8")
@@ -62,7 +62,7 @@ def compile_hlsl(text: str, stage: Literal["vert", "frag"] = "frag", entry: str 
 
 
 def cross_compile(code: bytes, language: Language) -> str:
-    """SPIR-V in another language. ShaderError with spirv-cross's words."""
+    """SPIR-V in another language. ShaderError with spirv-cross's message."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "shader.spv"
         path.write_bytes(code)

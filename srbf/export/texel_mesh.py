@@ -11,12 +11,12 @@ from srbf.arrays import Bool, Float32, Int
 from srbf.asset import Asset
 from srbf.errors import InputError
 
-LONGEST = 8.0  # of the median distance of neighbors: longer ones leap from one chart, or one side of an edge, to another
+LONGEST = 8.0  # of the median distance of neighbors: longer ones cross to another chart, or over an edge
 
 
 @dataclass(frozen=True, eq=False)
 class TexelMesh:
-    """V vertices in the asset's z-up frame with the lightmap's UV, v from the top down as glTF has it, and triangles by index."""
+    """V vertices in the asset's z-up frame with the lightmap's UV, v downwards as in glTF, and triangles by index."""
 
     positions: Float32[ndarray, "V 3"]
     normals: Float32[ndarray, "V 3"] | None
@@ -32,7 +32,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
     InputError without positions, and where no three texels are neighbors.
     """
     if "position" not in asset.images:
-        raise InputError("expected a position map to rebuild the mesh from, found none; give the mesh: --mesh FILE.glb")
+        raise InputError("expected a position map to rebuild the mesh from, found none; give a `mesh`, a .glb")
     covered, position = asset.covered, asset.images["position"]
     near = _near(covered, position)
     number = np.cumsum(covered.ravel()).reshape(covered.shape) - 1
@@ -48,7 +48,7 @@ def texel_mesh(asset: Asset) -> TexelMesh:
         found.append(quads[chosen][:, [a, b, c]])
     triangles = np.concatenate(found)
     if not len(triangles):
-        raise InputError("expected texels that are neighbors on the surface to rebuild the mesh from, found none; give it: --mesh FILE.glb")
+        raise InputError("expected texels that are neighbors on the surface to rebuild the mesh from, found none; give a `mesh`, a .glb")
     points = position[covered]
     normal = asset.images["normal"][covered] if "normal" in asset.images else None
     if normal is not None:

@@ -1,4 +1,4 @@
-"""`dds` and `ktx2`: all layers in one texture array, BC7 unless told, with their mip levels."""
+"""`dds` and `ktx2`: all layers in one texture array, BC7 by default, with their mip levels."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ from srbf.export.rounding import blocks_alone, blocks_together
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.io.containers import write_texture_array
 from srbf.io.containers.blocks import BlockFormat
-from srbf.io.containers.texture_array import TexelFormat, TextureArray
+from srbf.io.containers.dds_header import TexelFormat
+from srbf.io.containers.texture_array import TextureArray
 
-MOST_LAYERS = 2048  # of a texture array in Vulkan, Direct3D and WebGL; WebGPU promises 256
+MOST_LAYERS = 2048  # of a texture array in Vulkan, Direct3D and WebGL; WebGPU guarantees 256
 WEBGPU_LAYERS = 256
 
 
 def write(suffix: str, asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill `folder` with the asset, its layers in one file `maps` or `planes` named .dds or .ktx2.
 
-    InputError on BC1 for scalar planes, which are four to a layer, and on levels that an asset cannot have.
+    InputError on BC1 for scalar coefficient maps, which are four per layer, and on impossible levels.
     """
     form = settings.encoding or "bc7"
     if form == "float":
-        raise InputError(f"expected --encoding {', '.join(get_args(TexelFormat))} for a texture array, found {form}")
-    if form == "bc1" and asset.method != "relighting-map":
+        raise InputError(f"expected `encoding` {', '.join(get_args(TexelFormat))} for a texture array, found {form}")
+    if form == "bc1" and asset.stored.shape[3] > 3:
         raise InputError(
-            f"expected bc7 for scalar planes, four to a layer, found bc1, which has three channels; export {asset.method} as bc7"
+            f"expected bc7 for scalar coefficient maps, four per layer, found bc1, which has three channels; export {asset.method} as bc7"
         )
     if len(asset.stored) > MOST_LAYERS:
         raise InputError(f"expected at most {MOST_LAYERS} layers of a texture array, found {len(asset.stored)}; fit with fewer maps")
@@ -58,9 +59,9 @@ def write(suffix: str, asset: Asset, folder: Path, settings: Settings = PLAIN) -
     stored = texture.pixels()[..., : scale.shape[1]]
     with_layers(asset, suffix[1:], stored, scale, bias, entries).write(folder, layers=False)
     if form.startswith("bc") and (asset.width % 4 or asset.height % 4):
-        notes.append(f"{asset.width}x{asset.height} texels end within a block of 4 x 4: Direct3D and WebGPU take multiples of 4 alone")
+        notes.append(f"{asset.width}x{asset.height} texels end within a block of 4 x 4: Direct3D and WebGPU require multiples of 4")
     if len(asset.stored) > WEBGPU_LAYERS:
-        notes.append(f"{len(asset.stored)} layers are more than the {WEBGPU_LAYERS} that every WebGPU has")
+        notes.append(f"{len(asset.stored)} layers exceed the {WEBGPU_LAYERS} that WebGPU guarantees")
     return Written(tuple(notes))
 
 
@@ -100,18 +101,18 @@ def _halves(values: Float32[ndarray, "N H W C"], scale: ndarray, bias: ndarray) 
 
 
 def _levels(asset: Asset, settings: Settings) -> tuple[int, list[str]]:
-    """How many levels, full size included, and what is to be said of them."""
+    """The number of levels, full size included, and notes on them."""
     clean = levels_without_bleeding(asset)
     most = max(asset.width, asset.height).bit_length()
     if settings.levels == "auto":
-        clustered = "no mip levels: scalars of different clusters have no mean; relight to a texture and filter that"
+        clustered = "no mip levels: components of different clusters have no mean; relight to a texture and filter that"
         return clean, [clustered] if "cluster_index" in asset.tables else []
     if not 0 <= settings.levels <= most:
-        raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found --levels {settings.levels}")
+        raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found `levels={settings.levels}`")
     levels = max(1, settings.levels)
     if levels > 1 and "cluster_index" in asset.tables:
         raise InputError(
-            "expected no mip levels of a clustered eigen map, whose scalars mean another thing in every cluster, found --levels "
-            f"{levels}; relight it to a texture and let the GPU filter that"
+            "expected no mip levels of a clustered eigen map, whose components differ in meaning between clusters, found "
+            f"`levels={levels}`; relight it to a texture and let the GPU filter that"
         )
     return levels, [f"from level {clean} on, charts share texels: {levels} levels where {clean} keep them apart"] if levels > clean else []

@@ -1,7 +1,7 @@
-"""The shader pack taken apart: its small GLSL as functions, constants, structs and comments, for the dialects' writers.
+"""Parses the shader pack: its GLSL subset as functions, constants, structs and comments, for the dialects' writers.
 
-A translation keeps names, comments and lines, so that what ships can be read beside the pack. It knows no list of files: whatever the
-pack holds is translated, and GLSL that a dialect has no word for is refused by name.
+A translation keeps names, comments and lines, so that it can be read beside the pack. There is no list of files: everything in the
+pack is translated, and GLSL without an equivalent in a dialect is refused by name.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from srbf.errors import ShaderError
-from srbf.gl.includes import shader_root
+from srbf.gl.includes import dependence_order, shader_root
 
 _TOKEN = re.compile(
     r"(?P<comment>//[^\n]*|/\*.*?\*/)|(?P<directive>^[ \t]*\#[^\n]*)|(?P<space>\s+)"
@@ -28,7 +28,7 @@ VECTORS = frozenset(f"{kind}vec{n}" for kind in ("", "i", "u", "b") for n in (2,
 MATRICES = frozenset({"mat2", "mat3", "mat4"})
 ASSIGNMENTS = frozenset({"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^="})
 SAMPLED_BY = frozenset({"textureLod", "textureGrad"})
-# What no dialect has a word for, or another meaning: the pack does without.
+# Without an equivalent in some dialect, or with another meaning there: the pack does not use them.
 UNTRANSLATABLE = frozenset(
     {"mod", "texture", "textureGather", "textureOffset", "dFdx", "dFdy", "discard", "while", "do", "switch", "uniform", "varying"}
     | {"lessThan", "lessThanEqual", "greaterThan", "greaterThanEqual", "equal", "notEqual", "not", "inout"}
@@ -45,7 +45,7 @@ class Token:
 
 @dataclass(frozen=True)
 class Group:
-    """What stands between a pair of brackets."""
+    """The content of a pair of brackets."""
 
     opening: str
     inside: tuple[Node, ...]
@@ -115,33 +115,15 @@ def library_paths(root: Path | None = None) -> list[str]:
 def pack_files(
     paths: Iterable[str], root: Path | None = None, prepare: Callable[[str, str], str] = lambda text, path: text
 ) -> list[PackFile]:
-    """The files and all that they include, each once, after what it includes; `prepare` (text, path) is asked in that order.
+    """The files and all that they include, each once, after what it includes; `prepare` (text, path) is called in that order.
 
-    ShaderError on a missing file or GLSL past the subset.
+    ShaderError on a missing file, a cycle, or GLSL outside the subset.
     """
-    base = shader_root() if root is None else root
-    found: dict[str, PackFile | None] = {}
-
-    def visit(path: str, origin: str) -> None:
-        if path in found:
-            return
-        found[path] = None
-        place = base / path
-        if not place.is_file():
-            raise ShaderError(f'{origin}: expected "{path}" in the shader pack at {base}, found no such file')
-        text = place.read_text(encoding="utf-8")
-        for match in re.finditer(r'^\s*#\s*include\s+"([^"]+)"', text, re.MULTILINE):
-            visit(match[1], path)
-        del found[path]
-        found[path] = parse(prepare(text, path), path)  # last, so that the order is that of dependence
-
-    for path in paths:
-        visit(path, "translation")
-    return [file for file in found.values() if file is not None]
+    return [parse(prepare(text, path), path) for path, text in dependence_order(paths, root).items()]
 
 
 def without(nodes: Sequence[Node], name: str) -> list[Node]:
-    """Nodes of a function's body without what `#ifdef name` adds there: as where `name` is never defined."""
+    """Nodes of a function's body as if `name` were never defined."""
     kept: list[Node] = []
     branch = ""
     for node in nodes:
@@ -156,7 +138,7 @@ def without(nodes: Sequence[Node], name: str) -> list[Node]:
 
 
 def parse(text: str, path: str) -> PackFile:
-    """A file of the pack as items; ShaderError on what is neither function, struct, constant, directive nor comment."""
+    """A file of the pack as items; ShaderError on anything but functions, structs, constants, directives and comments."""
     nodes = list(_grouped(iter(tokens(text)), None, path))
     items: list[Item] = []
     i = 0
@@ -176,7 +158,7 @@ def parse(text: str, path: str) -> PackFile:
 
 
 def tokens(text: str) -> list[Token]:
-    """GLSL as words; joined again they are the text."""
+    """GLSL as tokens; joined, they give the text."""
     return [Token(str(match.lastgroup), match[0]) for match in _TOKEN.finditer(text)]
 
 
@@ -220,7 +202,7 @@ def _grouped(source: Iterator[Token], closing: str | None, path: str) -> Iterato
                 raise ShaderError(f"{path}: expected brackets in pairs, found {token.text!r} where {closing!r} was open")
             return
         elif token.kind == "name" and token.text in UNTRANSLATABLE:
-            raise ShaderError(f"{path}: expected GLSL that every dialect has a word for, found {token.text}; write it another way")
+            raise ShaderError(f"{path}: expected GLSL with an equivalent in every dialect, found {token.text}; write it another way")
         else:
             yield token
     if closing is not None:

@@ -22,8 +22,8 @@ IMPORTED = "relit.srbf"
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `relit.srbf`, which Unity imports, `asset.json` with its images, `SrbfAsset.hlsl`, a sample shader, and the
-    code in `Srbf/`, which a project needs once. Half floats and floats are EXRs, an image a layer; bytes, BC7 and BC1 a DDS file with mip
-    levels.
+    code in `Srbf/`, which a project needs once. Half floats and floats are EXRs, one image per layer; bytes, BC7 and BC1 a DDS file
+    with mip levels.
 
     InputError on an asset that no shader relights.
     """
@@ -40,7 +40,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def unity_include(asset: Asset) -> str:
-    """`SrbfAsset.hlsl`: the asset's functions, what its quantity means in Unity's units, and Unity's own glue.
+    """`SrbfAsset.hlsl`: the asset's functions, its quantity in Unity's units, and the code for Unity.
 
     A light of intensity I gives a white Lambert surface that faces it I, where Blender's sun of strength I gives I / pi.
     """
@@ -48,6 +48,6 @@ def unity_include(asset: Asset) -> str:
     defines = [
         f"#define SRBF_UNITY_SCALE {math.pi if radiance else 1.0}  // {'radiance' if radiance else 'irradiance'} in Unity's units",
         f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)' if radiance else '(albedo)'}",
-        *(["#define SRBF_CLUSTERED"] if asset.method == "clustered-eigen-map" else []),
+        *(["#define SRBF_CLUSTERED"] if "cluster_index" in asset.tables else []),
     ]
     return asset_include(asset, pairs=True) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'

@@ -17,7 +17,7 @@ from srbf.io import files
 
 DATA = "images"
 SCRIPT = "import_srbf.py"
-# What the Custom node is given besides textures and places; the material parameter collection holds them by these names.
+# Inputs of the Custom node besides textures and positions; the material parameter collection holds them under these names.
 LIGHTS = {
     "SunDirection": (0.0, 0.0, 1.0, 0.0),  # towards the sun, Unreal's frame
     "SunColor": (0.0, 0.0, 0.0, 0.0),  # linear, lux
@@ -29,7 +29,7 @@ LIGHTS = {
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
-    """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` by a name of its own, `node.json`, the Custom node, and the
+    """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` under a unique name, `node.json`, the Custom node, and the
     editor script that imports all of it.
 
     InputError on an asset that no shader relights.
@@ -58,8 +58,8 @@ def custom_node(asset: Asset, name: str) -> dict[str, Any]:
     The result is what a surface sends out, to be added to the emissive color: of irradiance assets for a white surface, so that the
     material multiplies by its base color, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
     """
-    clustered = asset.method == "clustered-eigen-map"
-    textures = {"Table": asset.manifest["r_table" if asset.method == "relighting-map" else "w_table"]["file"]}
+    clustered = "cluster_index" in asset.tables
+    textures = {"Table": asset.manifest["r_table" if "r_table" in asset.tables else "w_table"]["file"]}
     if clustered:
         textures["Clusters"] = asset.manifest["cluster_index"]["file"]
     if "ambient" in asset.images:

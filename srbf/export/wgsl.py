@@ -1,4 +1,4 @@
-"""The shader pack as WGSL, for WebGPU: readable functions, one text an asset since WGSL has neither includes nor a preprocessor."""
+"""The shader pack as WGSL, for WebGPU: readable functions, one text per asset, since WGSL has neither includes nor a preprocessor."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ HEADING = """// SPDX-License-Identifier: MIT
 def module(paths: Iterable[str], defines: Mapping[str, object], root: Path | None = None) -> str:
     """The functions of some files of the pack, and of all that these include, as one WGSL text for one set of `defines`.
 
-    Raises ShaderError where a define is missing or WGSL has no word for something.
+    Raises ShaderError on a missing define, or GLSL without an equivalent in WGSL.
     """
     known = set(defines)
     pack = pack_files(paths, root, lambda text, path: preprocess(text, path, known, constant_of))
@@ -102,7 +102,7 @@ class WgslWriter(Writer):
 
     def __init__(self, pack: list[PackFile]) -> None:
         super().__init__(pack, TYPES, WORDS, RESERVED)
-        self.pointers: frozenset[str] = frozenset()  # the `out` parameters of the function at hand
+        self.pointers: frozenset[str] = frozenset()  # the `out` parameters of the current function
 
     def constant(self, item: Constant) -> str:
         return f"const {item.name}: {self.type(item.type)} = {self.expression(item.value)};"
@@ -129,7 +129,7 @@ class WgslWriter(Writer):
     def body(self, function: Function) -> str:
         changed = _assigned(function.body.inside)
         if fixed := changed & {parameter.name for parameter in function.parameters if not parameter.out}:
-            raise ShaderError(f"expected {function.name} to leave its parameters as they are, found {sorted(fixed)[0]} assigned")
+            raise ShaderError(f"expected {function.name} to leave its parameters unchanged, found {sorted(fixed)[0]} assigned")
         self.pointers = frozenset(parameter.name for parameter in function.parameters if parameter.out)
         text = self._statements(function.body.inside, changed)
         self.pointers = frozenset()
@@ -172,12 +172,12 @@ class WgslWriter(Writer):
         return f"{lead}select({no.strip()}, {yes.strip()}, {condition.strip()})"
 
     def _place(self, place: str) -> str:
-        """The place of an array's texel: WGSL takes the layer apart, as an integer."""
+        """The place of an array's texel: WGSL takes the layer separately, as an integer."""
         parts = re.fullmatch(r"vec3f\((.+), (?:f32\((.+)\))\)", place)
         return f"{parts[1]}, {parts[2]}" if parts else place
 
     def _statements(self, nodes: Sequence[Node], changed: frozenset[str]) -> str:
-        """A block's inside, a statement at a time."""
+        """A block's content, statement by statement."""
         out: list[str] = []
         i = 0
         while i < len(nodes):
@@ -198,7 +198,7 @@ class WgslWriter(Writer):
         return "".join(out)
 
     def _branch(self, nodes: Sequence[Node], i: int, changed: frozenset[str]) -> tuple[str, int]:
-        """`if`, `else` or `for` up to its block, which WGSL always asks for."""
+        """`if`, `else` or `for` up to its block, which WGSL always requires."""
         word = nodes[i]
         assert isinstance(word, Token)
         i += 1
@@ -247,19 +247,19 @@ class WgslWriter(Writer):
         if len(words) == 2:
             return f"{word} {self.name(name.text)}: {self.type(kind.text)}"
         if not is_sign(words[2], "=") or len(split(words, ",")) > 1:
-            raise ShaderError(f"expected one variable a declaration, found {render_plain(nodes).strip()!r}")
+            raise ShaderError(f"expected one variable per declaration, found {render_plain(nodes).strip()!r}")
         value = nodes[nodes.index(words[2]) + 1 :]
         return f"{word} {self.name(name.text)}: {self.type(kind.text)} ={self.expression(value)}"
 
 
 def _pointer(argument: str) -> str:
-    """A variable as its address; an `out` parameter that is handed on is one already."""
+    """A variable's address; an `out` parameter that is passed on is one already."""
     text = argument.strip()
     return argument.replace(text, text[2:-1] if text.startswith("(*") else "&" + text)
 
 
 def _texts(writer: WgslWriter) -> list[str]:
-    """Every file of a writer, the first line saying where it is from."""
+    """Every file of a writer; the first line names its source."""
     texts = [re.sub(r"\n{3,}", "\n\n", writer.file(file)) for file in writer.files]
     bodies = [text.replace("// SPDX-License-Identifier: MIT\n", "", 1).strip() for text in texts]
     return [f"// from glsl/{file.path}\n{body}\n" for file, body in zip(writer.files, bodies, strict=True)]

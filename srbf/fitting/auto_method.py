@@ -1,4 +1,4 @@
-"""Method, clusters and scalars for a number of bytes a texel, or for a number of decibels, by what they do to lights they did not see."""
+"""Choice of method and size for a number of bytes per texel, or of decibels, by the error on held-out lights."""
 
 from __future__ import annotations
 
@@ -12,27 +12,31 @@ from numpy import ndarray
 from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
-from srbf.encode.cross_validation import HeldOut
 from srbf.encode.light_function_fit import choose_functions, dense_centers
 from srbf.encode.model_selection import TexelSample
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
-from srbf.methods.clustered_eigen_map import MOST_CLUSTERS, ClusteredEigenMap
-from srbf.methods.eigen_map import EigenMap
+from srbf.methods.protocol import Method
+from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
-from srbf.sphere import domain_of
 
-Planes = EigenMap | ClusteredEigenMap
-
-DEFAULT_BUDGET = 16  # bytes a texel
+DEFAULT_BUDGET = 16  # bytes per texel
 LEAST_BUDGET = 4  # one image of four bytes
-MOST_COMPONENTS = 64
-CLUSTERS = (16, 64, 256)
-TEXELS_PER_CLUSTER = 64  # fewer would have functions, not planes, hold the picture
+MOST_SIZE = 68  # bytes per texel that are tried for a number of decibels
 TRIED_TEXELS = 1 << 13
 LEAST_LIGHTS = 8  # that a choice without validation lights needs
 WORTH = 0.2  # dB that more clusters or more bytes must bring to be chosen
+
+
+def check_budget(budget: int | None, psnr: float | None) -> None:
+    """InputError on a budget below LEAST_BUDGET, on a PSNR that is no number, or on both."""
+    if budget is not None and psnr is not None:
+        raise InputError("expected a `budget` or a `psnr`, found both")
+    if budget is not None and budget < LEAST_BUDGET:
+        raise InputError(f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, found {budget}")
+    if psnr is not None and not np.isfinite(psnr):
+        raise InputError(f"expected `psnr` in dB, found {psnr:g}")
 
 
 def within_budget(
@@ -41,34 +45,34 @@ def within_budget(
     psnr: float | None = None,
     say: Callable[[str], None] = lambda line: None,
     **settings: Any,
-) -> Planes:
-    """The eigen map, clustered or not, that does best on unseen lights of a texel sample: within `budget` bytes a texel, or with the
-    fewest bytes that reach `psnr` dB, or its best if none does. Planes are bytes.
+) -> Method:
+    """The method that does best on held-out lights of a texel sample: within `budget` bytes per texel, or with the fewest bytes that reach
+    `psnr` dB, or its best if none does.
 
     Error is that of the validation lights. Without them it is estimated at each train light: what the candidate loses there, and what
-    every candidate misses between the lights, told by leaving that light out (`_between_lights`). Of near equals (WORTH) the one of
-    fewer clusters is taken.
-    `settings` go to the method. InputError on a budget below LEAST_BUDGET, or on both budget and psnr.
+    every candidate misses between the lights, measured by leaving that light out (`_between_lights`). Of near equals (WORTH) the one with
+    fewer light functions is taken.
+    With fewer than LEAST_LIGHTS train lights and no validation lights the simplest is taken. `settings` go to the method. InputError on a
+    budget below LEAST_BUDGET, or on both budget and psnr.
     """
-    if budget is not None and psnr is not None:
-        raise InputError("expected --budget or --psnr, found both")
-    if budget is not None and budget < LEAST_BUDGET:
-        raise InputError(f"expected a --budget of at least {LEAST_BUDGET} bytes a texel, found {budget}")
-    if psnr is not None and not np.isfinite(psnr):
-        raise InputError(f"expected --psnr in dB, found {psnr:g}")
+    check_budget(budget, psnr)
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
-    trial = _without_holdout(capture.kept(texels))
+    trial = capture.load(texels)
+    trial = trial.with_roles([None if light.role == "holdout" else light.role for light in trial.lights])
+    size, numbers = budget or DEFAULT_BUDGET, 3 * len(trial.indices("train"))
+    if not trial.indices("validation") and len(trial.indices("train")) < LEAST_LIGHTS:
+        simplest = next(iter(_candidates(size, len(covered), numbers)))
+        say(f"fewer than {LEAST_LIGHTS} train lights and no validation lights: too few to compare methods by; taking {simplest}")
+        return replace(simplest, **settings)  # type: ignore[type-var]
     missed = None if trial.indices("validation") else _between_lights(trial)
-    share = len(covered) / max(1, len(texels))
-    sizes = [budget or DEFAULT_BUDGET] if psnr is None else range(LEAST_BUDGET, MOST_COMPONENTS + 5, 4)
-    best: tuple[float, Planes] | None = None
-    for size in sizes:
-        for method in _candidates(size, len(covered), 3 * len(trial.indices("train"))):
-            tried = method
-            if isinstance(method, ClusteredEigenMap):  # as many texels a cluster as there will be
-                tried = replace(method, clusters=max(2, int(np.ceil(method.clusters / share))))
-            reached = _reached(replace(tried, **settings).encode(trial), trial, missed)
+    ratio = len(covered) / max(1, len(texels))
+    sizes = [size] if psnr is None else range(LEAST_BUDGET, MOST_SIZE + 1, 4)
+    best: tuple[float, Method] | None = None
+    for tried_size in sizes:
+        for method in _candidates(tried_size, len(covered), numbers):
+            tried = method.on_sample(ratio)  # as many texels per cluster as there will be
+            reached = _reached(replace(tried, **settings).encode(trial), trial, missed)  # type: ignore[type-var]
             if best is None or reached > best[0] + WORTH:
                 best = (reached, method)
         assert best is not None, "no candidate fits"
@@ -77,29 +81,15 @@ def within_budget(
     assert best is not None, "no candidate fits"
     reached, method = best
     if psnr is not None and reached < psnr:
-        say(f"expected {psnr:g} dB on unseen lights of a sample, found {reached:.1f} at most; taking that")
-    clusters = f"{method.clusters} clusters of " if isinstance(method, ClusteredEigenMap) else ""
-    say(f"chose {clusters}{method.scalars} scalars as bytes")
-    return replace(method, **settings)
+        say(f"expected {psnr:g} dB on held-out lights of a sample, found {reached:.1f} at most; taking that")
+    say(f"chose {method}")
+    return replace(method, **settings)  # type: ignore[type-var]
 
 
-def _candidates(size: int, texels: int, most: int) -> Iterable[Planes]:
-    """What `size` bytes a texel can hold, fewest light functions first."""
-    if size >= 4:
-        yield EigenMap(scalars=min(size // 4 * 4, MOST_COMPONENTS, most), encoding="uint8")
-    scalars = min((size - 1) // 4 * 4, MOST_COMPONENTS, most)
-    if scalars >= 1:
-        for clusters in CLUSTERS:
-            if clusters * TEXELS_PER_CLUSTER <= texels and clusters <= MOST_CLUSTERS:
-                yield ClusteredEigenMap(clusters=clusters, scalars=scalars, encoding="uint8")
-
-
-def _without_holdout(capture: Capture) -> Capture:
-    """The capture without what no decision may see. InputError where that leaves too few lights."""
-    if not capture.indices("validation") and len(capture.indices("train")) < LEAST_LIGHTS:
-        found = len(capture.indices("train"))
-        raise InputError(f"expected validation lights, or at least {LEAST_LIGHTS} train lights, to choose a method by; found {found}")
-    return capture.with_roles([None if light.role == "holdout" else light.role for light in capture.lights])
+def _candidates(size: int, texels: int, numbers: int) -> Iterable[Method]:
+    """What `size` bytes per texel can hold, fewest light functions first."""
+    for method in all_methods():
+        yield from method.candidates(size, texels, numbers)
 
 
 def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
@@ -109,11 +99,11 @@ def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
     grows with that distance, so its square is divided by four.
     """
     sample = TexelSample.of(capture, share=1.0)
-    lights = sample.directions
-    centers = dense_centers(lights, domain_of(lights))
+    lights = sample.coordinates
+    centers = dense_centers(lights, sample.domain)
     model = choose_functions(sample, centers)
     path = KernelPath(model.kernel.between(lights, lights, centers))
-    return HeldOut.of(sample.gram, lights, sample.train).single(path, model.ridge) / 4
+    return sample.held_out().single(path, model.ridge) / 4
 
 
 def _reached(asset: Asset, capture: Capture, missed: Float64[ndarray, " L"] | None) -> float:

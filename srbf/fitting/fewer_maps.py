@@ -1,86 +1,25 @@
-"""Fewer maps out of many: the article's trade of quality for memory, after the fit and without its capture."""
+"""An asset of fewer maps, or components, after the fit and without its capture."""
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-from numpy import ndarray
-
-from srbf.arrays import Float64
-from srbf.asset import Asset, layer_entries
-from srbf.basis.gaussian import GaussianBasis, r_table, spread_of
-from srbf.encode.quantization import quantize, quantize_together
+from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.sphere import all_around, point_set
-
-SPREADS = (0.8, 1.0, 1.25, 1.6, 2.0)  # of the mean distance between the centers that are kept
-WIDEST = 1.0  # rad: past it the R table has a cusp
-FAINT = 1e-6  # of the Gram matrix's mean diagonal: added, as Gaussians of geodesic distance can be all but dependent
-PLANE_CHANNELS = 4
+from srbf.methods import method_of
 
 
 def keep(asset: Asset, count: int, encoding: Encoding | None = None) -> Asset:
-    """The asset with `count` maps, or scalars of an eigen map, as near as they come over the captured domain.
+    """The asset with `count` maps, or components, as near as they come over the captured domain; in its own encoding unless given.
 
-    Relighting maps: Gaussians are not orthogonal, so maps are not dropped. The sum of K Gaussians is projected on `count` others
-    (Fibonacci centers): c' = G'^-1 H c with G'_ij = int R'_i R'_j and H_ij = int R'_i R_j, their spread the one that loses least.
-    Eigen maps: planes are orthogonal and in order, the last are dropped. `encoding`: the asset's own unless given.
-    InputError on clustered eigen maps and baselines, and on a count above the asset's. The error by role, measured for more, is left out.
+    InputError where the method cannot (clustered eigen maps, baselines), and on a count above the asset's. The error by role was measured
+    for more: it is left out.
     """
-    if asset.method not in ("relighting-map", "eigen-map"):
+    method = method_of(asset)
+    have = method.reducible_from(asset)
+    if have is None:
         raise InputError(f"expected relighting maps or an eigen map to keep fewer of, found {asset.method}; fit again with fewer")
-    have = asset.k if asset.method == "relighting-map" else asset.scalars
     if not 1 <= count <= have:
-        raise InputError(f"expected to keep 1 to {have} of the asset's {have}, found --keep {count}")
+        raise InputError(f"expected `count` of 1 to {have}, as many as the asset has, found {count}")
     manifest = {key: value for key, value in asset.manifest.items() if key not in ("error", "sha256")}
     manifest["source"] = {**manifest.get("source", {}), "kept": {"of": have}}
-    return (_fewer_maps if asset.method == "relighting-map" else _fewer_planes)(asset, manifest, count, encoding or asset.held)
-
-
-def _fewer_maps(asset: Asset, manifest: dict[str, Any], count: int, encoding: Encoding) -> Asset:
-    directions = all_around(asset.domain)
-    coefficients = asset.coefficients()
-    flat = coefficients.reshape(asset.k, -1)
-    before = asset.basis.evaluate(directions)
-    energy = (flat @ flat.T).astype(np.float64)
-    centers = point_set("fibonacci", count, asset.domain)
-    best: tuple[float, GaussianBasis, Float64[ndarray, "k K"]] | None = None
-    for factor in SPREADS:
-        basis = GaussianBasis(centers, min(spread_of(centers, "mean") * factor, WIDEST))
-        after = basis.evaluate(directions)
-        gram = after.T @ after
-        projection = np.linalg.solve(gram + FAINT * np.trace(gram) / count * np.eye(count), after.T @ before)
-        residual: np.ndarray = before - after @ projection  # (M, K): of each old Gaussian
-        lost = float(np.einsum("mi,ij,mj->", residual, energy, residual, optimize=True))
-        if best is None or lost < best[0]:
-            best = (lost, basis, projection)
-    assert best is not None
-    lost, basis, projection = best
-    total = float(np.einsum("mi,ij,mj->", before, energy, before, optimize=True))
-    kept = (projection.astype(np.float32) @ flat).reshape(count, *coefficients.shape[1:])
-    stored, scale, bias = quantize_together(kept, basis.evaluate(directions)) if encoding == "uint8" else quantize(kept, encoding)
-    table = r_table(basis.spread)
-    manifest["maps"] = layer_entries("map", encoding, scale, bias)
-    manifest["basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spread": basis.spread}
-    manifest["r_table"] = {"file": "r_table.exr", "size": len(table)}
-    manifest["source"]["kept"]["relative_residual"] = float(np.sqrt(lost / total)) if total > 0 else 0.0
-    return Asset(manifest, stored, scale, bias, {"r_table": table}, asset.images, asset.scene)
-
-
-def _fewer_planes(asset: Asset, manifest: dict[str, Any], count: int, encoding: Encoding) -> Asset:
-    images = -(-count // PLANE_CHANNELS)
-    layers = asset.coefficients()[:images].copy()
-    unused = range(count % PLANE_CHANNELS or PLANE_CHANNELS, PLANE_CHANNELS)
-    layers[-1][..., unused] = 0
-    stored, scale, bias = quantize(layers, encoding)
-    scale[-1, unused], bias[-1, unused] = 0, 0
-    size, columns = asset.manifest["w_table"]["size"], asset.manifest["w_table"]["columns"]
-    rows = -(-(count + 1) // columns)  # whole rows of tiles
-    table = asset.tables["w_table"][: rows * size]
-    manifest["scalars"] = count
-    manifest["planes"] = layer_entries("plane", encoding, scale, bias)
-    manifest["light_basis"] = {**asset.manifest["light_basis"], "spreads": asset.manifest["light_basis"]["spreads"][: count + 1]}
-    tables = {"light_coefficients": asset.tables["light_coefficients"][: count + 1], "w_table": table}
-    return Asset(manifest, stored, scale, bias, tables, asset.images, asset.scene)
+    return method.reduced(asset, manifest, count, encoding or asset.held)

@@ -1,121 +1,136 @@
-"""From what a user asks for to a method with its settings: by name, by bytes a texel, or by decibels."""
+"""From what a user asks for to a method with its settings: by name, by bytes per texel, or by decibels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from srbf.asset import Asset
-from srbf.capture import Capture, Look
+from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
-from srbf.fitting.auto_method import DEFAULT_BUDGET, Planes, within_budget
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap
-from srbf.methods.eigen_map import EigenMap
-from srbf.methods.relighting_map import RelightingMap, Tiles
+from srbf.fitting.auto_method import check_budget, within_budget
+from srbf.light_domain import domain_of_capture
+from srbf.methods.protocol import QUIET, FitRun, Method
+from srbf.registry import all_methods, method_named, method_names
 
-__all__ = ["DEFAULT_BUDGET", "DEFAULT_METHOD", "encode", "method_for", "method_of", "more_maps_than_lights", "settings_of"]
-
-DEFAULT_METHOD = "relighting-map"
-
-CLASSES: dict[str, type[RelightingMap] | type[EigenMap] | type[ClusteredEigenMap]] = {
-    "relighting-map": RelightingMap,
-    "eigen-map": EigenMap,
-    "clustered-eigen-map": ClusteredEigenMap,
-}
-OF_METHOD = {
-    "relighting-map": {"k", "basis", "centers", "encoding"},
-    "eigen-map": {"scalars", "weighting", "encoding"},
-    "clustered-eigen-map": {"scalars", "clusters", "encoding"},
-    "auto": {"budget", "psnr"},
-}
+AUTO = "auto"
+BUDGET_SETTINGS = ("budget", "psnr")  # of a choice
 
 
-IMPLIED_BY = (  # the first that was given names the method
-    ("auto", ("budget", "psnr")),
-    ("relighting-map", ("k", "basis", "centers")),
-    ("clustered-eigen-map", ("clusters",)),
-    ("eigen-map", ("scalars", "weighting")),
-)
+def fit(
+    capture: Capture,
+    method: str | Method | None = None,
+    *,
+    stitch: bool = True,
+    run: FitRun = QUIET,
+    say: Callable[[str], None] = lambda line: None,
+    **settings: Any,
+) -> Asset:
+    """The asset of a capture: its train lights compressed by a method.
 
+    Parameters
+    ----------
+    capture
+        What `Capture.open` reads.
+    method
+        `relighting-map`, `eigen-map`, `clustered-eigen-map`, or one with its settings, such as `RelightingMap(k=25)`. By default what the
+        settings imply (`k` relighting maps, `components` an eigen map, `clusters` a clustered one), and without those `auto`: the best
+        within `budget` bytes per texel (16), or with the fewest bytes that reach `psnr` dB on held-out lights of a sample.
+    stitch
+        Close the seams of the UV layer, where the capture has any.
+    run
+        What to report progress to.
+    say
+        Called with a line on what was chosen.
+    **settings
+        Of the method.
 
-def method_of(method: str | None, given: dict[str, Any]) -> str:
-    """The method asked for, else the one that has the settings that were `given` (None: not), else the default."""
-    if method is not None:
-        return method
-    return next((name for name, settings in IMPLIED_BY if any(given.get(s) is not None for s in settings)), DEFAULT_METHOD)
+    Returns
+    -------
+    Asset
+        In memory; `Asset.save` writes it.
 
+    Raises
+    ------
+    InputError
+        On a setting that the method does not have, on values out of range, and on a capture without train lights or with lights that
+        the method cannot fit.
 
-def settings_of(method: str, given: dict[str, Any], domain: str, spread: str, ridge: str) -> dict[str, Any]:
-    """The settings of `method` out of what was `given` (None: not); InputError on one that it does not have."""
-    settings = {name: value for name, value in given.items() if value is not None}
-    for name in settings:
-        if name not in OF_METHOD[method]:
-            others = [other for other, names in OF_METHOD.items() if name in names]
-            flag = "-k" if name == "k" else f"--{name}"
-            raise InputError(f"expected {flag} with --method {' or '.join(others)}, found it with --method {method}")
-    settings |= {"domain": domain, "spread": _spread(spread, method), "ridge": _number("ridge", ridge)}
-    return settings
+    Examples
+    --------
+    >>> fit(capture, k=9).k
+    9
+    >>> fit(capture, budget=8).bytes_per_texel()["directional"] <= 8
+    True
+    """
+    if isinstance(method, Method):
+        if settings:
+            raise InputError(f"expected settings within the method, found {', '.join(settings)} beside {method.name}")
+        return encode(method, capture, run, stitch)
+    return encode(method_for(capture, method, settings, say), capture, run, stitch)
 
 
 def method_for(
-    capture: Capture, method: str, settings: dict[str, Any], say: Callable[[str], None] = lambda line: None
-) -> RelightingMap | Planes:
-    """The method with its settings; `auto` tries what fits on a sample of the capture. InputError where its lights are not directional."""
-    capture.require_directional(f"--method {method}")
-    if settings.get("domain") == "hemisphere":
-        _require_above(capture, "--domain hemisphere")
-    if settings.get("basis") == "hemispherical-harmonics":
-        _require_above(capture, "--basis hemispherical-harmonics")
-    if method == "auto":
+    capture: Capture, method: str | None = None, settings: dict[str, Any] | None = None, say: Callable[[str], None] = lambda line: None
+) -> Method:
+    """The method with its settings; `auto`, the default, tries what fits into `budget` or reaches `psnr` on a sample of the capture.
+
+    Without a `method` the settings imply it: `k` relighting maps, `components` an eigen map, `clusters` a clustered one.
+    InputError on a setting that the method does not have, on values out of range, and on a capture whose lights it cannot fit.
+    """
+    settings = {} if settings is None else settings
+    name = check_settings(method, settings)
+    if name == AUTO:
         return within_budget(capture, say=say, **settings)
-    return CLASSES[method](**settings)
+    chosen = method_named(name)
+    kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
+    if kind not in chosen.domains:
+        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}")
+    return chosen(**settings)
 
 
-def more_maps_than_lights(chosen: RelightingMap | Planes, capture: Capture) -> str | None:
-    """A caution where a relighting map has more maps than the capture has train lights: the ridge alone decides between solutions."""
-    lights = len(capture.indices("train"))
-    if not isinstance(chosen, RelightingMap) or chosen.k <= lights:
-        return None
-    return (
-        f"caution: {chosen.k} maps of {lights} train lights hold more than was seen; more photographs, or -k {lights} and fewer, cost less"
-    )
+def check_settings(method: str | None, settings: dict[str, Any]) -> str:
+    """The method's name, given or implied. InputError on a setting that it does not have, and on a value out of range."""
+    name = implied_method(settings) if method is None else method
+    if name == AUTO:
+        _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
+        check_budget(settings.get("budget"), settings.get("psnr"))
+    else:
+        _check_known(name, settings, method_named(name).settings())
+        method_named(name)(**settings)
+    return name
 
 
-def encode(
-    chosen: RelightingMap | Planes,
-    capture: Capture,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-    look: Look = lambda row, image: None,
-    stitched: bool = True,
-    tiles: Tiles | None = None,
-) -> Asset:
-    """The asset of a method, the capture's UV seams closed where it has any and `stitched` says so; by `tiles` a relighting map."""
-    stitch = Stitch.of(capture) if stitched else None
-    if isinstance(chosen, RelightingMap):
-        return chosen.encode(capture, progress, look, stitch, tiles)
-    if tiles is not None:
-        raise InputError("expected a relighting map to be fitted by tiles, found another method")
-    return chosen.encode(capture, progress, look, stitch)
+def implied_method(settings: dict[str, Any]) -> str:
+    """The method that the settings are of, the most special first; `auto` where they name none."""
+    if any(name in settings for name in BUDGET_SETTINGS):
+        return AUTO
+    return next((m.name for m in reversed(all_methods()) if any(name in settings for name in m.implied_by)), AUTO)
 
 
-def _require_above(capture: Capture, flags: str) -> None:
-    """InputError where all train lights are below the hemisphere that `flags` ask for."""
-    heights = capture.directions(capture.indices("train"))[:, 2]
-    if len(heights) and (heights <= 0).all():
-        raise InputError(f"expected train lights above the horizon (z > 0) for {flags}, found all {len(heights)} below; leave it out")
+def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool = True) -> Asset:
+    """The asset of a method, the capture's UV seams closed where it has any and `stitch` says so.
+
+    InputError on `run.solve_rows` with a method whose rows are not independent.
+    """
+    if run.solve_rows is not None and not method.rows_are_independent:
+        able = " or ".join(other.name for other in all_methods() if other.rows_are_independent)
+        raise InputError(f"expected the method {able} to be fitted by blocks of rows, found {method.name}")
+    return method.encode(capture, replace(run, stitch=Stitch.of(capture) if stitch else None))
 
 
-def _spread(text: str, method: str) -> Any:
-    if method == "relighting-map" and text in ("mean", "min"):
-        return text
-    return _number("spread", text, ", mean, min" if method == "relighting-map" else "")
+def _shared_settings() -> set[str]:
+    """What `auto` hands on: settings that every candidate has."""
+    candidates = [m for m in all_methods() if any(True for _ in m.candidates(1 << 10, 1 << 20, 1 << 10))]
+    return set.intersection(*(set(m.settings()) for m in candidates)) - {"components", "encoding"}
 
 
-def _number(name: str, text: str, words: str = "") -> Any:
-    if text == "auto":
-        return text
-    try:
-        return float(text)
-    except ValueError as error:
-        raise InputError(f"expected --{name} auto{words} or a number, found {text!r}") from error
+def _check_known(name: str, settings: dict[str, Any], known: Any) -> None:
+    for setting in settings:
+        if setting not in known:
+            owners = [AUTO] if setting in BUDGET_SETTINGS else [m.name for m in all_methods() if setting in m.settings()]
+            if not owners:
+                raise InputError(f"expected settings of {', '.join((*method_names(), AUTO))}, found {setting!r}")
+            raise InputError(f"`{setting}` applies only to method {' or '.join(owners)}, found it with method {name}")

@@ -1,4 +1,4 @@
-"""A headless OpenGL 3.3 context, what it can hold, and programs compiled on it; nothing outside srbf.gl imports moderngl."""
+"""A headless OpenGL 3.3 context, its limits, and programs compiled on it; nothing outside srbf.gl imports moderngl."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EGL_LIBRARIES: tuple[dict[str, str], ...] = ({}, {"libgl": "libGL.so.1", "libegl
 
 @dataclass(frozen=True)
 class Limits:
-    """What a context can hold: texels a side, layers an array, texture units, vec4 uniforms of a fragment shader; and if it is software."""
+    """Limits of a context: texels per side, layers per array, texture units, vec4 uniforms of a fragment shader; whether it is software."""
 
     texture_size: int
     array_layers: int
@@ -43,7 +43,7 @@ class Limits:
 def create_context() -> moderngl.Context:
     """A context without a window: EGL on Linux, the system's own elsewhere. The caller releases it.
 
-    Raises MissingLibraryError without moderngl, ShaderError where no OpenGL 3.3 can be had.
+    Raises MissingLibraryError without moderngl, ShaderError where OpenGL 3.3 is unavailable.
     """
     library = _moderngl()
     attempts: list[dict[str, Any]] = [{}]
@@ -63,7 +63,7 @@ def create_context() -> moderngl.Context:
 
 
 def compile_program(context: moderngl.Context, vertex: ShaderSource, fragment: ShaderSource) -> moderngl.Program:
-    """A linked program; ShaderError with the driver's complaints put as file:line."""
+    """A linked program; ShaderError with the driver's messages as file:line."""
     library = _moderngl()
     try:
         return context.program(vertex_shader=vertex.text, fragment_shader=fragment.text)

@@ -1,4 +1,4 @@
-"""What a camera sees, out of its depth buffer: P = E - d V / |V|, d the ray's length [Wong2005, "Point-Source Shader"].
+"""What a camera sees, from its depth buffer: P = E - d V / |V|, d the ray's length [Wong2005, "Point-Source Shader"].
 
 Matrices are as OpenGL has them: column vectors, a camera looks along its -z, x to the right and y up; clip w is -z or, orthographic, 1.
 """
@@ -19,7 +19,7 @@ FARTHEST = 1e9  # meters: where a depth buffer holds nothing
 @dataclass(frozen=True, eq=False)
 class DepthCamera:
     """A camera as the shaders' SrbfCamera: `center`, `across` and `up` lead from the eye to the picture's middle, from there to its right
-    edge and to its upper one, 1 m ahead in perspective, sideways alone where the view is orthographic.
+    edge and to its upper one, 1 m ahead in perspective, sideways only where the view is orthographic.
 
     All in the asset's frame, meters; `forward` is unit, `depth_terms` are `depth_terms` of the projection.
     """
@@ -86,7 +86,7 @@ def eye_depth(stored: Float[ndarray, "*shape"], terms: Float64[ndarray, " 4"]) -
 def ray_length(
     depth: Float[ndarray, "*shape"], to_eye: Float[ndarray, "*shape 3"], forward: Float[ndarray, " 3"]
 ) -> Float64[ndarray, "*shape"]:
-    """Distance from the eye of what lies at a depth along the view axis: depth over the cosine between ray and axis."""
+    """Distance from the eye to a point at a depth along the view axis: depth over the cosine between ray and axis."""
     return depth * np.linalg.norm(to_eye, axis=-1) / -(to_eye @ np.asarray(forward, np.float64))
 
 
@@ -98,7 +98,7 @@ def point_on_ray(
 
 
 def receivers(stored: Float[ndarray, "*shape"], place: Float[ndarray, "*shape 2"], camera: DepthCamera) -> Float64[ndarray, "*shape 3"]:
-    """World positions at places of a picture, (-1, -1) its lower left corner, out of samples of its depth buffer."""
+    """World positions at places of a picture, (-1, -1) its lower left corner, from samples of its depth buffer."""
     sideways = camera.center + place[..., :1] * camera.across + place[..., 1:] * camera.up
     eye = camera.eye + (sideways if camera.orthographic else 0 * sideways)
     to_eye = np.broadcast_to(-camera.forward, sideways.shape) if camera.orthographic else -sideways

@@ -1,4 +1,4 @@
-"""Environment lights integrated on the GPU: the weights that `projected_weights` has of them, left in a texture."""
+"""Environment lights integrated on the GPU: their projected weights, in a texture."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
 SPHERE, HEMISPHERE, TURNED_HEMISPHERE = range(3)  # SRBF_SPHERE, ...
 
 
-class Sky:
-    """Weights of environments for one asset, by shaders; the asset's maps, or light functions, are a row a cluster.
+class EnvironmentWeights:
+    """Weights of environments for one asset, by shaders: one texel per map or light function, one row per cluster.
 
-    Relighting maps read the table, as numpy does; light functions are exact: from their basis, not from the w table.
+    Relighting maps read the table, as numpy does; light functions are computed from their basis, not from the w table.
     """
 
     def __init__(self, context: moderngl.Context, asset: Asset, programs: Programs, textures: AssetTextures, resources: ExitStack) -> None:
         self._context, self._asset, self._programs, self._textures = context, asset, programs, textures
         self._resources = resources
-        self._maps = asset.method == "relighting-map"
+        self._maps = "r_table" in asset.tables
         if self._maps:
             basis = asset.basis
             self._size = (asset.k, 1)
@@ -39,7 +39,7 @@ class Sky:
         else:
             functions = asset.light_functions
             spreads, which = np.unique(functions.spreads, return_inverse=True)
-            self._size = (asset.scalars + 1, asset.clusters)
+            self._size = (asset.components + 1, asset.clusters)
             centers = np.concatenate([np.pad(functions.centers, ((0, 0), (0, 1)), constant_values=0.5 / spread**2) for spread in spreads])
             coefficients = np.pad(functions.coefficients, ((0, 0), (0, 0), (0, 1)))
             coefficients[..., 3] = which[:, None]
@@ -50,20 +50,19 @@ class Sky:
         self._weights, self._weights_buffer = self._target(self._size)
 
     def weights(self, suns: Float64[ndarray, "F 3"], environments: Sequence[EnvironmentLight]) -> moderngl.Texture:
-        """A texture of the weights of far lights whose own are `suns`, and of environments besides."""
+        """A texture of the directional lights' weights, which are `suns`, plus the environments'."""
         self._weights.write(np.pad(suns.reshape(self._size[1], self._size[0], 3), ((0, 0), (0, 0), (0, 1))).astype(np.float32))
         for light in environments:
             self._add(light)
         return self._weights
 
     def read(self) -> Float32[ndarray, "F 3"]:
-        """The weights last left in the texture."""
+        """The texture's current weights."""
         data = self._weights_buffer.read(components=4, dtype="f4")
         return np.frombuffer(data, np.float32).reshape(-1, 4)[:, :3].copy()
 
     def _add(self, light: EnvironmentLight) -> None:
-        linear = self._asset.asset_from_world[:3, :3]
-        rotation = linear / np.cbrt(np.linalg.det(linear))
+        rotation = light.rotation
         domain = SPHERE
         if self._asset.domain == "hemisphere":
             domain = HEMISPHERE if np.allclose(rotation[2], [0, 0, 1]) else TURNED_HEMISPHERE

@@ -1,4 +1,4 @@
-"""Passes that relight relighting maps: all lights in one, far lights by folded weights, or the article's few maps a pass."""
+"""Passes that relight relighting maps: all lights at once, distant lights by projected weights, or the article's few maps per pass."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.gl.context import Limits
+from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs, ranges
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import (
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 VECTORS_PER_MAP = 4  # weight, center, scale, bias
 
 
-class MapPasses:
+class MapPasses(Passes):
     """Passes over an asset of relighting maps; each adds to the target in use."""
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
@@ -44,18 +45,18 @@ class MapPasses:
         self._functions = {"SRBF_FORMULA": 1} if formula else {"SRBF_PAIRS": 1} | ({"SRBF_SAMPLED": 1} if limits.software else {})
 
     def check_point_lights(self) -> None:
-        """InputError where the shaders know no formula for the functions of a lamp's direction."""
+        """InputError where the shaders have no formula for the functions of a point light's direction."""
         kind = self._asset.manifest["basis"]["kind"]
         if kind != "gaussian":
             raise InputError(f"expected Gaussians for point and spot lights on the GPU, found {kind}; relight them by numpy")
 
     def layers_per_pass(self, point_lights: int) -> int:
-        """Maps that a pass of so many lamps holds the uniforms of."""
+        """How many maps fit into the uniforms of a pass with that many point lights."""
         vectors = VECTORS_PER_MAP if point_lights else 1
         return max(1, (self._free - VECTORS_PER_POINT_LIGHT * point_lights) // vectors)
 
-    def far(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
-        """All directional and environment lights; `units` maps a pass as plain textures, or all that uniforms hold from an array."""
+    def distant(self, weights: Float64[ndarray, "K 3"], units: int | None) -> None:
+        """All directional and environment lights; `units` maps per pass as plain textures, or as many of an array as uniforms hold."""
         if units is not None:
             self._accumulate(weights, units)
             return
@@ -67,14 +68,14 @@ class MapPasses:
             self._programs.run("projected.frag", {"SRBF_K": count}, values)
 
     def weighted(self, weights: moderngl.Texture) -> None:
-        """All directional and environment lights, by weights that are on the GPU."""
+        """All directional and environment lights, by weights on the GPU."""
         weights.use(1)
         self._textures.layers().use(0)
         values = {"maps": 0, "weights": 1}
         self._over_maps("weighted.frag", {}, values, {}, self.layers_per_pass(1))
 
     def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "K 3"], units: int | None) -> None:
-        """Point and spot lights, and the far lights' `weights` with the first of them; `units` maps a pass."""
+        """Point and spot lights, and the distant lights' `weights` with the first of them; `units` maps per pass."""
         self._textures.layers().use(0)
         where, values = self._textures.receivers(1)
         self._textures.r_pairs().use(2)

@@ -32,7 +32,7 @@ class AssetTextures:
             raise InputError(
                 f"expected {asset.height} x {asset.width} depth samples, found {view.samples.shape}; render the asset's picture"
             )
-        looked_up = [table.shape[:2] for name, table in asset.tables.items() if name != "light_coefficients"]  # these stay on the host
+        looked_up = [table.shape[:2] for name, table in asset.tables.items() if name != "light_coefficients"]  # which stay on the host
         side = max(asset.width, asset.height, asset.manifest.get("scalars", 0) + 1, *map(max, looked_up))
         if side > limits.texture_size:
             raise ShaderError(f"expected at most {limits.texture_size} texels a side on this GPU, found {side}; shrink the asset")
@@ -41,12 +41,11 @@ class AssetTextures:
         self._layers: moderngl.TextureArray | None = None
 
     def layers(self) -> moderngl.TextureArray:
-        """All stored layers, maps or planes four by four, as an array. ShaderError where the GPU has fewer layers."""
+        """All stored layers, maps or four components each, as an array. ShaderError where the GPU has fewer layers."""
         if self._layers is None:
             stored, most = self._asset.stored, self._limits.array_layers
             if len(stored) > most:
-                what = "maps" if self._asset.method == "relighting-map" else "images of planes"
-                raise ShaderError(f"expected at most {most} {what} on this GPU (array layers), found {len(stored)}; fit with fewer")
+                raise ShaderError(f"expected at most {most} layers on this GPU (array layers), found {len(stored)}; fit with fewer")
             layers, height, width, channels = stored.shape
             dtype = _DTYPES[stored.dtype.name]
             pixels = np.ascontiguousarray(stored)
@@ -58,22 +57,16 @@ class AssetTextures:
         return self._layers
 
     def layer(self, i: int) -> moderngl.Texture:
-        """Layer i alone as a plain 2D texture, for the article's multi-pass variant."""
+        """Layer i as a plain 2D texture, for the article's multi-pass variant."""
         return self._plain(f"layer {i}", self._asset.stored[i])
 
     def r_pairs(self) -> moderngl.Texture:
-        """The R table from its end, and the differences of its entries, n x 1, as `srbfWeightPairs` reads it."""
+        """The R table from its end, and the differences of its entries, n x 1, for `srbfWeightPairs`."""
         return self._plain("r_pairs", pairs_of(self._asset.table)[None])
 
     def plain(self) -> bool:
         """Whether what is stored needs no decoding."""
-        scale, bias = self._asset.scale.ravel().copy(), self._asset.bias.ravel()
-        if self._asset.method != "relighting-map":
-            unused = slice(self._asset.scalars, None)
-            if self._asset.stored[-1].reshape(-1, 4)[:, self._asset.scalars % 4 or 4 :].any():
-                return False
-            scale[unused] = 1
-        return bool((scale == 1).all() and not bias.any())
+        return self._asset.is_plain()
 
     def w_table(self) -> moderngl.Texture:
         """The atlas of light functions over the octahedral square."""
@@ -84,7 +77,7 @@ class AssetTextures:
         return self._plain("cluster_index", self._asset.tables["cluster_index"][..., None])
 
     def receivers(self, unit: int) -> tuple[dict[str, int], dict[str, Any]]:
-        """Where the receivers are, bound to a texture unit, as (defines, uniforms): the position map, or what a camera's depths say."""
+        """Where the receivers are, bound to a texture unit, as (defines, uniforms): the position map, or a camera's depth buffer."""
         if self._view is not None:
             self._plain("depth", self._view.samples[..., None]).use(unit)
             camera = {f"camera.{name}": value for name, value in camera_uniforms(self._view.camera).items()}
@@ -99,12 +92,12 @@ class AssetTextures:
         return self._plain("ambient", self._asset.images.get("ambient", np.zeros((1, 1, 3), np.float32)))
 
     def kept(self, pixels: Float32[ndarray, "H W C"]) -> moderngl.Texture:
-        """Numbers as a texture of their own, kept as long as the asset's."""
+        """Numbers as a texture that lives as long as the asset's."""
         return self._plain(f"kept {len(self._made)}", pixels)
 
     @contextmanager
     def passing(self, pixels: ndarray) -> Iterator[moderngl.Texture]:
-        """An image that is there for one pass alone, (H, W, C)."""
+        """A texture for one pass only, (H, W, C)."""
         height, width, channels = pixels.shape
         texture = self._context.texture((width, height), channels, np.ascontiguousarray(pixels, np.float32), alignment=1, dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
@@ -126,6 +119,6 @@ class AssetTextures:
 
 
 def pairs_of(table: Float32[ndarray, " n"]) -> Float32[ndarray, "n 2"]:
-    """An R table from its end, so that it begins where cos theta is 1, each entry with what the next has more; 0 in the last."""
+    """An R table from its end, so that it begins where cos theta is 1, each entry with the difference to the next; 0 in the last."""
     turned = table[::-1]
     return np.stack([turned, np.diff(turned, append=turned[-1])], axis=1).astype(np.float32)

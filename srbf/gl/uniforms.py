@@ -1,4 +1,4 @@
-"""What the shaders' uniforms hold: vec4-padded arrays, and a lamp split into single-precision parts."""
+"""What the shaders' uniforms hold: vec4-padded arrays, and a point light split into single-precision parts."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from srbf.gl.depth_buffer import DepthCamera
 from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE
-VECTORS_KEPT_FREE = 32  # vec4 for the lamp and what drivers take for themselves
+VECTORS_KEPT_FREE = 32  # vec4 for the point light and for drivers
 VECTORS_PER_POINT_LIGHT = 4
-MOST_POINT_LIGHTS = 16  # a pass
-NO_CONE = (3.0, 4.0)  # versines past every angle: the cone of a point light is 1 everywhere
+MOST_POINT_LIGHTS = 16  # per pass
+NO_CONE = (3.0, 4.0)  # versines above every angle: the cone of a point light is 1 everywhere
 
 
 def padded(triples: Float[ndarray, "K 3"]) -> Float32[ndarray, "K 4"]:
@@ -56,7 +56,7 @@ def vectors_free(limits: Limits) -> int:
 
 
 def point_lights_per_pass(free: int, vectors_per_layer: int) -> int:
-    """How many lamps a pass takes: a power of two that leaves half of the `free` uniforms to layers, where that many are needed."""
+    """How many point lights a pass takes: a power of two that leaves half of the `free` uniforms to layers, where that many are needed."""
     point_lights = MOST_POINT_LIGHTS
     while point_lights > 1 and VECTORS_PER_POINT_LIGHT * point_lights > max(free // 2, free - 32 * vectors_per_layer):
         point_lights //= 2
@@ -64,17 +64,17 @@ def point_lights_per_pass(free: int, vectors_per_layer: int) -> int:
 
 
 def point_light_groups(point_lights: Sequence[PointLight], most: int) -> Iterator[tuple[Sequence[PointLight], int]]:
-    """(lamps of a pass, places in its array) of at most `most`; places are powers of two, so that few programs serve any number."""
+    """(point lights of a pass, places in its array) of at most `most`; places are powers of two, so that few programs serve any number."""
     for first in range(0, len(point_lights), most):
         group = point_lights[first : first + most]
         yield group, 1 << (len(group) - 1).bit_length()
 
 
 def packed_point_lights(point_lights: Sequence[PointLight], count: int) -> Float32[ndarray, "rows 4"]:
-    """Point and spot lights, already in the asset's frame, four vec4 each; zeros up to `count` lamps (4 count rows).
+    """Point and spot lights, already in the asset's frame, four vec4 each; zeros up to `count` lights (4 count rows).
 
     They hold (position, radius), (positionLow, falloff), (color, versineInner), (axis, versineOuter); the color is the irradiance
-    at 1 m, so that a0 needs no place of its own.
+    at 1 m, so that a0 need not be stored.
     """
     rows = np.zeros((count, 4, 4), np.float32)
     for row, light in zip(rows, point_lights, strict=False):

@@ -1,1 +1,1 @@
-"""Photographs, or renders of other programs, as a capture: light lists, pairing of names, pictures."""
+"""Import of photographs, or of renders by other programs, as a capture: light lists, pairing of names, image files."""

@@ -1,4 +1,4 @@
-"""Each entry of a light list with its image on disk, where list and file system spell names differently."""
+"""Pairing of the entries of a light list with image files whose names may be spelled differently."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path, PureWindowsPath
 
-from srbf.capture import LightKind
+from srbf.captured_light import LightKind
 from srbf.errors import ImageError
 from srbf.importing.light_list import LightListEntry, read_light_list
 from srbf.importing.pictures import RAW_SUFFIXES
@@ -19,8 +19,8 @@ ORDINARY = ".bmp .dib .dpx .exr .hdr .jfif .jpe .jpeg .jpg .pbm .pfm .pgm .png .
 OTHER = ".avif .cin .dds .gif .heic .heif .ico .iff .j2c .j2k .jfi .jif .jp2 .jxl .pic .psb .psd .rgb .rgba .sgi .sxr .tpic .tx .zfile"
 RANKS = {
     suffix: rank for rank, suffixes in enumerate((ORDINARY.split(), OTHER.split(), RAW_SUFFIXES)) for suffix in suffixes
-}  # of one stem the first
-SAID = {
+}  # the lowest rank wins among equal stems
+DIFFERENCES = {
     "case": "another letter case or composition of accents",
     "extension": "another extension",
     "last": "their last part alone, without the folders that the list names",
@@ -32,15 +32,15 @@ SAID = {
 def paired(
     light_list: Path, kind: LightKind = "directional", images: Path | None = None, say: Callable[[str], None] = lambda line: None
 ) -> list[tuple[Path, LightListEntry]]:
-    """Each entry of a list with its image: by the name as written, else its last part, else its stem alone, else one folder further in.
+    """Pair each entry with its image: by the exact name, else its last part, else its stem, else the same one folder deeper.
 
-    Images are beside the list, or in `images`, and in no other place, whatever the list says. Letter case, and accents composed or not,
-    do not matter where no name is the same. Of one stem a picture comes before a raw file. `say` hears of each kind of difference once.
-    ImageError where an entry has no image, several, or that of another entry.
+    Images must be beside the list or in `images`, even if the list names other folders. If no name is equal, letter case and the
+    composition of accents are ignored. Among equal stems, an image wins over a raw file. `say` reports each kind of difference once.
+    ImageError if an entry has no image, several, or that of another entry.
     """
     entries = read_light_list(light_list, kind, say)
     if images is not None and not images.is_dir():
-        raise ImageError(f"expected a folder of images at {images}, found none; give --images an existing folder")
+        raise ImageError(f"expected a folder of images at {images}, found none; give `images` an existing folder")
     search = _Search(light_list, (light_list.parent,) if images is None else (images, light_list.parent))
     pairs: list[tuple[Path, LightListEntry]] = []
     taken: dict[Path, str] = {}
@@ -52,7 +52,7 @@ def paired(
             )
         taken[path] = entry.name
         pairs.append((path, entry))
-    for reason, words in SAID.items():
+    for reason, words in DIFFERENCES.items():
         if reason in search.counts:
             say(f"{search.counts[reason]} of {len(entries)} images of {light_list.name} were found by {words}")
     return pairs
@@ -60,27 +60,27 @@ def paired(
 
 @dataclass(frozen=True)
 class _Folder:
-    """A folder's files and folders by name, by folded name, and its images by folded stem."""
+    """A folder's files and folders by name and by normalized name, and its images by normalized stem."""
 
     names: dict[str, Path]
-    projected: dict[str, list[Path]]
+    by_normalized: dict[str, list[Path]]
     stems: dict[str, list[Path]]
 
     @staticmethod
     def of(path: Path) -> _Folder:
         names = {entry.name: entry for entry in sorted(path.iterdir())}
-        projected: dict[str, list[Path]] = {}
+        by_normalized: dict[str, list[Path]] = {}
         stems: dict[str, list[Path]] = {}
         for name, entry in names.items():
-            projected.setdefault(_fold(name), []).append(entry)
+            by_normalized.setdefault(_normalized(name), []).append(entry)
             if entry.suffix.lower() in RANKS and not name.startswith("."):
-                stems.setdefault(_fold(entry.stem), []).append(entry)
-        return _Folder(names, projected, stems)
+                stems.setdefault(_normalized(entry.stem), []).append(entry)
+        return _Folder(names, by_normalized, stems)
 
 
 @dataclass
 class _Search:
-    """Looks for a list's images below `roots`, reads each folder once, and counts by what it found them."""
+    """Search for a list's images below `roots`; reads each folder once and counts the kinds of difference."""
 
     light_list: Path
     roots: Sequence[Path]
@@ -88,7 +88,7 @@ class _Search:
     folders: dict[Path, _Folder] = field(default_factory=dict)
 
     def image(self, name: str) -> Path:
-        """The one image of a name in the list."""
+        """The image for a name of the list."""
         written = PureWindowsPath(name)  # splits at both kinds of slash
         last = written.name
         asked = os.path.normpath(self.light_list.parent.absolute() / written.as_posix())
@@ -114,7 +114,7 @@ class _Search:
         return path
 
     def _walk(self, root: Path, parts: Sequence[str]) -> Path | None:
-        """The file at a path below a root, each part by its name or nearly so; None where a link leads out of all roots."""
+        """The file at a path below a root, each part by its exact or normalized name; None if a link leads out of all roots."""
         path: Path | None = root
         for part in parts[:-1]:
             path = self._entry(path, part) if path is not None and path.is_dir() else None
@@ -133,32 +133,32 @@ class _Search:
         return path
 
     def _entry(self, folder: Path, name: str) -> Path | None:
-        """What a folder has by a name: the same, else the only one that differs in letter case and accents' composition."""
+        """A folder's entry of that name, else the only one that differs in letter case or the composition of accents."""
         content = self._folder(folder)
         if name in content.names:
             return content.names[name]
-        alike = content.projected.get(_fold(name), [])
-        composed = [path for path in alike if unicodedata.normalize("NFC", path.name) == unicodedata.normalize("NFC", name)]
-        alike = composed or alike
-        if len(alike) > 1:
-            raise self._several(name, alike)
-        return alike[0] if alike else None
+        matches = content.by_normalized.get(_normalized(name), [])
+        composed = [path for path in matches if unicodedata.normalize("NFC", path.name) == unicodedata.normalize("NFC", name)]
+        matches = composed or matches
+        if len(matches) > 1:
+            raise self._several(name, matches)
+        return matches[0] if matches else None
 
     def _by_stem(self, folders: Sequence[Path], last: str, name: str) -> Path | None:
-        """The only image of that stem in the most ordinary format that there is."""
+        """The only image of that stem in the most common format present."""
         for stem in dict.fromkeys((last, Path(last).stem)):
-            alike = [path for folder in folders for path in self._folder(folder).stems.get(_fold(stem), []) if path.is_file()]
-            best = min((RANKS[path.suffix.lower()] for path in alike), default=0)
-            chosen = [path for path in alike if RANKS[path.suffix.lower()] == best]
+            matches = [path for folder in folders for path in self._folder(folder).stems.get(_normalized(stem), []) if path.is_file()]
+            best = min((RANKS[path.suffix.lower()] for path in matches), default=0)
+            chosen = [path for path in matches if RANKS[path.suffix.lower()] == best]
             if len(chosen) > 1:
                 raise self._several(name, chosen)
             if chosen:
-                self.counts["raw" if len(alike) > 1 else "extension"] += 1
+                self.counts["raw" if len(matches) > 1 else "extension"] += 1
                 return chosen[0]
         return None
 
     def _inside(self, root: Path) -> list[Path]:
-        """The folders in a root, hidden ones, captures and assets aside."""
+        """The folders in a root, except hidden ones, captures and assets."""
         folders = [path for name, path in self._folder(root).names.items() if path.is_dir() and not name.startswith(".")]
         folders = [path for path in folders if path.resolve().is_relative_to(root.resolve())]
         return [path for path in folders if not any((path / mark).exists() for mark in ("capture.json", "asset.json"))]
@@ -181,14 +181,14 @@ class _Search:
         if outside and os.path.isfile(asked):  # noqa: PTH113 - Path.is_file raises where a name is too long
             return ImageError(
                 f"expected the image {name!r} of {self.light_list.name} below {where}, found it outside: paths outside the list's folder "
-                f"are followed only below --images FOLDER; add --images {asked.parent}"
+                f"are followed only below `images`; add `images={asked.parent}`"
             )
-        elsewhere = "; if it is in another folder, add --images FOLDER" if len(self.roots) == 1 else ""
+        elsewhere = "; if it is in another folder, add `images`, that folder" if len(self.roots) == 1 else ""
         near = get_close_matches(last, self._folder(self.roots[0]).names, 1)
         nearest = f" (the nearest name is {near[0]!r})" if near else ""
         return ImageError(f"expected the image {last!r} of {self.light_list.name} in {where}, found none{nearest}{elsewhere}")
 
 
-def _fold(name: str) -> str:
-    """A name without letter case, its accents composed."""
+def _normalized(name: str) -> str:
+    """A name normalized: letter case normalized, accents composed."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())

@@ -1,6 +1,6 @@
-"""Light lists (.lp): a count, then `name x y z` a line, as photographers of relightable images keep them.
+"""Light lists (.lp): a count, then one `name x y z` per line, as used for reflectance transformation imaging.
 
-For near lights the same file holds positions instead of directions.
+For near lights the file holds positions instead of directions.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.capture import LightKind
+from srbf.captured_light import LightKind
 from srbf.errors import ManifestError
 from srbf.importing.light_list_faults import fault_of, spherical_fault
 from srbf.importing.light_list_text import Row, as_number, rows_of
@@ -24,16 +24,16 @@ COMMENT = re.compile(r"\s(?:#|//|;).*$")
 
 @dataclass(frozen=True)
 class LightListEntry:
-    """One image's name as the list spells it, and its light's unit direction, or position in meters (axes as they stand)."""
+    """One image's name as the list spells it, and its light's unit direction, or position in meters (axes unchanged)."""
 
     name: str
     place: tuple[float, float, float]
 
 
 def read_light_list(path: Path, kind: LightKind = "directional", say: Callable[[str], None] = lambda line: None) -> list[LightListEntry]:
-    """All entries of a .lp file, directions normalized, positions of point lights as they are; ManifestError names the line that is bad.
+    """All entries of a .lp file, directions normalized, positions of point lights unchanged; ManifestError names the invalid line.
 
-    Names may be in quotes. Blank lines, and lines that begin with #, // or ;, are skipped. `say` hears of an encoding that is not UTF-8.
+    Names may be in quotes. Blank lines, and lines that begin with #, // or ;, are skipped. `say` reports an encoding other than UTF-8.
     """
     rows, comments = rows_of(path, say)
     count, rows = _count(path, rows), rows[1:]
@@ -64,7 +64,7 @@ def read_light_list(path: Path, kind: LightKind = "directional", say: Callable[[
 
 
 def below_the_horizon(entries: Sequence[LightListEntry], listed: str) -> str | None:
-    """What to say of directions with z <= 0 in the list called `listed`; None where all are above."""
+    """A message about directions with z <= 0 in the list named `listed`; None if there are none."""
     below = sum(entry.place[2] <= 0 for entry in entries)
     if below == 0:
         return None
@@ -87,7 +87,7 @@ def _count(path: Path, rows: Sequence[Row]) -> int:
 
 
 def _split(line: str) -> tuple[str, tuple[float, ...]] | None:
-    """(name, x y z) of a line, a comment after them dropped; None where it is not that."""
+    """(name, x y z) of a line without its comment; None for other lines."""
     return _name_and_numbers(line) or _name_and_numbers(COMMENT.sub("", line))
 
 
@@ -107,6 +107,6 @@ def _name_and_numbers(line: str) -> tuple[str, tuple[float, ...]] | None:
 
 
 def _has_column_too_many(name: str) -> bool:
-    """Whether what is before the last three numbers is a file's name and one more number (`a.png 0.5`), not a name (`IMG 5`)."""
+    """Whether the text before the last three numbers is a file name and one more number (`a.png 0.5`), not a name (`IMG 5`)."""
     head, *rest = name.rsplit(maxsplit=1)
     return bool(rest) and as_number(rest[0]) is not None and re.search(r"\.[A-Za-z][A-Za-z0-9]{1,4}[\"'”]?$", head) is not None

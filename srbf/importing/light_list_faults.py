@@ -1,4 +1,4 @@
-"""What is wrong with a line of a light list, and how to write it instead."""
+"""Faults of the lines of a light list, and how to correct them."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from srbf.arrays import Float
 from srbf.importing.light_list_text import as_number
 
 FROM_ANGLES = "x = cos(elevation) cos(azimuth), y = cos(elevation) sin(azimuth), z = sin(elevation)"
-WIDE = 10.0  # a first column beyond this beside a third of 0 or 1 is no vector that anyone writes
+MAX_VECTOR = 10.0  # of the first column; a larger one with a third column of 0 or 1 is an angle
 
 
 def fault_of(line: str) -> str:
-    """`; …`, what to do about a line that is not `name x y z`; empty where nothing is known."""
+    """`; …` with the correction of a line that is not `name x y z`; empty if unknown."""
     if "°" in line or re.search(r"[0-9]\s*deg", line, re.IGNORECASE):
         return f"; degrees are not read: write {FROM_ANGLES}"
     words = line.split()
@@ -37,21 +37,21 @@ def fault_of(line: str) -> str:
 
 
 def spherical_fault(vectors: Float[ndarray, "L 3"]) -> str | None:
-    """What columns are that can only be azimuth and elevation in degrees, with a radius of 0 or 1; None of vectors.
+    """A message if the columns can only be azimuth and elevation in degrees with a radius of 0 or 1; None for vectors.
 
-    Vectors of any length are vectors: those of a ring have one length, those of a dome differ in z.
+    Vectors of any length pass: those of a ring have one length, those of a dome differ in z.
     """
     lengths = np.linalg.norm(vectors, axis=1)
     azimuth, elevation, radius = vectors.T
     if len(vectors) < 2 or not (radius == radius[0]).all() or radius[0] not in (0, 1) or np.ptp(lengths) <= 0.01 * lengths.max():
         return None
-    if np.abs(azimuth).max() <= WIDE or np.abs(azimuth).max() > 360 or np.abs(elevation).max() > 90:
+    if np.abs(azimuth).max() <= MAX_VECTOR or np.abs(azimuth).max() > 360 or np.abs(elevation).max() > 90:
         return None
     return f"azimuth and elevation in degrees, by their range: write {FROM_ANGLES}; if they are vectors, write them at unit length"
 
 
 def _trailing(words: list[str]) -> int:
-    """How many words at the end are numbers, the first word aside, which is the name."""
+    """The number of numbers at the end, without the first word, which is the name."""
     count = 0
     for word in reversed(words[1:]):
         if as_number(word) is None:

@@ -23,14 +23,14 @@ MARKS = (  # byte order marks; that of UTF-32 begins with that of UTF-16
 
 @dataclass(frozen=True)
 class Row:
-    """A line that says something: its number in the file, from 1, and its text without the space around it."""
+    """A line with content: its number in the file, from 1, and its stripped text."""
 
     number: int
     text: str
 
 
 def rows_of(path: Path, say: Callable[[str], None] = lambda line: None) -> tuple[list[Row], int]:
-    """Lines that are neither blank nor comments (#, //, ;), and how many comments there were; ManifestError where it is not text."""
+    """Lines that are neither blank nor comments (#, //, ;), and the number of comments; ManifestError if the file is not text."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -48,7 +48,7 @@ def rows_of(path: Path, say: Callable[[str], None] = lambda line: None) -> tuple
 def decoded(data: bytes) -> tuple[str | None, str]:
     """(text, encoding): by its byte order mark, else UTF-16 where every second byte is 0, else UTF-8, Latin-1 or Windows-1252.
 
-    The text is None where none of them can be.
+    The text is None if none of them fits.
     """
     for mark, codec, name in MARKS:
         if data.startswith(mark):
@@ -64,7 +64,7 @@ def decoded(data: bytes) -> tuple[str | None, str]:
 
 
 def as_number(word: str) -> float | None:
-    """The finite number that a word is, with a decimal point; None of all else. A typeset minus counts as one."""
+    """A word as a finite number with a decimal point; None for other words. A typographic minus is accepted."""
     if NUMBER.fullmatch(word) is None:
         return None
     value = float(word.replace("\u2212", "-"))

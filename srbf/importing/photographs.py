@@ -1,4 +1,4 @@
-"""Photographs, or anyone's renders, with a light list become a capture."""
+"""Import of photographs, or of renders, with a light list as a capture."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 import srbf
-from srbf.capture import MANIFEST, LightKind, Quantity, Role
+from srbf.capture import MANIFEST, Quantity
+from srbf.captured_light import LightKind, Role
 from srbf.errors import ImageError, InputError
 from srbf.importing.image_pairing import paired
 from srbf.importing.light_list import LightListEntry, below_the_horizon
@@ -21,12 +22,12 @@ from srbf.io.image import HALF_MAX, write_image
 
 @dataclass(frozen=True)
 class LightListImport:
-    """A .lp list and its images, paired by the name in the list; an optional list of unseen lights.
+    """A .lp list and its images, paired by the name in the list; an optional list of held-out lights.
 
-    transfer: `srgb` decodes the sRGB curve, `linear` takes stored values as they are; what files say of their own values comes first
-    (`srbf.importing.pictures`). `layer` names one of multilayer EXR. `mask` becomes coverage. `kind` says whether the lists hold
-    directions, or positions of point lights in meters, whose irradiance the images have at 1 m from each. `images` is a folder
-    that images may be in besides the list's own.
+    transfer: `srgb` decodes the sRGB curve, `linear` keeps stored values; profiles and tags in the files come first
+    (`srbf.importing.pictures`). `layer` is a layer of a multilayer EXR. `mask` becomes coverage. `kind`: the lists hold directions, or
+    positions of point lights in meters, which have unit irradiance at 1 m. `images` is a further folder for images, besides the
+    list's own.
     """
 
     lights: Path
@@ -45,9 +46,9 @@ class LightListImport:
         progress: Callable[[int, int], None] = lambda done, total: None,
         say: Callable[[str], None] = lambda text: None,
     ) -> dict[str, Any]:
-        """Write the capture, whole or not at all; returns its manifest. `say` gets a line of each kind of thing done to images.
+        """Write the capture atomically; returns its manifest. `say` gets one line per kind of conversion.
 
-        ManifestError or ImageError where the list or an image is damaged, missing, of another size, or not finite.
+        ManifestError or ImageError if the list or an image is damaged, missing, of another size, or not finite.
         """
         if self.transfer not in ("srgb", "linear"):
             raise InputError(f"expected a transfer of srgb, linear, found {self.transfer!r}")

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and paths in manifests that cannot leave their folder."""
+"""Atomic writes of files and folders, and paths of manifests that stay inside their folder."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Write JSON atomically: keys in the order given, NaN refused, so that equal values give equal bytes."""
+    """Write JSON atomically: keys in the given order, without NaN, so that equal values give equal bytes."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False) + "\n")
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object from a file; ManifestError where there is none."""
+    """Read a JSON object from a file; ManifestError if there is none."""
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
@@ -82,7 +82,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder and its parents; WriteError where the target cannot hold one."""
+    """Make a folder and its parents; WriteError if that fails."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -90,7 +90,7 @@ def make_folder(path: Path) -> None:
 
 
 def inside(folder: Path, name: str, manifest: Path) -> Path:
-    """The file `name` of a manifest under its folder; ManifestError where it would leave the folder."""
+    """The file `name` of a manifest under its folder; ManifestError if it would leave the folder."""
     pure = PurePosixPath(name)
     try:
         resolved = (folder / pure).resolve()
@@ -108,7 +108,7 @@ def sha256_of(path: Path) -> str:
 
 
 def checksums(folder: Path, manifest: str) -> dict[str, str]:
-    """Hex SHA-256 of every file under a folder but its `manifest`, by relative path in order."""
+    """Hex SHA-256 of every file under a folder except its `manifest`, sorted by relative path."""
     found = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file() and p != folder / manifest)
     return {name: sha256_of(folder / name) for name in found}
 
@@ -117,14 +117,14 @@ def checksums(folder: Path, manifest: str) -> dict[str, str]:
 def atomic_folder(path: Path, force: bool, marker: str) -> Iterator[Path]:
     """A temporary folder beside `path` to fill, renamed to it on success.
 
-    An existing `path` is replaced only with `force`, and only where it is empty or holds the file `marker`, so that a slip of
-    -o never deletes a folder that is not ours.
+    An existing `path` is replaced only with `force`, and only where it is empty or holds the file `marker`, so that a wrong
+    path never deletes a folder of something else.
     """
     check_replaceable(path, force, marker)
-    path = path.resolve()  # "." has no name to put a temporary one beside, and a link's target is what is replaced
+    path = path.resolve()  # "." has no name for a temporary sibling, and the target of a link is replaced
     make_folder(path.parent)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    shutil.rmtree(temporary, ignore_errors=True)  # of a killed process that had this number
+    shutil.rmtree(temporary, ignore_errors=True)  # of a killed process with this number
     make_folder(temporary)
     try:
         yield temporary
@@ -140,20 +140,20 @@ def atomic_folder(path: Path, force: bool, marker: str) -> Iterator[Path]:
 
 
 def check_replaceable(path: Path, force: bool, marker: str) -> None:
-    """OutputExistsError where `path` exists and may not be replaced."""
+    """OutputExistsError if `path` exists and may not be replaced."""
     if not path.exists():
         return
     if not force:
-        raise OutputExistsError(f"expected no {path} yet, found one; choose another -o or add --force")
+        raise OutputExistsError(f"expected no {path} yet, found one; choose another, or `force=True`")
     if not path.is_dir() or (any(path.iterdir()) and not (path / marker).is_file()):
-        raise OutputExistsError(f"--force replaces only a folder with {marker}, and {path} is not one; choose another -o")
+        raise OutputExistsError(f"`force=True` replaces only a folder with {marker}, and {path} is not one; choose another")
     folders = [p for p in path.iterdir() if p.is_dir() and p.name not in ("lights", "direct")]
     if others := [p.name for p in folders if not _listed(p, path / marker)]:
-        raise OutputExistsError(f"--force would delete the folder {others[0]!r} inside {path}; move it, or choose another -o")
+        raise OutputExistsError(f"`force=True` would delete the folder {others[0]!r} inside {path}; move it, or choose another")
 
 
 def _listed(folder: Path, manifest: Path) -> bool:
-    """Whether a manifest beside `folder` knows the checksum of every file in it: an export's own code, say."""
+    """Whether a manifest beside `folder` has the checksum of every file in it, such as the code of an export."""
     try:
         known = read_json(manifest).get("sha256", {})
     except ManifestError:

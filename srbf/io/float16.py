@@ -1,4 +1,4 @@
-"""Half floats to float32 by their bits: several times quicker than numpy's own conversion."""
+"""Half floats to float32 by their bits: several times faster than numpy's conversion."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32
 
-INFINITE = 0x7C00  # the least magnitude of a half's bits that stands for Inf or NaN
+INFINITE = 0x7C00  # smallest magnitude of a half's bits that is Inf or NaN
 MAGNITUDE = np.uint16(0x7FFF)
-SIGN_AND_VALUE = np.int32(~0x70000000)  # drops the copies of the sign that widening makes
-REBIAS = np.float32(2.0**112)  # 127 - 15, between the exponents' biases; makes subnormals right as well
+SIGN_AND_VALUE = np.int32(~0x70000000)  # removes the copies of the sign from widening
+REBIAS = np.float32(2.0**112)  # 127 - 15, between the exponents' biases; also correct for subnormals
 
 
 def finite_to_float32(half: Float[ndarray, "*shape"], out: Float32[ndarray, "*shape"]) -> Float32[ndarray, "*shape"]:
-    """`half` in `out`, bit for bit as numpy casts it where it is finite; Inf and NaN come out finite and wrong, so ask before.
+    """`half` converted to `out`, bit-identical to numpy for finite values. Inf and NaN become wrong finite values: check `all_finite`.
 
     Shift the 15 bits of exponent and mantissa to their float32 places, keep the sign, multiply by 2^112. Four passes over `out`:
-    feed it pieces that stay in cache.
+    use pieces that fit the cache.
     """
     bits = out.view(np.int32)
     np.copyto(bits, half.view(np.int16))  # sign-extended

@@ -35,7 +35,7 @@ def _file() -> Any:
     except ImportError as error:
         raise MissingLibraryError("binary glTF needs pygltflib, which is not installed; run: pip install pygltflib") from error
 
-    class File(GLTF2):
+    class File(GLTF2):  # type: ignore[misc]
         text = ""
 
         @classmethod

@@ -18,14 +18,14 @@ from srbf.io.float16 import all_finite, finite_to_float32
 
 Encoding = Literal["half", "float", "uint8"]
 HALF_MAX = 65504.0
-NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO stamps the time otherwise, and equal pixels would give unequal files
+NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO would write the time, and equal pixels would give different files
 
 
 def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W C"]:
     """All channels of an image as float32: EXR values as stored, integers over their maximum (8 bit: byte / 255).
 
-    With `channels` 3, gray is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned as they
-    are: `require_finite` names the file. ImageError on a missing, damaged or truncated file.
+    With `channels` 3, gray is repeated and alpha dropped; any other mismatch is refused. Non-finite values are returned
+    unchanged; `require_finite` rejects them. ImageError on a missing, damaged or truncated file.
     """
     pixels = read_stored(path, channels)
     if pixels.dtype == np.float32:
@@ -34,13 +34,13 @@ def read_image(path: Path, channels: int | None = None) -> Float32[ndarray, "H W
 
 
 def read_stored(path: Path, channels: int | None = None, rows: Sequence[tuple[int, int]] | None = None) -> Float[ndarray, "H W C"]:
-    """`read_image` without its widening: float16 where the file holds half floats, float32 of anything else. The file is opened once.
+    """`read_image` without widening: float16 for half floats, float32 for all else. The file is opened once.
 
-    With `rows`, only those (begin, end) of it, one below the other: of an EXR the other strips of 16 rows are not undone.
+    With `rows`, only these ranges (begin, end), stacked; other strips of 16 rows of an EXR are not decompressed.
     """
     oiio = _oiio()
     wanted = oiio.ImageSpec()
-    wanted.attribute("oiio:UnassociatedAlpha", 1)  # colors as the file holds them, not multiplied by its alpha
+    wanted.attribute("oiio:UnassociatedAlpha", 1)  # colors as stored, not multiplied by alpha
     source = oiio.ImageInput.open(str(path), wanted) if path.is_file() else None
     if source is None:
         reason = _first_line(oiio.geterror()) if path.is_file() else "no such file"
@@ -72,10 +72,10 @@ def read_stored(path: Path, channels: int | None = None, rows: Sequence[tuple[in
 
 
 def holds_half(path: Path) -> bool:
-    """Whether a file stores half floats, from its header alone; False where there is none to read."""
+    """Whether a file stores half floats, from its header; False if it cannot be read."""
     source = _oiio().ImageInput.open(str(path)) if path.is_file() else None
     if source is None:
-        _oiio().geterror()  # taken, so that it does not speak up at exit
+        _oiio().geterror()  # cleared, so that it is not printed at exit
         return False
     half = bool(source.spec().format == _oiio().TypeHalf)
     source.close()
@@ -83,7 +83,7 @@ def holds_half(path: Path) -> bool:
 
 
 def size_of(path: Path) -> tuple[int, int]:
-    """(height, width) from the header alone; ImageError where there is none to read."""
+    """(height, width) from the header; ImageError if it cannot be read."""
     oiio = _oiio()
     source = oiio.ImageInput.open(str(path)) if path.is_file() else None
     if source is None:
@@ -95,7 +95,7 @@ def size_of(path: Path) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Part:
-    """One image of a file, as its header has it: `data` is the window that is stored, `display` the frame, each (x, y, width, height)."""
+    """One image of a file by its header: `data` is the stored window, `display` the frame, each (x, y, width, height)."""
 
     index: int
     name: str
@@ -109,7 +109,7 @@ class Part:
 
 
 def parts_of(path: Path) -> list[Part]:
-    """The headers of all images of a file: parts of an EXR, pages, frames. ImageError where there is none to read."""
+    """The headers of all images of a file: parts of an EXR, pages, frames. ImageError if the file cannot be read."""
     source = _opened(path)
     parts: list[Part] = []
     try:
@@ -137,7 +137,7 @@ def parts_of(path: Path) -> list[Part]:
 
 
 def read_channels(path: Path, part: Part, channels: Sequence[int]) -> Float32[ndarray, "H W C"]:
-    """Channels of one part in its display window: zero where nothing is stored, and nothing of what is stored outside of it."""
+    """Channels of one part in its display window: zero outside the stored window; overscan is cropped."""
     source, low, high = _opened(path), min(channels), max(channels) + 1
     try:
         stored = source.read_image(part.index, 0, low, high, _oiio().FLOAT)
@@ -168,7 +168,7 @@ def _opened(path: Path) -> Any:
 
 
 def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:
-    """ImageError that names the file, the count and the first texel where `pixels`, float32 or float16, holds NaN or Inf."""
+    """ImageError that names the file, the count and the first texel if `pixels`, float32 or float16, contain NaN or Inf."""
     if not (all_finite(pixels) if pixels.dtype == np.float16 else np.isfinite(pixels).all()):
         bad = ~np.isfinite(pixels).all(axis=2)
         r, c = np.argwhere(bad)[0]
@@ -178,7 +178,7 @@ def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:
 def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
     """Write (H, W) or (H, W, C) pixels, atomically. `half`, `float`: EXR, ZIP. `uint8`: PNG of bytes given as uint8.
 
-    ImageError where a value does not fit a half float (beyond 65504) or is not finite: nothing is written then.
+    ImageError if a value exceeds half floats (65504) or is not finite; nothing is written then.
     """
     oiio = _oiio()
     pixels = pixels[:, :, None] if pixels.ndim == 2 else pixels
@@ -198,7 +198,7 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
         spec.attribute("compression", "zip")
         spec.attribute("DateTime", NO_DATE)
     else:
-        spec.attribute("oiio:UnassociatedAlpha", 1)  # a fourth channel is data like the others: none is divided by it
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # a fourth channel is data, not alpha
     with atomic_path(path) as temporary:
         target = oiio.ImageOutput.create(str(path))
         if target is None or not target.open(str(temporary), spec):
@@ -209,12 +209,12 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
 
 
 def write_images(images: Sequence[tuple[Path, ndarray, Encoding]]) -> None:
-    """`write_image` of each (path, pixels, encoding), a thread a core at it; the first error in their order, once all have ended."""
+    """`write_image` of each (path, pixels, encoding), with one thread per core; raises the first error after all have ended."""
     each(lambda i: write_image(*images[i]), len(images))
 
 
 def write_picture(path: Path, linear: Float32[ndarray, "H W 3"], exposure: float = 0.0) -> None:
-    """A PNG to look at: the sRGB encoding of clip(value 2^exposure), 8 bits."""
+    """Write a PNG for display: the sRGB encoding of clip(value 2^exposure), 8 bits."""
     srgb = encode_srgb(np.clip(linear * 2.0**exposure, 0, 1))
     write_image(path, np.round(srgb * 255).astype(np.uint8), "uint8")
 

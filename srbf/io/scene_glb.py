@@ -1,4 +1,4 @@
-"""`scene.glb`: receivers and occluders as triangles, read back from binary glTF into the capture's z-up frame."""
+"""`scene.glb`: receivers and occluders as triangles, read from binary glTF into the capture's z-up frame."""
 
 from __future__ import annotations
 
@@ -19,38 +19,38 @@ Z_UP_FROM_Y_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """T triangles: corners and the normals there (T, 3, 3), the material of each, and who casts. World frame, meters.
+    """T triangles: corners and their normals (T, 3, 3), materials, and whether they cast shadows. World frame, meters.
 
-    `tints` (M, KNOTS, 3) is what one wall of a material lets through of a shadow ray that meets its normal at the cosine
-    0, 1/(KNOTS-1), …, 1; 0 throughout is opaque. `lightmap`: where a receiver's corners lie in the lightmap, (0, 0) at the top left of
-    its image; NaN of what is no receiver, None in a scene without any.
+    `transmittance` (M, KNOTS, 3) of one wall of a material for shadow rays at the cosines 0, 1/(KNOTS-1), …, 1 to its normal; an opaque
+    material has 0. `lightmap`: lightmap coordinates of the receivers' corners, (0, 0) at the top left of its image; NaN for other
+    triangles, None in a scene without lightmap.
     """
 
     corners: Float32[ndarray, "T 3 3"]
     normals: Float32[ndarray, "T 3 3"]
     material: Int[ndarray, " T"]
     casts: Bool[ndarray, " T"]
-    tints: Float32[ndarray, "M KNOTS 3"]
+    transmittance: Float32[ndarray, "M KNOTS 3"]
     lightmap: Float32[ndarray, "T 3 2"] | None = None
 
     @property
     def translucent(self) -> Bool[ndarray, " T"]:
-        """Which triangles pass some light."""
-        return (self.tints > 0).any(axis=(1, 2))[self.material]
+        """Mask of the triangles that transmit some light."""
+        return (self.transmittance > 0).any(axis=(1, 2))[self.material]
 
     @property
     def occluders(self) -> Bool[ndarray, " T"]:
-        """Which triangles stop all light that meets them."""
+        """Mask of the triangles that block all light."""
         return self.casts & ~self.translucent
 
     @property
     def filters(self) -> Bool[ndarray, " T"]:
-        """Which triangles tint the light that meets them."""
+        """Mask of the shadow casters that transmit some light."""
         return self.casts & self.translucent
 
 
 def read_triangles(data: bytes, name: str = "scene.glb") -> Triangles:
-    """The triangles of a .glb; ManifestError, in one line, where it is none or of a kind that no bake writes (sparse, compressed)."""
+    """The triangles of a .glb; ManifestError if it is no .glb, or of a kind that no bake writes (sparse, compressed)."""
     try:
         return _Reader(Glb.parse(data)).triangles()
     except DAMAGE as error:
@@ -74,11 +74,13 @@ class _Reader:
         if not found:
             raise ValueError("no triangles in it")
         corners, normals, material, casts, places = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        tints = np.stack([np.zeros((KNOTS, 3)), *map(_tint, document.get("materials", []))])
+        transmittance = np.stack([np.zeros((KNOTS, 3)), *map(_transmittance, document.get("materials", []))])
         if not (np.isfinite(corners).all() and np.isfinite(normals).all()):
             raise ValueError("corners that are not finite")
         lightmap = places.astype(np.float32) if np.isfinite(places).any() else None
-        return Triangles(corners.astype(np.float32), normals.astype(np.float32), material, casts, tints.astype(np.float32), lightmap)
+        return Triangles(
+            corners.astype(np.float32), normals.astype(np.float32), material, casts, transmittance.astype(np.float32), lightmap
+        )
 
     def _visit(self, index: int, parent: Float64[ndarray, "4 4"], found: list[tuple[np.ndarray, ...]]) -> None:
         node = self._document["nodes"][index]
@@ -113,8 +115,8 @@ class _Reader:
         return self._glb.values(primitive["indices"]).reshape(-1, 3)
 
 
-def _tint(material: dict[str, Any]) -> Float64[ndarray, "KNOTS 3"]:
-    """By angle where srbf wrote it, else a transmission's base color at every angle."""
+def _transmittance(material: dict[str, Any]) -> Float64[ndarray, "KNOTS 3"]:
+    """By angle if srbf wrote it, else the base color of a transmissive material at every angle."""
     curve = material.get("extras", {}).get("tint_by_cosine")
     if curve is not None:
         return np.array(curve, np.float64).reshape(KNOTS, 3)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy import ndarray
@@ -15,17 +15,10 @@ from srbf.io.image import encode_srgb, write_image
 Alpha = Literal["straight", "premultiplied", "none"]
 
 
-def receiver_kind(asset: Asset) -> str:
-    """`view`, `lightmap` or `vertices`, as the asset's source says; a picture of which nothing is known is a view."""
-    source = asset.manifest.get("source", {})
-    first: dict[str, Any] = source.get("receiver") or next(iter(source.get("receivers", [])), {})
-    return str(first.get("kind") or "view")
-
-
 def alpha_of(asset: Asset) -> Float32[ndarray, "H W"] | None:
     """The coverage of a view, 0 to 1; None where all of it is covered, where nothing is known, and for lightmaps and vertices."""
     coverage = asset.images.get("coverage")
-    if coverage is None or receiver_kind(asset) != "view":
+    if coverage is None or asset.receiver_kind != "view":
         return None
     alpha = np.clip(coverage, 0, 1).astype(np.float32)
     return None if (alpha == 1).all() else alpha

@@ -31,7 +31,7 @@ class DirectLight(Protocol):
         """The direct diffuse light of `lights`; environments add nothing."""
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
-        """`answer` to a white light from each of many directions."""
+        """`response` to a white light from each of many directions."""
 
 
 def chosen(asset: Asset, asked: Direct | None) -> Direct:
@@ -41,7 +41,7 @@ def chosen(asset: Asset, asked: Direct | None) -> Direct:
     """
     if asset.transport == "combined":
         if asked not in (None, "none"):
-            raise InputError(f"expected an indirect asset for --direct {asked}, found a combined one: it holds the direct light already")
+            raise InputError(f"expected an indirect asset for `direct={asked}`, found a combined one: it holds the direct light already")
         return "none"
     if asked is not None:
         return asked
@@ -74,7 +74,7 @@ class Added:
         return None if self._light is None else self._light.response([moved(light, self._frame) for light in lights])
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
-        """The answers to white lights from world-space `directions`, 0 where none is added."""
+        """The responses to white lights from world-space `directions`, 0 where none is added."""
         return 0.0 if self._light is None else self._light.directional(directions @ _rotation(self._frame).T)
 
     def notes(self, lights: Sequence[Light]) -> list[str]:

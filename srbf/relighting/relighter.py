@@ -1,4 +1,4 @@
-"""Relighting an asset on the GPU: the same answer as `srbf.methods.relight`, by the shader pack."""
+"""Relighting an asset on the GPU: the same as `srbf.methods.relight`, by the shader pack."""
 
 from __future__ import annotations
 
@@ -13,15 +13,13 @@ from numpy import ndarray
 from srbf.arrays import Float32
 from srbf.asset import Asset
 from srbf.errors import InputError
-from srbf.gl.coefficient_maps import ComponentPasses
 from srbf.gl.context import Limits, create_context
 from srbf.gl.depth_buffer import DepthView
-from srbf.gl.environment import Sky
+from srbf.gl.environment import EnvironmentWeights
 from srbf.gl.programs import Programs
-from srbf.gl.relighting_map import MapPasses
 from srbf.gl.textures import AssetTextures
-from srbf.lights import EnvironmentLight, Light, PointLight, moved
-from srbf.methods import projected_weights
+from srbf.lights import EnvironmentLight, Light, PointLight
+from srbf.methods import in_asset_frame, method_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -32,11 +30,6 @@ Place = Literal["host", "gpu"]
 
 UNITS = 5  # maps, or images of four planes, a pass of the multi-pass variant
 MAX_UNITS = 8  # as many terms as stages/accumulate.frag spells out
-PASSES: dict[str, type[MapPasses | ComponentPasses]] = {
-    "relighting-map": MapPasses,
-    "eigen-map": ComponentPasses,
-    "clustered-eigen-map": ComponentPasses,
-}
 
 
 def relight(
@@ -55,9 +48,9 @@ class Relighter:
     """An asset's textures and programs on the GPU, ready to relight frame after frame; a context manager.
 
     Lights add up in RGBA32F; target says what the frame is kept in: `float` RGBA32F, `half` RGBA16F. Without a `context` (moderngl)
-    it makes a headless one of its own. `functions`: R of lamps from the asset's table, or by formula. `environments`: where their weights
-    are integrated; by shaders a sky may change from frame to frame. With a `view` receivers stand where its depth buffer says, not where
-    the position map does.
+    it makes a headless one of its own. `functions`: R of point lights from the asset's table, or by formula. `environments`: where their
+    weights are integrated; by shaders they may change from frame to frame. With a `view` receivers are where its depth buffer says, not
+    where the position map does.
     Raises ShaderError without OpenGL 3.3 or where the asset exceeds the GPU, InputError on a method that no shader knows.
     """
 
@@ -71,8 +64,7 @@ class Relighter:
         environments: Place = "host",
         view: DepthView | None = None,
     ) -> None:
-        if asset.method not in PASSES:
-            raise InputError(f"expected an asset of {', '.join(PASSES)}, found {asset.method}: no shader relights it")
+        passes = method_of(asset).gl_passes()
         if target not in get_args(Target):
             raise InputError(f"expected a target of float, half, found {target!r}")
         if functions not in get_args(Functions):
@@ -91,13 +83,13 @@ class Relighter:
                 self._sum, self._sum_buffer = self._target("f4")  # half would lose up to a step with every pass
                 _, self._relit_buffer = self._target(self._type)
                 self._programs = Programs(self._context, self._resources)
-                self._sky = None
+                self._environment = None
                 if environments == "gpu":
-                    self._sky = Sky(self._context, asset, self._programs, self._textures, self._resources)
+                    self._environment = EnvironmentWeights(self._context, asset, self._programs, self._textures, self._resources)
         except BaseException:
             self.close()
             raise
-        self._passes = PASSES[asset.method](asset, self._programs, self._textures, self._limits, functions == "formula")
+        self._passes = passes(asset, self._programs, self._textures, self._limits, functions == "formula")
 
     def __enter__(self) -> Relighter:
         return self
@@ -134,16 +126,16 @@ class Relighter:
         most = min(MAX_UNITS, self._limits.texture_units)
         if not 1 <= units <= most:
             raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
-        inside = [moved(light, self._asset.asset_from_world) for light in lights]
+        inside = in_asset_frame(self._asset, lights)
         point_lights = [light for light in inside if isinstance(light, PointLight)]
         if point_lights and not self._located:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if point_lights:
             self._passes.check_point_lights()
-        skies = [light for light in lights if isinstance(light, EnvironmentLight)] if self._sky is not None else []
-        weights = projected_weights(self._asset, [light for light in lights if light not in skies])
+        environments_lit = [light for light in inside if isinstance(light, EnvironmentLight)] if self._environment is not None else []
+        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in environments_lit])
         with self._context:
-            by_shader = None if self._sky is None or not skies else self._sky.weights(weights, skies)
+            by_shader = None if self._environment is None or not environments_lit else self._environment.weights(weights, environments_lit)
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)
@@ -152,7 +144,7 @@ class Relighter:
                 self._passes.weighted(by_shader)
                 weights = 0 * weights
             if weights.any() and (multipass or not point_lights):
-                self._passes.far(weights, at_once)
+                self._passes.distant(weights, at_once)
                 weights = 0 * weights
             if point_lights:
                 self._passes.point_lights(point_lights, weights, at_once)

@@ -1,4 +1,4 @@
-"""A report on an asset against the capture that it came from: pictures to look at, and a page that holds them."""
+"""The report on an asset against its capture: figures, and one page that holds them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
-from srbf.evaluation.rate_distortion import METHODS, Method
+from srbf.evaluation.rate_distortion import compared_methods
 from srbf.io import files
 from srbf.lights import Light
+from srbf.methods import Method
 from srbf.report.abrdf_mosaic import abrdf_tiles
 from srbf.report.contact_sheet import contact_sheet
 from srbf.report.findings import measure
@@ -22,13 +23,13 @@ from srbf.report.sphere import centers, r_curve
 from srbf.report.strips import animation, point_strip, spot_strip
 from srbf.report.subject import Picture, Subject, gather
 
-MAPS, POSITION = "maps", "position"  # what a picture needs of the asset
+MAPS, POSITION = "maps", "position"  # requirements of a figure on the asset
 Draw = Callable[[Subject, Path], Picture]
-WITHOUT = {
+REASONS = {
     MAPS: "Not drawn: this picture shows the terms of a relighting map of Gaussians, and the asset holds other functions.",
-    POSITION: "Not drawn: the asset has no position map (photographs never have one), and a lamp needs to know where receivers are.",
+    POSITION: "Not drawn: the asset has no position map (photographs never have one), which a point light needs.",
 }
-DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, how, what it needs
+FIGURES: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, function, requirements
     ("contact_sheet.png", "Reference against relit", contact_sheet, ()),
     ("animation.webp", "In motion", animation, ()),
     ("sum_of_maps.png", "A sum of maps", sum_of_maps, (MAPS,)),
@@ -39,7 +40,13 @@ DRAWN: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, ho
     ("centers.png", "Centers and lights", centers, (MAPS,)),
     ("r_curve.png", "The curve R", r_curve, (MAPS,)),
 )
-WRITTEN = (*(file for file, *_ in DRAWN), "error_by_light.png", "animation.gif", "report.md", "index.html")  # by any version
+REPORT_FILES = (
+    *(file for file, *_ in FIGURES),
+    "error_by_light.png",
+    "animation.gif",
+    "report.md",
+    "index.html",
+)  # of any version of the report
 
 
 def write_report(
@@ -54,29 +61,28 @@ def write_report(
     methods: Sequence[Method] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write pictures, report.md and index.html into `folder`, and return the path of index.html, which holds every figure in itself.
+    """Write the figures, report.md and index.html into `folder`; returns the path of index.html, which contains all figures.
 
-    `evaluation` is what `srbf.evaluation.errors_by_role.evaluate` gave for this asset and capture; `timings` are seconds by step;
-    `demo_lights` the point and spot lights to show instead of derived ones (lights of other kinds are not drawn);
-    `asset_folder` is where the asset was saved, for its size; `methods` are fitted to a sample of the
-    capture and compared. Files of an earlier report in `folder` are replaced.
-    What an asset lacks is left out with a sentence on the page. InputError where sizes or lights do not match,
-    MissingLibraryError without matplotlib.
+    `evaluation` is the result of `srbf.evaluation.errors_by_role.evaluate` for this asset and capture. `timings` are seconds by step.
+    `demo_lights` are point and spot lights to show instead of derived ones; other kinds are ignored. `asset_folder` is the saved asset,
+    for its size on disk. `methods` are fitted to a sample of the capture and compared. Replaces the files of an earlier report.
+    If the asset lacks the data of a figure, the page gives the reason. InputError if sizes or lights do not match, MissingLibraryError
+    without matplotlib.
     """
     folder = Path(folder)
     if (asset.width, asset.height) != (capture.width, capture.height):
         found = f"{capture.width}x{capture.height}"
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {found}")
     if {entry["file"] for entry in evaluation.get("lights", [])} != {light.file for light in capture.lights}:
-        raise InputError(f"expected an evaluation of the {len(capture.lights)} lights of {capture.folder}, found another's; evaluate again")
+        raise InputError(f"expected an evaluation of the {len(capture.lights)} lights of {capture.folder}, found others; evaluate again")
     files.make_folder(folder)
-    for name in WRITTEN:
+    for name in REPORT_FILES:
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
-    steps = 4 + len(DRAWN)
-    findings = measure(subject, METHODS if methods is None else methods, lambda done, total: progress(done, steps))
+    steps = 4 + len(FIGURES)
+    findings = measure(subject, compared_methods() if methods is None else methods, lambda done, total: progress(done, steps))
     pictures = []
-    for entry in DRAWN:
+    for entry in FIGURES:
         pictures.append(_draw(subject, folder, *entry))
         progress(4 + len(pictures), steps)
     return write_page(subject, findings, folder, pictures, timings, asset_folder)
@@ -86,7 +92,7 @@ def _draw(subject: Subject, folder: Path, file: str, title: str, draw: Draw, nee
     has = {MAPS: subject.asset.manifest.get("basis", {}).get("kind") == "gaussian", POSITION: bool(subject.points)}
     for need in needs:
         if not has[need]:
-            return Picture(file, title, WITHOUT[need], omitted=True)
+            return Picture(file, title, REASONS[need], omitted=True)
     if draw is animation:
         try:
             return draw(subject, folder)

@@ -1,7 +1,7 @@
-"""Rebinning made visible: the images of a capture as tiles, each an ABRDF over the light directions [Wong2005, fig. 1, 4].
+"""Rebinning: the images of a capture as tiles, each an ABRDF over the light directions [Wong2005, fig. 1, 4].
 
-A tile belongs to one receiver or to the mean over a block of them; a sparse `(G, P)` matrix says which. Its pixels are light
-directions: a disc looked down on from +z with x to the right and y up, or the whole sphere by latitude and longitude.
+A tile belongs to one receiver or to the mean over a block of them; a sparse `(G, P)` matrix defines it. Its pixels are light
+directions: a disc seen from +z with x to the right and y up, or the whole sphere by latitude and longitude.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.errors import InputError
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 
 Projection = Literal["equal-area", "orthographic", "latitude-longitude"]
-CHUNK = 1 << 16  # receivers; a few times as many answers are asked for at a time
+CHUNK = 1 << 16  # receivers; a block has at most 16 times as many responses
 
 
 def tile_directions(size: int, projection: Projection) -> Float64[ndarray, "h w 3"]:
     """Unit light direction of every pixel of a tile, row 0 at the top; NaN outside the disc.
 
-    `equal-area` (Lambert's azimuthal, every solid angle keeps its share) and `orthographic` show the hemisphere z > 0 on
+    `equal-area` (Lambert's azimuthal, preserves solid angle) and `orthographic` show the hemisphere z > 0 on
     (size, size) pixels; `latitude-longitude` the sphere on (size, 2 size), u = 1/2 - atan2(y, x) / 2 pi and +z on top, as
-    environment maps have it. InputError on another projection or a size below 1.
+    in environment maps. InputError on another projection or a size below 1.
     """
     if size < 1:
         raise InputError(f"expected a tile of 1 pixel or more, found {size}")
@@ -51,13 +51,13 @@ def tile_directions(size: int, projection: Projection) -> Float64[ndarray, "h w 
 
 
 def disc_points(directions: Float64[ndarray, "N 3"]) -> Float64[ndarray, "N 2"]:
-    """Where directions fall on the equal-area disc of radius 1; what lies below the horizon is mirrored up first."""
+    """Coordinates of directions on the equal-area disc of radius 1; directions below the horizon are mirrored up first."""
     directions = np.asarray(directions, np.float64)
     return directions[:, :2] / np.sqrt(1 + np.abs(directions[:, 2:]))
 
 
 def grid_for(height: int, width: int, tiles: int = 432) -> tuple[int, int]:
-    """(rows, columns) of about `tiles` nearly square blocks, never more than there are receivers."""
+    """(rows, columns) of about `tiles` nearly square blocks, at most one per receiver."""
     columns = max(1, round(np.sqrt(tiles * width / height)))
     rows = max(1, round(tiles / columns))
     return min(rows, height), min(columns, width)
@@ -66,8 +66,8 @@ def grid_for(height: int, width: int, tiles: int = 432) -> tuple[int, int]:
 def block_means(coverage: Float32[ndarray, "H W"], grid: tuple[int, int]) -> csr_array:
     """(G, P) matrix that averages each of grid = (rows, columns) blocks over its covered receivers, weighted by coverage.
 
-    Block edges fall on whole texels. A block without covered receivers is an empty row. A grid of (H, W) is one tile a receiver.
-    InputError where a block would hold no texel.
+    Block edges fall on whole texels. A block without covered receivers is an empty row. A grid of (H, W) gives one tile per receiver.
+    InputError if a block would hold no texel.
     """
     height, width = coverage.shape
     if not (1 <= grid[0] <= height and 1 <= grid[1] <= width):
@@ -94,9 +94,9 @@ def tile_count(tiles: csr_array) -> int:
 
 
 def rebin(capture: Capture, indices: Sequence[int], tiles: csr_array) -> Float32[ndarray, "L G 3"]:
-    """What each tile answers to each of the lights `indices`: (G, P) times T, read in blocks of images, never held whole.
+    """Response of each tile to each of the lights `indices`: (G, P) times T, where T is read in blocks of images.
 
-    NaN for a tile of no receivers.
+    NaN for a tile without receivers.
     """
     responses = np.empty((len(indices), tile_count(tiles), 3), np.float32)
     for first, block in capture.blocks(indices):
@@ -109,29 +109,29 @@ def rebin(capture: Capture, indices: Sequence[int], tiles: csr_array) -> Float32
 def captured_tiles(
     responses: Float32[ndarray, "L G 3"], lights: Float64[ndarray, "L 3"], directions: Float64[ndarray, "h w 3"]
 ) -> Float32[ndarray, "G h w 3"]:
-    """Tiles whose pixel holds the answer to the nearest light; NaN where `directions` are, outside the disc [Wong2005, fig. 1]."""
+    """Tiles whose pixels hold the response to the nearest light; NaN outside the disc, where `directions` is NaN [Wong2005, fig. 1]."""
     inside = np.isfinite(directions[..., 0])
-    nearest = KDTree(lights).query(directions[inside])[1]  # the nearest chord is the nearest angle
+    nearest = KDTree(lights).query(directions[inside])[1]  # the shortest chord has the smallest angle
     result = np.full((responses.shape[1], *inside.shape, 3), np.nan, np.float32)
     result[:, inside] = responses[nearest].transpose(1, 0, 2)
     return result
 
 
 def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h w 3"]) -> Float32[ndarray, "G h w 3"]:
-    """The same tiles from the fit: the answer at each pixel's own direction, signed, before the clamp [Wong2005, eq. 1, fig. 4].
+    """The same tiles from the fit: the signed response at each pixel's direction, before the clamp [Wong2005, eq. 1, fig. 4].
 
-    By the asset's method, whatever it is: every receiver that a tile has is asked for every direction, CHUNK answers at a time.
+    Evaluates the asset's method for every receiver of a tile and every direction, in blocks.
     """
     receivers = np.unique(tiles.indices)
     picked, columns = asset.at(receivers), tiles.tocsc()[:, receivers].tocsr()
     inside = np.isfinite(directions[..., 0])
     asked = directions[inside]
     responses = np.full((len(asked), tile_count(tiles), 3), np.nan, np.float32)
-    at_a_time = max(1, 16 * CHUNK // max(1, len(receivers)))
-    for start in range(0, len(asked) if len(receivers) else 0, at_a_time):
-        images = directional_responses(picked, asked[start : start + at_a_time])[:, 0]  # (b, n, 3)
+    block = max(1, 16 * CHUNK // max(1, len(receivers)))
+    for start in range(0, len(asked) if len(receivers) else 0, block):
+        images = asset_responses(picked, asked[start : start + block])[:, 0]  # (b, n, 3)
         means = columns @ images.transpose(1, 0, 2).reshape(len(receivers), -1)
-        responses[start : start + at_a_time] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
+        responses[start : start + block] = means.reshape(len(means), -1, 3).transpose(1, 0, 2)
     responses[:, _empty(tiles)] = np.nan
     result = np.full((tile_count(tiles), *inside.shape, 3), np.nan, np.float32)
     result[:, inside] = responses.transpose(1, 0, 2)
@@ -139,7 +139,7 @@ def fitted_tiles(asset: Asset, tiles: csr_array, directions: Float64[ndarray, "h
 
 
 def mosaic(tiles: Float32[ndarray, "G h w 3"], grid: tuple[int, int], gap: int = 1) -> Float32[ndarray, "H W 3"]:
-    """Tiles laid out as their blocks lie in the image, `gap` pixels of NaN between them."""
+    """Tiles arranged as their blocks in the image, with `gap` pixels of NaN between them."""
     rows, columns = grid
     _, h, w, _ = tiles.shape
     sheet = np.full((rows, h + gap, columns, w + gap, 3), np.nan, np.float32)

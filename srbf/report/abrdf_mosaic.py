@@ -1,4 +1,4 @@
-"""ABRDF tiles before and after the fit: the whole image as a grid of them, and a few receivers large."""
+"""ABRDF tiles before and after the fit: a grid over the whole image, and a few enlarged receivers."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from srbf.sphere import farthest_points
 
 FILE = "abrdf_tiles.png"
 TILES = {"hemisphere": 432, "sphere": 216}  # a sphere's tile is twice as wide
-WIDE, TALL = 590, 640  # the largest mosaic, in sheet units
+MAX_WIDTH, MAX_HEIGHT = 590, 640  # of a mosaic, in sheet units
 GAP = 2  # pixels between tiles
-LARGE = 144  # pixels of a single receiver's tile
-CANDIDATES, PROBES = 128, 6  # receivers looked at, and drawn
+LARGE_TILE = 144  # pixels of a single receiver's tile
+CANDIDATES, PROBES = 128, 6  # receivers examined, and drawn
 
 
 def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
@@ -51,8 +51,8 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
         np.append(probe_responses.transpose(1, 0, 2).reshape(len(candidates), -1), 0 * probe_responses[0, :, :1], 1), PROBES
     )
     squash = 2 if sphere else 1  # a latitude-longitude tile is twice as wide as high
-    side = int(min(WIDE * DPI / 100 / grid[1] - GAP, squash * (TALL * DPI / 100 / grid[0] - GAP)))
-    small, large = tile_directions(max(1, side // squash), projection), tile_directions(LARGE // squash, projection)
+    side = int(min(MAX_WIDTH * DPI / 100 / grid[1] - GAP, squash * (MAX_HEIGHT * DPI / 100 / grid[0] - GAP)))
+    small, large = tile_directions(max(1, side // squash), projection), tile_directions(LARGE_TILE // squash, projection)
     before = mosaic(captured_tiles(responses[:, : tile_count(blocks)], lights, small), grid, GAP)
     after = mosaic(fitted_tiles(asset, blocks, small), grid, GAP)
     frame = mosaic(np.repeat(small[None], grid[0] * grid[1], axis=0).astype(np.float32), grid, GAP)
@@ -71,12 +71,12 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
     sheet = Sheet(
         2 * MARGIN + 2 * wide + gap,
         y + max(2 * cell_h + 16, picture_h) + 30,
-        "Rebinned: what each part of the image answers to every light",
-        f"One tile a block of receivers ({grid[1]}×{grid[0]}); a tile shows {view}; {gain_text(gain)}.",
+        "Rebinned: the response of each part of the image to every light",
+        f"One tile per block of receivers ({grid[1]}×{grid[0]}); a tile shows {view}; {gain_text(gain)}.",
     )
-    sheet.image(MARGIN, top, wide, tall, paper(before, gain, frame), label=f"captured: {len(train)} lights, nearest one a pixel")
+    sheet.image(MARGIN, top, wide, tall, paper(before, gain, frame), label=f"captured: {len(train)} lights, the nearest one per pixel")
     sheet.image(MARGIN + wide + gap, top, wide, tall, paper(after, gain, frame), label=f"fitted: {name_of(asset)}")
-    sheet.text(MARGIN, y - 28, "Single receivers whose answers differ most", size=10, va="center", weight="bold")
+    sheet.text(MARGIN, y - 28, "Single receivers whose responses differ most", size=10, va="center", weight="bold")
     brightest = int(np.argmax(subject.references[:, covered].mean(axis=(1, 2))))
     sheet.image(MARGIN, y, picture_w, picture_h, shown(subject.references[brightest], subject.gain, covered))
     x0 = MARGIN + picture_w + 74
@@ -93,23 +93,23 @@ def abrdf_tiles(subject: Subject, folder: Path) -> Picture:
         sheet.text(x0 - 10, y + line * (cell_h + 12) + cell_h / 2, label, size=8.5, color=SOFT, ha="right", va="center")
     sheet.save(folder / FILE)
     caption = (
-        f"The capture rebinned: each tile is the mean answer of a block of receivers as a function on the {asset.domain} "
+        f"The capture rebinned: each tile is the mean response of a block of receivers as a function on the {asset.domain} "
         "of light directions, before (nearest train light) and after "
-        "the fit (negative sums black), and six single receivers large (after figures 1 and 4). "
+        "the fit (negative sums black), and six single receivers enlarged (after figures 1 and 4). "
         f"Shown at {gain_text(gain)}."
     )
     return Picture(FILE, "ABRDF tiles", caption)
 
 
 def paper(image: Float32[ndarray, "H W 3"], gain: float, frame: ndarray) -> ndarray:
-    """Display values: as white as the sheet where `frame` (H, W, 3) is NaN, gray where a tile has no covered receiver."""
+    """Display values: white like the sheet where `frame` (H, W, 3) is NaN, gray where a tile has no covered receiver."""
     display = shown(image, gain)
     display[np.isnan(frame[..., 0])] = 1.0
     return display
 
 
 def spread_receivers(covered: ndarray, count: int) -> ndarray:
-    """Flat indices of at most `count` covered receivers on a regular lattice over the image, all of them where it finds none."""
+    """Flat indices of at most `count` covered receivers on a regular lattice over the image, or of all if it misses them."""
     height, width = covered.shape
     rows, columns = grid_for(height, width, count)
     r = ((np.arange(rows) + 0.5) * height / rows).astype(np.int64)

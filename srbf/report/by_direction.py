@@ -1,10 +1,10 @@
-"""Error over the sphere of directions: a disc a role, and PSNR against the light's elevation."""
+"""Error over the sphere of directions: one disc per role, and PSNR against the light's elevation."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.report.inline import figure, ramp
 from srbf.report.plot import Axis, Plot, disc, on_disc, svg
 from srbf.report.sphere import on_half
@@ -21,15 +21,14 @@ def by_direction(subject: Subject) -> str:
     """The discs and the plot as one figure."""
     values = np.array([subject.psnr_of(i) for i in range(len(subject.capture.lights))])
     caption = (
-        "PSNR of every light over the directions that light comes from: equal-area discs of the hemisphere seen from +z, world x to the "
-        "right and y up, one a role, the best light dark and the worst bright; the ring marks each role's worst. Below, the same against "
-        "the light's elevation."
+        "PSNR of every light over its direction: equal-area discs of the hemisphere seen from +z, world x to the right and y up, one per "
+        "role, the best light dark and the worst bright; a ring marks the worst of each role. Below: PSNR against elevation."
     )
     return figure(discs(subject, values) + against_elevation(subject, values), caption)
 
 
 def discs(subject: Subject, values: np.ndarray) -> str:
-    """A disc a role with lights, two where lights come from below as well."""
+    """One disc per role that has lights, two if some lights are below the horizon."""
     directions = subject.capture.directions()
     halves = (1, -1) if (directions[:, 2] < 0).any() else (1,)
     roles = [role for role in ROLES if subject.capture.indices(role)]
@@ -44,8 +43,8 @@ def discs(subject: Subject, values: np.ndarray) -> str:
         indices = np.array(subject.capture.indices(role))
         error = subject.evaluation[role]
         parts.append(f'<text class="strong" x="{cx - RADIUS:.1f}" y="14">{role}</text>')
-        told = f"{len(indices)} lights, {error['psnr']:.2f} dB"
-        parts.append(f'<text class="soft" x="{cx + RADIUS:.1f}" y="14" text-anchor="end">{told}</text>')
+        count = f"{len(indices)} lights, {error['psnr']:.2f} dB"
+        parts.append(f'<text class="soft" x="{cx + RADIUS:.1f}" y="14" text-anchor="end">{count}</text>')
         worst = int(indices[np.argmin(values[indices])])
         for line, half in enumerate(halves):
             cy = HEAD + RADIUS + line * (2 * RADIUS + 30)
@@ -57,8 +56,8 @@ def discs(subject: Subject, values: np.ndarray) -> str:
             here = indices[on_half(directions[indices], half)]
             for index, px, py in zip(here, *on_disc(directions[here], cx, cy, RADIUS), strict=True):
                 step = int(np.clip((values[index] - low) / max(high - low, 1e-9) * STEPS, 0, STEPS - 1))
-                told = f"<title>{values[index]:.1f} dB</title>"
-                parts.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="{DOT[role]:g}" fill="{colors[step]}">{told}</circle>')
+                title = f"<title>{values[index]:.1f} dB</title>"
+                parts.append(f'<circle cx="{px:.1f}" cy="{py:.1f}" r="{DOT[role]:g}" fill="{colors[step]}">{title}</circle>')
                 if index == worst:
                     parts.append(f'<circle class="ring" cx="{px:.1f}" cy="{py:.1f}" r="{DOT[role] + 3.5:g}"/>')
                     side = -1 if px > cx else 1

@@ -1,4 +1,4 @@
-"""The sheet that every figure of a report is drawn on, and the one way from linear values to what is shown."""
+"""The sheet on which the figures are drawn, and the conversion of linear values to display values."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from srbf.report.abrdf import disc_points
 INK, SOFT, RULE = "#262626", "#707070", "#c9c9c9"
 ROLE_COLOR = {"train": "#8a99a8", "validation": "#2f7fa8", "holdout": "#c4502f"}
 ROLE_MARKER = {"train": "o", "validation": "D", "holdout": "s"}
-UNCOVERED = 0.82  # sRGB: receivers that are not real
+UNCOVERED = 0.82  # sRGB gray of texels outside the validity mask
 DPI = 150  # of the saved PNG; sheets are laid out in units of 1/100 inch
 MARGIN = 28
-NARROWEST = 760  # a sheet at least holds its title
+MIN_WIDTH = 760  # of a sheet, so that the title fits
 
 
 class Sheet:
     """A white sheet in units of 1/100 inch from its top left corner, with a title and a line of explanation."""
 
     def __init__(self, width: float, height: float, title: str, note: str = "") -> None:
-        """MissingLibraryError without matplotlib."""
+        """An empty sheet; MissingLibraryError without matplotlib."""
         try:
             from matplotlib.backends.backend_agg import FigureCanvasAgg
             from matplotlib.figure import Figure
         except ImportError as error:
             raise MissingLibraryError("writing a report needs matplotlib: pip install matplotlib") from error
-        width = max(width, NARROWEST)
+        width = max(width, MIN_WIDTH)
         self.width, self.height = width, height
         self.figure = Figure(figsize=(width / 100, height / 100), dpi=DPI, facecolor="white")
         FigureCanvasAgg(self.figure)
@@ -45,11 +45,11 @@ class Sheet:
         self.text(MARGIN, 46, note, size=8.5, color=SOFT, va="top")
 
     def text(self, x: float, y: float, text: str, size: float = 9, color: str = INK, **options: Any) -> None:
-        """Text at (x, y); alignment and weight as matplotlib names them."""
+        """Text at (x, y); `options` are those of matplotlib."""
         self.figure.text(x / self.width, 1 - y / self.height, text, fontsize=size, color=color, **options)
 
     def axes(self, x: float, y: float, width: float, height: float) -> Any:
-        """Axes in the given box, quietly styled."""
+        """Axes in the given box, with thin gray lines."""
         axes = self.figure.add_axes((x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height))
         axes.tick_params(labelsize=8, colors=SOFT, length=3)
         for name, spine in axes.spines.items():
@@ -66,7 +66,7 @@ class Sheet:
             self.text(x, y - 4, label, va="bottom")
 
     def sun(self, x: float, y: float, size: float, direction: ndarray) -> None:
-        """A light direction on the disc of directions seen from above (x right, y up); a ring where it comes from below."""
+        """A light direction on the disc of directions seen from above (x right, y up); a ring if it is below the horizon."""
         from matplotlib.patches import Circle
 
         radius = size / 2.24
@@ -79,7 +79,7 @@ class Sheet:
         self.point_light(cx + px, cy - py, above=bool(direction[2] > 0))
 
     def point_light(self, x: float, y: float, above: bool = True, size: float = 6.5) -> None:
-        """A yellow dot, hollow for what is below the horizon."""
+        """A yellow dot, hollow for lights below the horizon."""
         self._paper.plot(x, y, "o", ms=size, mfc="#f0b429" if above else "white", mec="#a87512", mew=0.9)
 
     def dots(self, points: ndarray) -> None:
@@ -87,7 +87,7 @@ class Sheet:
         self._paper.scatter(*points.T, s=0.4, color=RULE)
 
     def save(self, path: Path) -> None:
-        """Write the PNG, whole or not at all; equal figures give equal bytes."""
+        """Write the PNG atomically; equal figures give equal bytes."""
         with atomic_path(path) as temporary:
             self.figure.savefig(temporary, dpi=DPI, metadata={"Software": None})
 
@@ -127,17 +127,17 @@ def shown_signed(values: Float32[ndarray, "H W 3"], scale: float, covered: ndarr
 
 
 def box_for(width: int, height: int, area: float, widest: float, tallest: float) -> tuple[float, float]:
-    """(width, height) of about `area` in the image's proportion, within the largest box."""
+    """(width, height) of about `area` with the image's aspect ratio, within `widest` and `tallest`."""
     w = np.sqrt(area * width / height)
     w = min(w, widest, tallest * width / height)
     return float(w), float(w * height / width)
 
 
 def gain_text(gain: float) -> str:
-    """An exposure as it stands in captions: factor and stops."""
+    """An exposure as caption text: factor and stops."""
     return f"exposure ×{gain:.3g} ({np.log2(gain):+.1f} EV)"
 
 
 def place_text(position: Sequence[float]) -> str:
-    """A position in meters to the centimetre, without a negative zero."""
+    """A position in meters, rounded to centimeters, without a negative zero."""
     return "(" + ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in position) + ")"

@@ -1,4 +1,4 @@
-"""Reference, relit image and their difference, side by side for directions that the fit has not seen."""
+"""Reference, relit image and their difference, side by side for held-out directions."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from srbf.report.subject import Picture, Subject
 
 FILE = "contact_sheet.png"
 LEGEND, GAP, TOP = 128, 14, 92
-GLYPH, LOWEST = 64, 116  # the sun, and the row that it and its text need
+GLYPH_SIZE, MIN_ROW_HEIGHT = 64, 116  # of the sun glyph, and of a row with its text
 
 
 def contact_sheet(subject: Subject, folder: Path) -> Picture:
-    """Write contact_sheet.png: a row a direction, all under one exposure; the difference under a stated further gain."""
+    """Write contact_sheet.png: one row per direction, all under one exposure; the difference has a further gain, stated in its label."""
     asset, gain = subject.asset, subject.gain
     w, h = box_for(asset.width, asset.height, area=290 * 195, widest=380, tallest=290)
     difference = np.abs(subject.relit - subject.references)
     boost = difference_gain(difference[:, subject.covered], gain)
-    rows, pitch = len(subject.shown), max(h, LOWEST) + GAP
+    rows, pitch = len(subject.shown), max(h, MIN_ROW_HEIGHT) + GAP
     sheet = Sheet(
         2 * MARGIN + LEGEND + 3 * w + 2 * GAP,
         TOP + rows * pitch + 14,
         f"Relit under {len(subject.shown)} {subject.role_words.split(' (this')[0].split(',')[0]}",
-        f"Reference and relit: {gain_text(gain)}; difference ×{boost:g} on top. Sun: seen from above, world x right, y up.",
+        f"Reference and relit: {gain_text(gain)}; difference a further ×{boost:g}. Sun: seen from above, world x right, y up.",
     )
     x = [MARGIN + LEGEND + i * (w + GAP) for i in range(3)]
     for column, label in zip(x, ("reference", "relit", f"|difference| ×{boost:g}"), strict=True):
@@ -37,14 +37,14 @@ def contact_sheet(subject: Subject, folder: Path) -> Picture:
             x, (subject.references[row], subject.relit[row], difference[row]), (gain, gain, gain * boost), strict=True
         ):
             sheet.image(column, y, w, h, shown(pixels, factor, subject.covered))
-        sheet.sun(MARGIN, y, GLYPH, direction)
-        sheet.text(MARGIN, y + GLYPH + 6, f"{subject.psnr_of(subject.shown[row]):.1f} dB", size=12, va="top", weight="bold")
+        sheet.sun(MARGIN, y, GLYPH_SIZE, direction)
+        sheet.text(MARGIN, y + GLYPH_SIZE + 6, f"{subject.psnr_of(subject.shown[row]):.1f} dB", size=12, va="top", weight="bold")
         elevation, azimuth = np.degrees(np.arcsin(direction[2])), np.degrees(np.arctan2(direction[1], direction[0]))
-        sheet.text(MARGIN, y + GLYPH + 28, f"elevation {elevation:.0f}°\nazimuth {azimuth:.0f}°", size=8, color=SOFT, va="top")
+        sheet.text(MARGIN, y + GLYPH_SIZE + 28, f"elevation {elevation:.0f}°\nazimuth {azimuth:.0f}°", size=8, color=SOFT, va="top")
     sheet.save(folder / FILE)
     caption = (
-        f"Reference, relit and absolute difference for {rows} {subject.role_words}, chosen to lie far apart, with the PSNR of each. "
-        f"Shown at {gain_text(gain)}: the 99.5 % quantile of these references lies at 0.9; differences are ×{boost:g} on top of it."
+        f"Reference, relit and absolute difference for {rows} {subject.role_words}, chosen far apart, with the PSNR of each. "
+        f"Shown at {gain_text(gain)}: the 99.5 % quantile of these references is 0.9; differences have a further ×{boost:g}."
     )
     return Picture(FILE, "Reference against relit", caption)
 

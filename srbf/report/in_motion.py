@@ -1,4 +1,4 @@
-"""How the picture moves while a light sweeps between the captured directions: change, brightness and ghosts, frame by frame."""
+"""Plots of motion under a light that sweeps between the captured directions: change, brightness and ghosting per frame."""
 
 from __future__ import annotations
 
@@ -13,43 +13,43 @@ RIGHT = 106.0  # for labels at the lines' ends
 
 
 def motion_figures(motion: Motion) -> Table:
-    """The figures of a sweep beside those of a perfect relighter."""
+    """The measures of a sweep beside their ideal values."""
     rows = (
-        ("change of the relit picture over the reference's", f"{motion.change_ratio:.2f}", "1.00", "above 1 it boils, below 1 it drags"),
-        ("largest single step, likewise", f"{motion.largest_step:.2f}", "1.00", "a pop"),
+        ("change of the relit image over the reference's", f"{motion.change_ratio:.2f}", "1.00", "above 1 flicker, below 1 lag"),
+        ("largest single step over the reference's", f"{motion.largest_step:.2f}", "1.00", "popping"),
         ("largest error of the mean brightness", f"{motion.brightness_error:.1%}", "0.0%", "where the reference is bright"),
-        ("largest ripple of the mean brightness", f"{motion.largest_ripple:.1%}", "0.0%", "pulsing, less any gain or tilt"),
+        ("largest flicker of the mean brightness", f"{motion.largest_flicker:.1%}", "0.0%", "without any gain or tilt"),
         ("ghosting of shadow edges", f"{motion.ghosting:.2f}", "0.00", "change at the wrong time over all change of edges"),
-        ("shadow edges' motion kept", f"{motion.edge_kept:.2f}", "1.00", "change at the right time"),
+        ("motion of shadow edges kept", f"{motion.edge_kept:.2f}", "1.00", "change at the right time"),
     )
-    return Table("Figures of the sweep", ("what", "here", "perfect", "meaning"), rows)
+    return Table("Motion", ("measure", "here", "ideal", "meaning"), rows)
 
 
 def motion_curves(motion: Motion) -> str:
-    """Three plots over the frames of all circles, one after the other."""
+    """Three plots over the frames of all circles in sequence."""
     circles, frames = motion.relit_brightness.shape
     rms = float(np.sqrt((motion.reference_change**2).mean()))
     mean = float(motion.reference_brightness.mean())
     edge = float(motion.edge.mean())
     error = 100 * (motion.relit_brightness - motion.reference_brightness) / mean
-    ghosts = edge > 0
+    has_edges = edge > 0
     plots = [
         _two("change from frame to frame, over the reference's rms", frames, (motion.relit_change / rms, motion.reference_change / rms)),
         _two(
             "mean brightness less the reference's, % of its mean",
             frames,
-            (100 * motion.ripple, error),
-            ("ripple", "error"),
-            last=not ghosts,
+            (100 * motion.flicker, error),
+            ("flicker", "error"),
+            last=not has_edges,
         ),
     ]
-    if ghosts:
+    if has_edges:
         pair = (motion.ghost / edge, motion.edge / edge)
-        plots.append(_two("change at shadow edges, over the mean of passing ones", frames, pair, ("ghosts", "edges passing"), last=True))
+        plots.append(_two("change at shadow edges, over the mean of passing edges", frames, pair, ("ghosting", "passing edges"), last=True))
     caption = (
-        f"{circles * frames} frames of one white light along {circles} great circles (upright lines part them), compared with all train "
-        "images interpolated, which is what the capture knows of directions between its own. Ripple is the error less any gain, offset or "
-        "tilt. Ghosts are changes at shadow-edge texels while no edge passes them."
+        f"{circles * frames} frames of one white light along {circles} great circles (separated by vertical lines), compared with all "
+        "train images interpolated, the best reference between the captured directions. Flicker is the error without gain, offset and "
+        "tilt. Ghosting is change at shadow-edge texels while no edge passes them."
     )
     return figure("".join(f'<div class="row">{plot}</div>' for plot in plots), caption)
 
@@ -57,7 +57,7 @@ def motion_curves(motion: Motion) -> str:
 def _two(
     label: str, frames: int, curves: tuple[np.ndarray, np.ndarray], names: tuple[str, str] = ("relit", "reference"), last: bool = False
 ) -> str:
-    """Two curves (C, F or F - 1), the first in color, labeled at their ends; the frames' axis is named on the `last` plot."""
+    """Two curves (C, F or F - 1), the first in color, labeled at their ends; only the `last` plot names the axis of frames."""
     circles, steps = curves[0].shape
     low, high = (float(f(np.stack(curves))) for f in (np.min, np.max))
     low = 0.0 if low >= 0 else low - 0.06 * (high - low)

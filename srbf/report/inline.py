@@ -1,4 +1,4 @@
-"""Files and pixels as data that a page can hold in itself, and the small elements that it is made of."""
+"""Files and pixels as data URIs, and the HTML elements of the page."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SHEET_QUALITY = 92
 
 @dataclass(frozen=True)
 class Table:
-    """A heading and rows of text under column names; columns but the first are set as numbers where `numbers`."""
+    """A heading and rows of text under column names; with `numbers`, all columns except the first are right-aligned."""
 
     title: str
     columns: tuple[str, ...]
@@ -43,7 +43,7 @@ class Table:
 
 
 def data_uri(path: Path) -> str:
-    """An image file as a data URI; a PNG as WebP of high quality, a third of it, where Pillow can."""
+    """An image file as a data URI; a PNG becomes WebP of high quality, a third of its size, if Pillow supports it."""
     from PIL import Image, features
 
     if path.suffix == ".png" and features.check("webp"):
@@ -70,17 +70,17 @@ def image(source: str, alt: str, style: str = "") -> str:
 
 
 def figure(inside: str, caption: str, style: str = "") -> str:
-    """A figure of ready elements and its caption in plain text."""
+    """A figure: HTML elements and a caption of plain text."""
     return f"<figure{_class(style)}>{inside}\n<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def paragraphs(*texts: str) -> str:
-    """Plain text, a paragraph each."""
+    """Plain texts, one paragraph each."""
     return "\n".join(f"<p>{escape(text)}</p>" for text in texts)
 
 
 def colored(values: ndarray, top: float, name: str, covered: ndarray, uncovered: float) -> ndarray:
-    """Scalars (H, W) as display values by a matplotlib color map from 0 to `top`; `uncovered` gray where nothing is."""
+    """Scalars (H, W) as display values by a matplotlib color map from 0 to `top`; the gray `uncovered` outside `covered`."""
     from matplotlib import colormaps
 
     display = colormaps[name](np.clip(values / max(top, 1e-30), 0, 1))[..., :3]

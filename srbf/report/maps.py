@@ -1,4 +1,4 @@
-"""How relighting maps, weighed by R_i(L0), add up to a relit image."""
+"""The sum of relighting maps, weighted by R_i(L0), that is a relit image."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from srbf.methods import directional_responses
-from srbf.methods.relighting_map import directional_weights
+from srbf.methods import responses
+from srbf.methods.relighting_map import basis_weights
 from srbf.report.canvas import MARGIN, SOFT, Sheet, box_for, gain_text, shown, shown_signed
 from srbf.report.subject import Picture, Subject
 
@@ -22,7 +22,7 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
     row = int(np.argmin([abs(subject.direction(i)[2] - np.sin(np.radians(45))) for i in range(len(subject.shown))]))
     world = subject.direction(row)
     direction = asset.asset_from_world[:3, :3] @ world
-    weights = directional_weights(asset, direction / np.linalg.norm(direction))
+    weights = basis_weights(asset, direction[None] / np.linalg.norm(direction))[0]
     terms = [int(i) for i in np.argsort(-weights, kind="stable")[:TERMS]]
     maps = np.stack([decoded(subject, i) for i in terms])
     scale = signed_scale(maps[:, covered])
@@ -77,13 +77,13 @@ def sum_of_maps(subject: Subject, folder: Path) -> Picture:
     caption = (
         f"The {len(terms)} maps of largest weight for one {subject.role} light, times their weights, and the running sum "
         "(after the article's figure 6). Coefficients are signed, so maps and shares are shown offset: mid gray is 0. "
-        "The disc beside a weight shows where that map's center looks."
+        "The disc beside a weight shows that map's center."
     )
     return Picture(FILE, "A sum of maps", caption)
 
 
 def decoded(subject: Subject, i: int) -> np.ndarray:
-    """Map c_i, (H, W, 3), alone."""
+    """Map c_i decoded, (H, W, 3)."""
     asset = subject.asset
     stored = asset.stored[i].astype(np.float32)
     return (stored / 255 if asset.held == "uint8" else stored) * asset.scale[i] + asset.bias[i]
@@ -91,9 +91,9 @@ def decoded(subject: Subject, i: int) -> np.ndarray:
 
 def unclamped(subject: Subject, direction: np.ndarray) -> np.ndarray:
     """The signed sum of all maps under one white light, (H, W, 3)."""
-    return directional_responses(subject.asset, direction[None])[0]
+    return responses(subject.asset, direction[None])[0]
 
 
 def signed_scale(values: np.ndarray) -> float:
-    """The magnitude that white and black stand for: a high quantile of |values|, never 0."""
+    """The magnitude shown as white and black: a high quantile of |values|, never 0."""
     return max(float(np.quantile(np.abs(values), SIGNED_QUANTILE)), 1e-6) if values.size else 1.0

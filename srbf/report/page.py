@@ -1,4 +1,4 @@
-"""The page of a report: one file of HTML that holds all its figures, and the same in Markdown beside pictures of its own."""
+"""The page of a report: one HTML file that contains all figures, and a Markdown file beside the figures."""
 
 from __future__ import annotations
 
@@ -10,33 +10,35 @@ from pathlib import Path
 import numpy as np
 
 from srbf.asset import Asset
-from srbf.capture import ROLES
-from srbf.evaluation.rate_distortion import components_of, family_of, name_of, texel_bytes
+from srbf.captured_light import ROLES
+from srbf.evaluation.cluster_borders import ClusterBorders
+from srbf.evaluation.rate_distortion import family_of, name_of, texel_bytes
 from srbf.info import folder_bytes
 from srbf.io.files import write_text
 from srbf.io.image import size_of
+from srbf.methods import method_of
 from srbf.report.by_bytes import by_bytes
 from srbf.report.by_bytes import table as table_of_bytes
 from srbf.report.by_direction import by_direction
 from srbf.report.by_texel import by_texel
 from srbf.report.findings import Findings
+from srbf.report.held_out_lights import how_measured, table_of_lights, worst_directions
 from srbf.report.in_motion import motion_curves, motion_figures
 from srbf.report.inline import Table, data_uri, figure, image, paragraphs
 from srbf.report.light_functions import light_functions
 from srbf.report.samples import samples_plot
 from srbf.report.spectrum import spectrum_plots
 from srbf.report.subject import Picture, Subject
-from srbf.report.unseen_light import how_measured, table_of_lights, worst_directions
 
 STYLE = Path(__file__).with_name("page.css")
-MOVING = (".webp", ".gif")
-WIDE = 1.2  # a sheet so much wider than high shares a printed page with another
-DIRECT = {"direct_ray": "direct light by rays, exact", "direct_shadow_map": "direct light by a shadow map"}  # keys of an evaluation
+MOVING_SUFFIXES = (".webp", ".gif")
+WIDE_RATIO = 1.2  # width over height from which a sheet shares a printed page with another
+DIRECT_METHODS = {"direct_ray": "direct light by rays, exact", "direct_shadow_map": "direct light by a shadow map"}  # keys of an evaluation
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and ready HTML under it."""
+    """A heading and the HTML below it."""
 
     title: str
     body: str
@@ -50,7 +52,7 @@ def write_page(
     timings: Mapping[str, float] | None,
     asset_folder: Path | None,
 ) -> Path:
-    """Write report.md and index.html; returns the latter, which needs no file beside it."""
+    """Write report.md and index.html; returns the latter, which needs no other file."""
     asset = subject.asset
     title = f"Relighting report: {asset.width}×{asset.height} {subject.capture.quantity}, {kept_words(subject)}"
     lead = lead_of(subject)
@@ -58,12 +60,12 @@ def write_page(
     if timings:
         facts.insert(1, Table("Times", ("step", "seconds"), tuple((name, f"{value:.2f}") for name, value in timings.items()), numbers=True))
     limits = limits_of(subject)
-    tables = [errors(subject), *split_errors(subject), table_of_lights(findings.unseen), *bytes_and_motion(findings), *facts]
+    tables = [errors(subject), *split_errors(subject), table_of_lights(findings.held_out), *bytes_and_motion(findings), *facts]
     write_text(folder / "report.md", _markdown(title, lead, tables, pictures, limits))
     sections = [
-        Section("Under unseen light", unseen_section(subject, findings)),
+        Section("Held-out lights", held_out_section(subject, findings)),
         Section("By direction", by_direction(subject)),
-        Section("What a byte buys", by_bytes(subject, findings) if findings.scores else paragraphs(findings.missing)),
+        Section("Error by bytes", by_bytes(subject, findings) if findings.scores else paragraphs(findings.missing)),
     ]
     if findings.spectrum is not None:
         sections.append(Section("Spectrum", spectrum_plots(subject, findings, findings.spectrum)))
@@ -73,80 +75,82 @@ def write_page(
     if curve:
         sections.append(Section("Samples", samples_plot(curve)))
     sections += [
-        Section("Where the error is", by_texel(subject, findings.unseen)),
+        Section("By texel", by_texel(subject, findings.held_out)),
         Section("In motion", motion_section(findings, pictures, folder)),
     ]
-    sections += [Section(picture.title, drawn(picture, folder)) for picture in pictures if Path(picture.file).suffix not in MOVING]
+    sections += [Section(picture.title, drawn(picture, folder)) for picture in pictures if Path(picture.file).suffix not in MOVING_SUFFIXES]
     boxes = "".join(f"<div><h3>{html.escape(table.title)}</h3>{table.html()}</div>" for table in facts)
-    sections.append(Section("In figures", f'<div class="facts">{boxes}</div>'))
+    sections.append(Section("Facts", f'<div class="facts">{boxes}</div>'))
     sections.append(Section("Limits", "<ul>\n" + "\n".join(f"<li>{html.escape(note)}</li>" for note in limits) + "\n</ul>"))
     write_text(folder / "index.html", _html(title, lead, key_figures(subject, findings), sections))
     return folder / "index.html"
 
 
 def kept_words(subject: Subject) -> str:
-    """What the asset keeps of a texel, in words."""
+    """The asset's data per texel, as text."""
     return f"{family_of(subject.asset)} of {name_of(subject.asset)}"
 
 
 def key_figures(subject: Subject, findings: Findings) -> str:
-    """The few numbers that one asks for first."""
-    one = findings.unseen.errors[0]
+    """The most important numbers."""
+    one = findings.held_out.errors[0]
     figures = [
         (f"PSNR, {subject.role}", f"{subject.evaluation[subject.role]['psnr']:.2f} dB"),
         ("worst light", f"{one.worst:.1f} dB"),
         ("at shadow edges", f"{one.edges:.1f} dB"),
-        ("read of a texel", f"{texel_bytes(subject.asset)} bytes"),
-        ("of the energy is clamped", f"{findings.unseen.negative.energy:.2%}"),
+        ("read per texel", f"{texel_bytes(subject.asset)} bytes"),
+        ("of the energy is clamped", f"{findings.held_out.negative.energy:.2%}"),
     ]
     if findings.motion is not None:
-        figures.append(("largest ripple in motion", f"{findings.motion.largest_ripple:.1%}"))
+        figures.append(("largest flicker in motion", f"{findings.motion.largest_flicker:.1%}"))
     cells = "".join(f"<div><dd>{value}</dd><dt>{name}</dt></div>" for name, value in figures)
     return f'<dl class="key">{cells}</dl>'
 
 
-def unseen_section(subject: Subject, findings: Findings) -> str:
-    """The worst directions, errors under several lights, errors by role, and with the direct light added where it was left out."""
-    unseen = findings.unseen
-    lights, roles = table_of_lights(unseen), errors(subject)
-    parts = [worst_directions(subject, unseen), f"<h3>{lights.title}</h3>", lights.html(), how_measured(unseen)]
+def held_out_section(subject: Subject, findings: Findings) -> str:
+    """The worst directions, errors under several lights, errors by role, with direct light added, and at cluster borders."""
+    held_out = findings.held_out
+    lights, roles = table_of_lights(held_out), errors(subject)
+    parts = [worst_directions(subject, held_out), f"<h3>{lights.title}</h3>", lights.html(), how_measured(held_out)]
     parts += [f"<h3>{roles.title}</h3>", roles.html()]
-    for table in split_errors(subject):
+    further = split_errors(subject) + ([border_figures(findings.borders)] if findings.borders is not None else [])
+    for table in further:
         parts += [f"<h3>{table.title}</h3>", table.html()]
     return "\n".join(parts)
 
 
 def motion_section(findings: Findings, pictures: Sequence[Picture], folder: Path) -> str:
-    """The sweep, whether the lights are close enough, and the animation."""
+    """The sweep, whether the light spacing suffices, and the animation."""
     parts = [] if findings.sampling is None else [paragraphs(_sentence(findings.sampling.sentence()))]
     if findings.motion is None:
         parts.append(paragraphs(findings.missing))
     else:
         parts += [motion_figures(findings.motion).html(), motion_curves(findings.motion)]
-    parts += [f'<div class="moving">{drawn(picture, folder)}</div>' for picture in pictures if Path(picture.file).suffix in MOVING]
+    parts += [f'<div class="moving">{drawn(picture, folder)}</div>' for picture in pictures if Path(picture.file).suffix in MOVING_SUFFIXES]
     return "\n".join(parts)
 
 
 def drawn(picture: Picture, folder: Path) -> str:
-    """A picture's file as an element, or why there is none."""
+    """A figure's element, or the reason for its absence."""
     if picture.omitted:
         return f'<p class="soft">{html.escape(picture.caption)}</p>'
     path = folder / picture.file
     height, width = size_of(path) if path.suffix == ".png" else (1, 1)
-    style = "sheet wide" if width > WIDE * height else "sheet"
+    style = "sheet wide" if width > WIDE_RATIO * height else "sheet"
     return figure(image(data_uri(path), picture.title, style), picture.caption)
 
 
 def bytes_and_motion(findings: Findings) -> list[Table]:
-    """The tables of the contest and of the sweep, where there are any."""
+    """The tables of the method comparison, of the sweep and of cluster borders, as far as measured."""
     tables = [table_of_bytes(findings)] if findings.scores else []
-    return tables + ([motion_figures(findings.motion)] if findings.motion is not None else [])
+    tables += [motion_figures(findings.motion)] if findings.motion is not None else []
+    return tables + ([border_figures(findings.borders)] if findings.borders is not None else [])
 
 
 def split_errors(subject: Subject) -> list[Table]:
-    """Errors with the direct light added, where the evaluation has them: {`direct_ray`, `direct_shadow_map`: {role: RoleError}}."""
+    """Errors with direct light added, if the evaluation has them: {`direct_ray`, `direct_shadow_map`: {role: RoleError}}."""
     rows = []
-    for key, words in DIRECT.items():
+    for key, words in DIRECT_METHODS.items():
         for role in ROLES:
             if role in (found := subject.evaluation.get(key, {})):
                 e = found[role]
@@ -155,8 +159,18 @@ def split_errors(subject: Subject) -> list[Table]:
     return [Table("With the direct light added", columns, tuple(rows))] if rows else []
 
 
+def border_figures(borders: ClusterBorders) -> Table:
+    """Errors across cluster borders beside errors next to them."""
+    rows = (
+        ("error, rms", f"{borders.error_at_border:.4g}", f"{borders.error_beside:.4g}", f"{borders.error_ratio:.2f}"),
+        ("jump of the error, rms", f"{borders.jump_at_border:.4g}", f"{borders.jump_beside:.4g}", f"{borders.jump_ratio:.2f}"),
+    )
+    title = f"Cluster borders ({borders.border:.1%} of neighboring texels; a ratio of 1 is invisible)"
+    return Table(title, ("measure", "at borders", "beside them", "ratio"), rows, numbers=True)
+
+
 def lead_of(subject: Subject) -> str:
-    """What was compared, in two sentences."""
+    """A summary in two sentences."""
     error = subject.evaluation[subject.role]
     return (
         f"On {len(subject.capture.indices(subject.role))} {subject.role_words} the relit images reach {error['psnr']:.1f} dB "
@@ -172,16 +186,16 @@ def sizes(subject: Subject, asset_folder: Path | None) -> Table:
     rows = (
         ("capture on disk", f"{bytes_text(folder_bytes(capture.folder))}, {len(capture.lights)} lights"),
         *([("asset on disk", bytes_text(folder_bytes(asset_folder)))] if asset_folder else []),
-        ("texels' own data, uncompressed", f"{bytes_text(raw)}, {name_of(asset)}, {asset.encoding}"),
-        ("train answers for each number kept", f"{3 * len(capture.indices('train')) / components_of(asset):.1f}"),
-        ("read by a shader of the texel's own data", f"{texel_bytes(asset)} bytes a texel"),
-        ("resident on a GPU, everything", bytes_text(asset.resident_bytes())),
+        ("data of the texels, uncompressed", f"{bytes_text(raw)}, {name_of(asset)}, {asset.encoding}"),
+        ("train responses per stored number", f"{3 * len(capture.indices('train')) / method_of(asset).numbers_per_texel(asset):.1f}"),
+        ("read by a shader", f"{texel_bytes(asset)} bytes per texel"),
+        ("resident on a GPU, with tables", bytes_text(asset.resident_bytes())),
     )
     return Table("Size", ("what", "how much"), rows)
 
 
 def fit_facts(subject: Subject) -> Table:
-    """What the manifest records of the fit."""
+    """The fit as recorded in the manifest."""
     asset = subject.asset
     spreads = np.array(spreads_of(asset))
     source = asset.manifest.get("source", {})
@@ -201,7 +215,7 @@ def fit_facts(subject: Subject) -> Table:
 
 
 def spreads_of(asset: Asset) -> list[float]:
-    """Spreads (rad) of the Gaussians that an asset's functions of direction are made of; none where they are others."""
+    """Spreads (rad) of the Gaussians in an asset's functions of direction; empty for other functions."""
     if "light_basis" in asset.manifest:
         return asset.manifest["light_basis"]["spreads"]
     return [asset.basis.spread] if asset.manifest["basis"]["kind"] == "gaussian" else []
@@ -236,31 +250,29 @@ def errors(subject: Subject) -> Table:
 
 
 def limits_of(subject: Subject) -> list[str]:
-    """What these pictures do not show, said plainly."""
+    """The limits of these figures, one sentence or two each."""
     asset = subject.asset
     spreads = spreads_of(asset)
     finest = f"about the spread, {np.degrees(min(spreads)):.0f}°," if spreads else "its highest harmonics"
     notes = [
-        f"The functions of direction are smooth: features of a receiver's answer finer than {finest} are blurred. Hard shadow edges soften "
-        "and ring; sums below 0 are clamped.",
+        f"The functions of direction are smooth: features of a receiver's response finer than {finest} are blurred. Hard shadow edges "
+        "soften and ring; sums below 0 are clamped.",
         "A point or spot light inside a scene that was captured under directional lights is the article's approximation: every receiver "
-        "uses its answer to a light at infinity, so an occluder beyond the lamp still casts its shadow, and the light that "
-        "reaches it by bouncing does not know how far the lamp is from the surfaces that bounced it.",
+        "uses its response to a distant light, so an occluder beyond the light still casts its shadow, and bounced light does not depend "
+        "on the distance from the light to the surfaces that bounce it.",
     ]
     if asset.domain == "hemisphere":
-        notes.append("Only the hemisphere z > 0 was captured: what a light from below gives is extrapolated and means little.")
+        notes.append("Only the hemisphere z > 0 was captured: the response to a light from below is an extrapolation.")
     if asset.manifest.get("transport") == "indirect":
-        notes.append("The maps hold indirect light alone: the engine adds the direct light of each lamp, and these pictures do not.")
+        notes.append("The maps hold indirect light only: the engine adds the direct light, which these figures leave out.")
     if "ambient" in asset.images:
         notes.append(
             "The scene emits light by itself: its ambient image is part of the strips and the animation, not of comparisons and errors."
         )
     if subject.capture.source_bits == 8:
-        notes.append(
-            "The references are 8-bit photographs: the peak is 1, and noise, clipping and stray light of the pictures count as truth."
-        )
+        notes.append("The references are 8-bit photographs: the peak is 1, and their noise, clipping and stray light count as reference.")
     if subject.role != "holdout":
-        notes.append(f"There are no holdout lights: the comparison is on {subject.role_words}, which is kinder than unseen light.")
+        notes.append(f"There are no holdout lights: the comparison uses {subject.role_words}, whose error is lower.")
     return notes
 
 
@@ -282,7 +294,7 @@ def _markdown(title: str, lead: str, tables: Sequence[Table], pictures: Sequence
     lines = [f"# {title}", "", lead, ""]
     for table in tables:
         lines += [f"## {table.title}", "", *table.markdown(), ""]
-    lines += ["## Pictures", ""]
+    lines += ["## Figures", ""]
     for picture in pictures:
         image = [] if picture.omitted else [f"![{picture.title}]({picture.file})", ""]
         lines += [f"### {picture.title}", "", *image, picture.caption, ""]

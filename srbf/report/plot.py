@@ -1,4 +1,4 @@
-"""Plots as SVG that stand in the page itself: its type, its colors, light or dark, and sharp in print."""
+"""Plots as SVG inside the page: they use its font and its colors, light or dark, and print sharply."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy import ndarray
 
 from srbf.report.abrdf import disc_points
 
-LETTER = 6.2  # width of a letter of a label, about, at 12 px
+LETTER_WIDTH = 6.2  # pixels, of a letter of a 12 px label, about
 DISC_RINGS = (0.0, 30.0, 60.0)  # degrees of elevation
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A range of values, linear or logarithmic, its label, and where its ticks are: at nice values unless given."""
+    """A range of values, linear or logarithmic, its label and its ticks, at round values unless given."""
 
     low: float
     high: float
@@ -28,7 +28,7 @@ class Axis:
     most: int = 6  # ticks of a linear axis
 
     def at(self, values: ndarray) -> ndarray:
-        """Where values lie, 0 at `low` and 1 at `high`."""
+        """Values mapped linearly (or by their logarithm) to 0 at `low` and 1 at `high`."""
         if self.log:
             return np.asarray(np.log(np.maximum(values, 1e-300) / self.low) / np.log(self.high / self.low))
         return np.asarray((values - self.low) / (self.high - self.low))
@@ -41,12 +41,12 @@ class Axis:
 
 
 class Plot:
-    """Axes in a box of `width` x `height` CSS pixels; what is drawn is clipped to nothing: keep values in range."""
+    """Axes in a box of `width` x `height` CSS pixels; nothing is clipped, so keep values in range."""
 
     def __init__(
         self, width: float, height: float, x: Axis, y: Axis, margins: tuple[float, float, float, float] = (18, 16, 42, 52)
     ) -> None:
-        """`margins` top, right, bottom, left."""
+        """`margins`: top, right, bottom, left."""
         self.width, self.height, self.x, self.y = width, height, x, y
         self.top, self.right, self.bottom, self.left = margins
         self._parts: list[str] = []
@@ -82,7 +82,7 @@ class Plot:
         self._parts.append(f'<text class="{style}" x="{px:.1f}" y="{py:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
 
     def rule(self, x: float | None = None, y: float | None = None, style: str = "rule") -> None:
-        """A line through the whole box, upright at `x` or level at `y`."""
+        """A line through the whole box, vertical at `x` or horizontal at `y`."""
         if x is not None:
             px = float(self.point(x, self.y.low)[0])
             self._parts.append(f'<path class="{style}" d="M{px:.1f} {self.top:g}V{self.height - self.bottom:g}"/>')
@@ -91,7 +91,7 @@ class Plot:
             self._parts.append(f'<path class="{style}" d="M{self.left:g} {py:.1f}H{self.width - self.right:g}"/>')
 
     def svg(self, title: str) -> str:
-        """The element; `title` says what it shows to who cannot see it."""
+        """The element; `title` is its accessible description."""
         return svg(self.width, self.height, title, self._parts)
 
     def _axes(self) -> None:
@@ -108,7 +108,7 @@ class Plot:
 
 
 def svg(width: float, height: float, title: str, parts: Iterable[str]) -> str:
-    """An SVG element that scales with the page up to its own size."""
+    """An SVG element that scales with the page up to `width`."""
     return (
         f'<svg viewBox="0 0 {width:g} {height:g}" style="max-width:{width:g}px" role="img" aria-label="{escape(title)}">'
         + "".join(parts)
@@ -154,7 +154,7 @@ def decade_ticks(low: float, high: float) -> list[float]:
 
 
 def spread_labels(wanted: Sequence[float], apart: float) -> list[float]:
-    """Places near `wanted` that are at least `apart` from each other, in the same order of size; for labels at the ends of lines."""
+    """Positions near `wanted` that are at least `apart` from each other, in the same order; for labels at the ends of lines."""
     order = np.argsort(wanted, kind="stable")
     placed = np.array(wanted, np.float64)
     for _ in range(200):

@@ -1,4 +1,4 @@
-"""What a point light changes: a weight for every receiver, and attenuation."""
+"""Relighting by a point light: one weight per map and receiver, and attenuation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from srbf.lights import PointLight, moved
 from srbf.methods import relight
-from srbf.methods.receivers import CHUNK
+from srbf.methods.over_lights import CHUNK
 from srbf.methods.relighting_map import receiver_weights
 from srbf.report.canvas import MARGIN, Sheet, box_for, gain_text, place_text, shown, shown_signed
 from srbf.report.maps import decoded, signed_scale
@@ -37,7 +37,7 @@ def point_light(subject: Subject, folder: Path) -> Picture:
     sheet = Sheet(
         left + max(len(terms) * (w + gap) - gap, 3 * large_w + 92) + MARGIN,
         y_large + large_h + 34,
-        "A point light weighs every receiver by itself",
+        "A point light has separate weights for every receiver",
         f"Point light at {place_text(point_light.position)} m, $a_o$ {point_light.a0:.3g} m. "
         f"Maps: mid gray is 0, white +{scale:.3g}, black −{scale:.3g}. "
         f"$R_i$: black 0, white 1. Lower row: {gain_text(gain)}.",
@@ -83,12 +83,12 @@ def point_light(subject: Subject, folder: Path) -> Picture:
 
 
 def gray(values: ndarray, covered: ndarray) -> ndarray:
-    """Scalars (H, W) in [0, 1] as linear display grays, uncovered receivers as everywhere."""
+    """Scalars (H, W) in [0, 1] as linear display grays, uncovered receivers in the usual gray."""
     return shown_signed(np.repeat(2 * values[..., None] - 1, 3, axis=2), 1.0, covered)
 
 
 def strongest(subject: Subject, point_light: PointLight) -> list[int]:
-    """The maps whose weight peaks highest over the receivers (0.9 quantile), ordered by where their light comes from."""
+    """The maps whose weight peaks highest over the receivers (0.9 quantile), ordered by the azimuth of their centers."""
     positions = subject.asset.images["position"][subject.covered]
     weights, _ = receiver_weights(subject.asset, point_light, positions[:: max(1, len(positions) // 4096)])
     terms = np.argsort(-np.quantile(weights, 0.9, axis=0), kind="stable")[:TERMS]
@@ -96,7 +96,7 @@ def strongest(subject: Subject, point_light: PointLight) -> list[int]:
 
 
 def weighed(subject: Subject, point_light: PointLight, terms: list[int]) -> tuple[ndarray, ndarray, ndarray]:
-    """(R_i of `terms` (H, W, n), attenuation (H, W), signed sum of c_i R_i before it (H, W, 3)), some rows at a time."""
+    """(R_i of `terms` (H, W, n), attenuation (H, W), signed sum of c_i R_i without attenuation (H, W, 3)), in blocks of rows."""
     asset = subject.asset
     r_maps = np.empty((asset.height, asset.width, len(terms)), np.float32)
     strength = np.empty((asset.height, asset.width), np.float32)

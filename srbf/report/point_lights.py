@@ -1,4 +1,4 @@
-"""Point and spot lights to demonstrate an asset with, derived from where its receivers are."""
+"""Point and spot lights for the figures, derived from the positions of the receivers."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from numpy import ndarray
 
 from srbf.arrays import Float64
 from srbf.asset import Asset
-from srbf.lights import Light, PointLight, SpotLight, Triple, moved
+from srbf.lights import Light, PointLight, SpotLight, moved, triple
 
-COUNT = 6  # lamps a strip
-MARGIN_QUANTILE = 0.02  # of the positions at either end do not count: a far horizon must not push the lamp away
-INWARD = 0.15  # mean of n . (center - p) over the two horizontal axes, in half sizes: above this walls look inwards, as in a room
-TOP_QUANTILE = 0.995  # of the receivers' height along the way out: the lamp stands above it
-FLAT_NORMAL = 0.15  # a mean normal shorter than this says nothing about where the front is
+LIGHTS_PER_STRIP = 6
+MARGIN_QUANTILE = 0.02  # of the positions at either end are ignored, so that a distant horizon does not move the lights away
+INWARD = 0.15  # mean of n . (center - p) over the two horizontal axes, in half sizes: above this, walls face inward, as in a room
+TOP_QUANTILE = 0.995  # of the receivers' height along `out`; the lights are above it
+FLAT_NORMAL = 0.15  # a shorter mean normal does not define a front
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Where receivers are: center, `out` the way they face, `along` their longest side across it, half sizes and top (m)."""
+    """Frame of the receivers: center, mean normal `out`, longest side `along` perpendicular to it, half sizes and top (m)."""
 
     center: Float64[ndarray, " 3"]
     out: Float64[ndarray, " 3"]
@@ -34,7 +34,7 @@ class Stage:
     inside: bool
 
     def point_light_at(self, t: float, lift: float = 1.0) -> Float64[ndarray, " 3"]:
-        """A position on the arc, t from 0 to 1: over the front of the receivers, or inside them where they look inwards."""
+        """A position on the arc, t from 0 to 1: in front of the receivers, or among them if they face inward."""
         side = -np.cos(np.pi * (0.12 + 0.76 * t)) * self.half_along * (0.6 if self.inside else 0.95)
         bow = np.sin(np.pi * (0.12 + 0.76 * t))
         height = 0.35 * bow * self.half_out if self.inside else self.top + lift * self.radius * (0.16 + 0.14 * bow)
@@ -42,7 +42,7 @@ class Stage:
 
 
 def stage_of(asset: Asset, covered: ndarray) -> Stage:
-    """The stage of the covered positions, in the asset's frame; the way out is the mean normal, or +z where there is none."""
+    """The stage of the covered positions, in the asset's frame; `out` is the mean normal, or +z without normals."""
     positions = asset.images["position"][covered].astype(np.float64)
     low, high = np.quantile(positions, [MARGIN_QUANTILE, 1 - MARGIN_QUANTILE], axis=0)
     center, half = (low + high) / 2, (high - low) / 2
@@ -69,8 +69,8 @@ def demonstration_point_lights(
 ) -> tuple[tuple[PointLight, ...], tuple[SpotLight, ...]]:
     """(point lights, spot lights) in world space: those of `given`, else derived; none without covered positions.
 
-    A derived lamp has a0 at the distance from the middle of its way to the receivers' center: from there its irradiance at the
-    center is 1, as of a captured light.
+    The a0 of a derived light is the distance from the middle of its path to the receivers' center: there, its irradiance at the
+    center is 1, as that of a captured light.
     """
     if "position" not in asset.images or not covered.any():
         return (), ()
@@ -80,9 +80,9 @@ def demonstration_point_lights(
     points: tuple[PointLight, ...] = tuple(light for light in given if isinstance(light, PointLight) and not isinstance(light, SpotLight))
     spots: tuple[SpotLight, ...] = tuple(light for light in given if isinstance(light, SpotLight))
     if not points:
-        points = tuple(_point(stage, t, world) for t in np.linspace(0, 1, COUNT))
+        points = tuple(_point(stage, t, world) for t in np.linspace(0, 1, LIGHTS_PER_STRIP))
     if not spots:
-        spots = tuple(_spot(stage, t, world) for t in np.linspace(0, 1, COUNT))
+        spots = tuple(_spot(stage, t, world) for t in np.linspace(0, 1, LIGHTS_PER_STRIP))
     return points, spots
 
 
@@ -94,7 +94,7 @@ def moving_point(asset: Asset, covered: ndarray, t: float) -> PointLight:
 def _point(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> PointLight:
     position = stage.point_light_at(t)
     a0 = max(float(np.linalg.norm(stage.point_light_at(0.5) - stage.center)), 1e-3)
-    return cast(PointLight, moved(PointLight(_triple(position), a0=a0), world))
+    return cast(PointLight, moved(PointLight(triple(position), a0=a0), world))
 
 
 def _spot(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> SpotLight:
@@ -103,9 +103,5 @@ def _spot(stage: Stage, t: float, world: Float64[ndarray, "4 4"]) -> SpotLight:
     ray = target - position
     distance = max(float(np.linalg.norm(position - stage.center)), 1e-3)
     outer = float(np.arctan(0.4 * stage.radius / distance))
-    spot = SpotLight(_triple(position), a0=distance, direction=_triple(ray), inner=0.6 * outer, outer=outer)
+    spot = SpotLight(triple(position), a0=distance, direction=triple(ray), inner=0.6 * outer, outer=outer)
     return cast(SpotLight, moved(spot, world))
-
-
-def _triple(vector: Float64[ndarray, " 3"]) -> Triple:
-    return (float(vector[0]), float(vector[1]), float(vector[2]))

@@ -1,4 +1,4 @@
-"""How many samples a capture took, and why no more: the curve by which `srbf bake --samples auto` stopped."""
+"""The error curve by which `srbf bake --samples auto` stopped."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from srbf.report.plot import Axis, Plot
 
 
 def samples_plot(curve: list[dict[str, Any]]) -> str:
-    """Error on the validation lights, their noise taken off, after each doubling of the samples; and that noise."""
+    """Error on the validation lights without their noise, and that noise, after each doubling of the samples."""
     samples = np.array([entry["samples"] for entry in curve], np.float64)
     error = np.array([entry["relative_rmse"] for entry in curve])
     noise = np.array([entry["noise"] for entry in curve])
     across = Axis(
         float(samples[0]) * 0.9,
         float(samples[-1]) * 1.1,
-        "samples a texel of each fitted light (log scale)",
+        "samples per texel of each fitted light (log scale)",
         log=True,
         ticks=tuple(samples),
     )
@@ -29,7 +29,7 @@ def samples_plot(curve: list[dict[str, Any]]) -> str:
     plot.line(samples, noise, "red thin dash")
     plot.label(float(samples[-1]), float(noise[-1]), "their noise", "red", dx=10, dy=4)
     caption = (
-        f"The bake stopped at {samples[-1]:.0f} samples: after each doubling all fitted images are interpolated, and the relative RMSE "
-        "on the validation lights, less their own noise, is measured. The holdout lights were not looked at."
+        f"The bake stopped at {samples[-1]:.0f} samples: after each doubling it interpolates all fitted images and measures the "
+        "relative RMSE on the validation lights without their noise. It does not use the holdout lights."
     )
     return figure('<div class="plots">' + plot.svg("Validation error by samples") + "</div>", caption)

@@ -1,37 +1,37 @@
-"""How many planes the capture would need: singular values of its answers, and where the asset stands."""
+"""Singular values of the responses, and the PSNR of the best planes beside that of the asset."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from srbf.evaluation.rate_distortion import components_of
+from srbf.methods import method_of
 from srbf.report.findings import Findings, Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
 from srbf.report.subject import Subject
 
-SHOWN = 0.999  # of the spectrum's length at most: the last few values are rounding
+SHOWN_SHARE = 0.999  # of the singular values; the last ones are rounding errors
 FLOOR = 1e-4  # of the largest value
-ABOVE = 15.0  # dB over the asset's own: beyond, planes hold the noise
+HEADROOM = 15.0  # dB shown above the asset's PSNR; beyond, planes fit noise
 
 
 def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> str:
-    """Singular values, and what the best planes leave, side by side."""
-    scalars = components_of(subject.asset)
+    """Singular values, and the PSNR of the best planes, side by side."""
+    components = method_of(subject.asset).numbers_per_texel(subject.asset)
     ranks = np.arange(1, len(spectrum.values) + 1)
     relative = spectrum.values / max(float(spectrum.values[0]), 1e-30)
-    kept = (relative > FLOOR) & (ranks <= SHOWN * len(ranks))
+    kept = (relative > FLOOR) & (ranks <= SHOWN_SHARE * len(ranks))
     kept[:2] = True
     ranks, relative = ranks[kept], np.maximum(relative[kept], FLOOR)
-    last = float(max(len(ranks), scalars, 10))
-    rank_axis = Axis(1, last, "scalar planes (log scale)", log=True)
-    left = Plot(450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value, of the first", log=True), (24, 20, 42, 58))
+    last = float(max(len(ranks), components, 10))
+    rank_axis = Axis(1, last, "components (log scale)", log=True)
+    left = Plot(450, 290, rank_axis, Axis(float(relative.min()) * 0.8, 1.25, "singular value over the first", log=True), (24, 20, 42, 58))
     left.line(ranks, relative, "blue")
-    left.rule(x=scalars, style="line red thin dash")
-    left.label(scalars, 1.0, f"{scalars} numbers", "strong red halo", dx=6, dy=12)
-    left.label(scalars, 1.0, "a texel here", "red halo", dx=6, dy=27)
+    left.rule(x=components, style="line red thin dash")
+    left.label(components, 1.0, f"{components} numbers", "strong red halo", dx=6, dy=12)
+    left.label(components, 1.0, "per texel here", "red halo", dx=6, dy=27)
     bound = spectrum.bound[: len(ranks)]
-    near = np.flatnonzero(bound <= spectrum.own + ABOVE)[1:]  # planes 1, 2, …
+    near = np.flatnonzero(bound <= spectrum.own + HEADROOM)[1:]  # planes 1, 2, …
     high = max(float(bound[near].max(initial=0)), spectrum.own) + 1
     low = min(float(bound[0]), spectrum.own) - 4
     right = Plot(450, 290, rank_axis, Axis(low, high, "PSNR on train lights, pooled, dB"), (24, 20, 42, 52))
@@ -39,20 +39,20 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     if len(near):
         middle = near[len(near) // 4]
         right.label(float(middle), float(bound[middle]), "the best planes", "strong blue", dx=-10, dy=-6, anchor="end")
-    right.dots(np.array([scalars]), np.array([spectrum.own]), "red", 5)
-    right.label(scalars, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
+    right.dots(np.array([components]), np.array([spectrum.own]), "red", 5)
+    right.label(components, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
     enough = bound >= spectrum.own
     reach = f", which the best {planes_words(int(np.argmax(enough)))} would reach too" if enough.any() else ""
     caption = (
-        f"On the train lights the asset's {scalars} numbers a texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular values "
-        f"are of the answers of {findings.texels} texels to all train lights and colors, less their mean texel; every light weighs "
-        "alike. The curve on the right bounds any one linear model of so many planes on these very answers, not on unseen light; clusters "
-        "of texels with planes of their own may pass it."
+        f"On the train lights the asset's {components} numbers per texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular "
+        f"values are those of the responses of {findings.texels} texels to all train lights and colors, minus the mean texel; all "
+        "lights have equal weight. The curve on the right bounds any linear model of so many components on these responses, not on "
+        "held-out lights; clusters with separate components may exceed it."
     )
-    plots = left.svg("Singular values by rank"), right.svg("PSNR that the best planes leave, by their number")
+    plots = left.svg("Singular values by rank"), right.svg("PSNR of the best planes, by their number")
     return figure('<div class="plots row">' + "".join(f'<div style="flex: 1 1 20rem">{p}</div>' for p in plots) + "</div>", caption)
 
 
 def planes_words(count: int) -> str:
-    """So many planes, in words."""
+    """A number of planes as text."""
     return "plane" if count == 1 else f"{count} planes"

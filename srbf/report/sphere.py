@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.basis.gaussian import TABLE_TOLERANCE, lookup, weight
-from srbf.capture import ROLES
+from srbf.captured_light import ROLES
 from srbf.report.abrdf import disc_points
 from srbf.report.canvas import INK, MARGIN, ROLE_COLOR, ROLE_MARKER, RULE, SOFT, Sheet, draw_disc
 from srbf.report.subject import Picture, Subject
@@ -17,11 +17,11 @@ from srbf.report.subject import Picture, Subject
 CENTERS, CURVE = "centers.png", "r_curve.png"
 DISC, TOP = 430, 88
 SIZE = {"train": 14, "validation": 30, "holdout": 30}
-LABELLED = 64  # beyond so many centers their numbers would overlap
+MAX_LABELED = 64  # centers; the numbers of more would overlap
 
 
 def centers(subject: Subject, folder: Path) -> Picture:
-    """Write centers.png: centers with their spread on the left, lights by role on the right; a second row for below the horizon."""
+    """Write centers.png: centers with their spread on the left, lights by role on the right; a second row for those below the horizon."""
     basis = subject.asset.basis
     halves = [1, -1] if subject.asset.domain == "sphere" else [1]
     spread = np.degrees(basis.spread)
@@ -33,7 +33,7 @@ def centers(subject: Subject, folder: Path) -> Picture:
     )
     for n, half in enumerate(halves):
         y = TOP + n * (DISC + 30)
-        side = "" if len(halves) == 1 else (", z ≥ 0" if half > 0 else ", z < 0 (seen through from above)")
+        side = "" if len(halves) == 1 else (", z ≥ 0" if half > 0 else ", z < 0 (seen from above)")
         axes = disc_axes(sheet, MARGIN, y, f"basis centers $Q_i${side}")
         for circle in spread_circles(basis.centers, basis.spread):
             circle[circle[:, 2] * half < 0] = np.nan
@@ -41,7 +41,7 @@ def centers(subject: Subject, folder: Path) -> Picture:
         here = on_half(basis.centers, half)
         points = disc_points(basis.centers)
         axes.scatter(*points[here].T, s=26, color=INK, zorder=3)
-        if len(points) <= LABELLED:
+        if len(points) <= MAX_LABELED:
             for i in here:
                 axes.annotate(str(i), points[i], xytext=(4, 3), textcoords="offset points", fontsize=7, color=SOFT)
         axes = disc_axes(sheet, MARGIN + DISC + 40, y, f"captured lights{side}")
@@ -89,15 +89,12 @@ def r_curve(subject: Subject, folder: Path) -> Picture:
     axes.set_ylabel("|error|", color=SOFT, fontsize=9)
     axes.set_xlabel(r"$\cos\theta = \hat{L}\cdot Q_i$", color=SOFT, fontsize=9)
     sheet.save(folder / CURVE)
-    caption = (
-        "The one curve that all basis functions share, the entries of its table, "
-        "and below it the error of interpolating them (after figure 9)."
-    )
+    caption = "The curve that all basis functions share and the entries of its table; below, the interpolation error (after figure 9)."
     return Picture(CURVE, "The curve R", caption)
 
 
 def disc_axes(sheet: Sheet, x: float, y: float, title: str) -> Any:
-    """Axes with the disc of a hemisphere, titled above."""
+    """Axes with the disc of a hemisphere and a title above."""
     axes = sheet.axes(x, y, DISC, DISC)
     draw_disc(axes)
     sheet.text(x + DISC / 2, y, title, size=10, ha="center", va="center")

@@ -1,4 +1,4 @@
-"""Strips of one lamp at several places, and a short animation."""
+"""Strips of one point or spot light at several positions, and a short animation."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from srbf.report.point_lights import moving_point
 from srbf.report.subject import Picture, Subject
 
 POINTS, SPOTS, ANIMATION = "point_strip.png", "spot_strip.png", "animation.webp"
-TURN, TRAVEL = 14, 10  # frames of the directional and of the point light
+ORBIT_FRAMES, TRAVEL_FRAMES = 14, 10  # of the directional and of the point light
 ELEVATION = np.radians(38)
-LONGEST_SIDE = 440  # pixels of a frame
+MAX_SIDE = 440  # pixels of a frame
 MAX_BYTES = 2 << 20
 
 
 def point_strip(subject: Subject, folder: Path) -> Picture:
     """Write point_strip.png: the asset under one point light at several positions."""
-    return _strip(subject, folder / POINTS, subject.points, "A point light on the move", "Point lights")
+    return _strip(subject, folder / POINTS, subject.points, "A moving point light", "Point lights")
 
 
 def spot_strip(subject: Subject, folder: Path) -> Picture:
-    """Write spot_strip.png: the asset under a spot light that swings."""
-    return _strip(subject, folder / SPOTS, subject.spots, "A spot light that swings", "Spot lights")
+    """Write spot_strip.png: the asset under a moving spot light."""
+    return _strip(subject, folder / SPOTS, subject.spots, "A moving spot light", "Spot lights")
 
 
 def _strip(subject: Subject, path: Path, point_lights: Sequence[PointLight], heading: str, title: str) -> Picture:
@@ -46,7 +46,7 @@ def _strip(subject: Subject, path: Path, point_lights: Sequence[PointLight], hea
         2 * MARGIN + columns * (w + gap) - gap,
         top + rows * (h + legend) + 6,
         heading,
-        f"White, attenuation {fall}; {gain_text(gain)}. Plan: the receivers from above, x right, y up, lamp in yellow.",
+        f"White, attenuation {fall}; {gain_text(gain)}. Plan: the receivers from above, x right, y up, the light in yellow.",
     )
     for n, point_light in enumerate(point_lights):
         x, y = MARGIN + n % columns * (w + gap), top + n // columns * (h + legend)
@@ -61,18 +61,20 @@ def _strip(subject: Subject, path: Path, point_lights: Sequence[PointLight], hea
             va="center",
         )
     sheet.save(path)
-    caption = f"{title} relit from the maps, none of which was captured: {len(point_lights)} of them, all at the contact sheet's exposure."
+    caption = f"{title} relit from the maps; none was captured. {len(point_lights)} positions, all at the contact sheet's exposure."
     return Picture(path.name, title, caption)
 
 
 def _plan(sheet: Sheet, subject: Subject, point_light: PointLight, x: float, y: float, width: float, height: float) -> None:
-    """Receivers (a thinned cloud) and lamp from above, in world meters."""
+    """A plan of the receivers (subsampled) and the light, seen from above, in world meters."""
     positions = subject.asset.images["position"][subject.covered]
     positions = positions[:: max(1, len(positions) // 600)].astype(np.float64)
     inverse = np.linalg.inv(subject.asset.asset_from_world)
     positions = positions @ inverse[:3, :3].T + inverse[:3, 3]
     low, high = np.minimum(positions.min(axis=0), point_light.position)[:2], np.maximum(positions.max(axis=0), point_light.position)[:2]
-    scale = 0.86 * min(width, height) / max(float((high - low).max()), 1e-3) * np.array([1, -1])  # sheet units a meter; y is down there
+    scale = (
+        0.86 * min(width, height) / max(float((high - low).max()), 1e-3) * np.array([1, -1])
+    )  # sheet units per meter; y points down there
     corner = np.array([x, y]) + [0.07 * width, 0.5 * height]
     middle = np.array([low[0], (low[1] + high[1]) / 2])
     sheet.dots(corner + (positions[:, :2] - middle) * scale)
@@ -81,7 +83,7 @@ def _plan(sheet: Sheet, subject: Subject, point_light: PointLight, x: float, y: 
 
 
 def animation(subject: Subject, folder: Path) -> Picture:
-    """Write animation.webp (animation.gif where Pillow has no WebP): a directional light goes round, then a point light passes.
+    """Write animation.webp (animation.gif where Pillow has no WebP): a directional light orbits, then a point light passes.
 
     MissingLibraryError without Pillow. At most 24 frames and MAX_BYTES.
     """
@@ -92,7 +94,7 @@ def animation(subject: Subject, folder: Path) -> Picture:
     frames = [Image.fromarray(_frame(subject, light)) for light in _path(subject)]
     webp = bool(features.check("webp"))
     path = folder / (ANIMATION if webp else "animation.gif")
-    factor = LONGEST_SIDE / max(frames[0].size)
+    factor = MAX_SIDE / max(frames[0].size)
     for quality in (82, 60, 40):
         size = (max(1, round(frames[0].width * factor)), max(1, round(frames[0].height * factor)))
         kernel = Image.Resampling.LANCZOS if factor < 1 else Image.Resampling.BICUBIC
@@ -103,20 +105,20 @@ def animation(subject: Subject, folder: Path) -> Picture:
         if path.stat().st_size <= MAX_BYTES:
             break
         factor *= 0.7
-    second = f", then {len(frames) - TURN} of a point light passing by" if len(frames) > TURN else ""
+    second = f", then {len(frames) - ORBIT_FRAMES} of a point light passing by" if len(frames) > ORBIT_FRAMES else ""
     return Picture(
         path.name,
         "In motion",
-        f"{TURN} frames of a directional light going round at {np.degrees(ELEVATION):.0f}° of elevation{second}.",
+        f"{ORBIT_FRAMES} frames of a directional light orbiting at {np.degrees(ELEVATION):.0f}° of elevation{second}.",
     )
 
 
 def _path(subject: Subject) -> list[Light]:
     lights: list[Light] = []
-    for turn in np.arange(TURN) * (2 * np.pi / TURN):
+    for turn in np.arange(ORBIT_FRAMES) * (2 * np.pi / ORBIT_FRAMES):
         lights.append(DirectionalLight((np.cos(ELEVATION) * np.cos(turn), np.cos(ELEVATION) * np.sin(turn), np.sin(ELEVATION))))
     if subject.points:
-        there_and_back = 0.5 - 0.5 * np.cos(np.arange(TRAVEL) * (2 * np.pi / TRAVEL))
+        there_and_back = 0.5 - 0.5 * np.cos(np.arange(TRAVEL_FRAMES) * (2 * np.pi / TRAVEL_FRAMES))
         lights += [moving_point(subject.asset, subject.covered, float(t)) for t in there_and_back]
     return lights
 

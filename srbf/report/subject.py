@@ -1,4 +1,4 @@
-"""What a report is about, gathered once: the lights to compare at, their references, one exposure and the demonstration lamps."""
+"""The subject of a report: the compared lights, their references, one exposure and the demonstration lights."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.capture import ROLES, Capture, Role
-from srbf.evaluation.errors_by_role import COVERED, psnr
+from srbf.capture import COVERED, Capture
+from srbf.captured_light import ROLES, Role
+from srbf.evaluation.errors_by_role import psnr
+from srbf.light_domain import domain_of_capture
 from srbf.lights import Light, PointLight, SpotLight
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.report.point_lights import demonstration_point_lights
 from srbf.sphere import farthest_points
 
-SHOWN = 6  # unseen directions compared
-EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # that quantile of the references is shown at this linear level
+SHOWN_LIGHTS = 6  # compared
+EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # the exposure maps this quantile of the references to this linear level
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One picture of the report and its caption; `omitted` where the caption says why there is none."""
+    """One figure of the report and its caption; if `omitted`, there is no file and the caption gives the reason."""
 
     file: str
     title: str
@@ -60,24 +62,25 @@ class Subject:
 
     @property
     def role_words(self) -> str:
-        """What the compared directions are, for captions."""
+        """The compared directions as caption text."""
         return {
-            "holdout": "unseen (holdout) directions",
+            "holdout": "held-out directions",
             "validation": "validation directions (this capture has no holdout lights)",
-            "train": "train directions, which the fit has seen (this capture has neither holdout nor validation lights)",
+            "train": "train directions, which the fit used (this capture has neither holdout nor validation lights)",
         }[self.role]
 
 
 def gather(asset: Asset, capture: Capture, evaluation: dict[str, Any], demo_lights: Sequence[Light] | None) -> Subject:
-    """Choose spread-out lights of the least seen role there is, read their references and relight them without ambient."""
+    """Choose lights far apart of the last role that has any (holdout, validation, train), read their references and relight them without
+    ambient."""
     role: Role = next(r for r in ROLES[::-1] if capture.indices(r))
     indices = capture.indices(role)
-    directions = capture.directions(indices)
-    chosen = [indices[i] for i in farthest_points(directions, SHOWN)]
+    directions = domain_of_capture(capture).captured(capture, indices)
+    chosen = [indices[i] for i in farthest_points(directions, SHOWN_LIGHTS)]
     chosen.sort(key=lambda i: -capture.lights[i].direction[2])
     covered = capture.coverage() >= COVERED
     references = np.stack([capture.image(i) for i in chosen])
-    relit = np.maximum(directional_responses(asset, capture.directions(chosen)), 0)
+    relit = np.maximum(responses(asset, domain_of_capture(capture).captured(capture, chosen)), 0)
     level = float(np.quantile(references[:, covered], EXPOSURE_QUANTILE)) if covered.any() else 0.0
     gain = EXPOSURE_LEVEL / level if level > 0 else 1.0
     points, spots = demonstration_point_lights(asset, covered, demo_lights)

@@ -10,30 +10,62 @@ from typing import Any, Literal
 from srbf.errors import ManifestError, MissingLibraryError
 
 SchemaName = Literal["capture", "asset", "frames"]
+Schema = dict[str, Any]
 
 
 @functools.cache
-def load_schema(name: SchemaName) -> dict[str, Any]:
-    """The JSON Schema (draft 2020-12) of `name`."""
-    return json.loads(resources.files(__package__).joinpath(f"{name}.schema.json").read_text(encoding="utf-8"))
+def load_schema(name: SchemaName, method: str | None = None) -> Schema:
+    """The JSON Schema (draft 2020-12) of `name`; of an asset with the keys of a `method`'s fragment (the stem of its files)."""
+    schema = _read(f"{name}.schema.json")
+    fragment = method
+    while fragment is not None:
+        own = _read(f"methods/{fragment}.schema.json")
+        schema["required"] = [*schema["required"], *own["required"]]
+        schema["properties"] = {**schema["properties"], **own["properties"]}
+        fragment = own.get("extends")
+    return schema
+
+
+def _read(name: str) -> Schema:
+    return json.loads(resources.files(__package__).joinpath(name).read_text(encoding="utf-8"))
 
 
 @functools.cache
-def _validator(name: SchemaName) -> Any:
+def _validator(name: SchemaName, method: str | None = None) -> Any:
     try:
         import jsonschema
     except ImportError as error:
         raise MissingLibraryError("reading manifests needs jsonschema: pip install jsonschema") from error
-    return jsonschema.Draft202012Validator(load_schema(name))
+    return jsonschema.Draft202012Validator(load_schema(name, method))
 
 
-def check(value: dict[str, Any], name: SchemaName, where: str) -> None:
+def check(value: Schema, name: SchemaName, where: str) -> None:
     """ManifestError, in one line, where `value` breaks the schema; `where` names the file."""
-    validator = _validator(name)
+    _check(value, name, None, where)
+
+
+def check_asset(value: Schema, method: str, where: str) -> None:
+    """`check` of an asset.json, by the keys of its method, too: `method` is the stem of the method's files."""
+    _check(value, "asset", method, where)
+
+
+def _check(value: Schema, name: SchemaName, method: str | None, where: str) -> None:
+    validator = _validator(name, method)
     from jsonschema.exceptions import best_match
 
-    error = best_match(validator.iter_errors(value))
+    errors = list(validator.iter_errors(value))
+    error = best_match([cause for found in errors for cause in _of_kind(found)] or errors)
     if error is not None:
         place = "/".join(str(p) for p in error.absolute_path) or "its top level"
         message = error.message if len(error.message) <= 200 else error.message[:197] + "..."
         raise ManifestError(f"{where} breaks the {name} format at {place}: {message}")
+
+
+def _of_kind(error: Any) -> list[Any]:
+    """The error; where it is that of a `oneOf` whose alternatives differ by `kind`, the errors of the alternative of the value's kind."""
+    if error.validator != "oneOf" or not isinstance(error.instance, dict) or "kind" not in error.instance:
+        return [error]
+    alternatives: dict[Any, list[Any]] = {}
+    for cause in error.context:
+        alternatives.setdefault(cause.schema_path[0], []).append(cause)
+    return next((causes for causes in alternatives.values() if not any(list(cause.path) == ["kind"] for cause in causes)), [])

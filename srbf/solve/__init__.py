@@ -1,1 +1,1 @@
-"""Solvers, one algorithm a file; they know nothing of light."""
+"""Solvers, one algorithm per file, independent of lights."""

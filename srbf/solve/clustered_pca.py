@@ -1,4 +1,4 @@
-"""Clustered PCA: vectors in clusters, each with a mean and a few principal axes of its own [Sloan2003, Kristensen2005]."""
+"""Clustered PCA: vectors in clusters, each with its mean and a few principal axes [Sloan2003, Kristensen2005]."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy import ndarray
 from srbf.arrays import Float32, Int
 from srbf.errors import MissingLibraryError
 
-POWER_STEPS = 2  # of subspace iteration between two assignments: the axes start from those before
+POWER_STEPS = 2  # of subspace iteration between two assignments, started at the previous axes
 LAST_STEPS = 6
 LAST_ASSIGNMENTS = 3  # at the full number of axes
 OVERSAMPLED = 4  # axes iterated beyond those kept
-AT_A_TIME = 1 << 13  # vectors assigned at once
+VECTOR_BATCH = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Clusters:
     axes: Float32[ndarray, "C M S"]
 
     def through(self, features: Float32[ndarray, "M D"]) -> Clusters:
-        """The same subspaces seen through an orthonormal map to D features: their residuals are those of the features."""
+        """The same subspaces under an orthonormal map to D features; residuals become those of the features."""
         return Clusters(self.means @ features, np.einsum("cms,md->cds", self.axes, features, optimize=True))
 
     def assign(self, vectors: Float32[ndarray, "n M"]) -> tuple[Int[ndarray, " n"], Float32[ndarray, " n"]]:
@@ -35,8 +35,8 @@ class Clusters:
         offset = np.einsum("cm,cms->cs", self.means, self.axes)
         squared = np.einsum("cm,cm->c", self.means, self.means)
         nearest, distance = np.empty(len(vectors), np.int64), np.empty(len(vectors), np.float32)
-        for start in range(0, len(vectors), AT_A_TIME):
-            part = vectors[start : start + AT_A_TIME]
+        for start in range(0, len(vectors), VECTOR_BATCH):
+            part = vectors[start : start + VECTOR_BATCH]
             squares = np.einsum("nm,nm->n", part, part)[:, None] - 2 * part @ self.means.T + squared
             if axes:
                 along = (part @ flat).reshape(len(part), count, axes) - offset
@@ -48,11 +48,11 @@ class Clusters:
 
 
 def cluster(vectors: Float32[ndarray, "n M"], features: Float32[ndarray, "M D"], count: int, axes: int, seed: int = 0) -> Clusters:
-    """Clusters of least squared distance: k-means first, then axes grown one after the other with vectors re-assigned between.
+    """Clusters of least squared distance: k-means first, then one axis after the other, with vectors reassigned in between.
 
-    Growing finds better optima than k-means with all axes put in at once: vectors move where the next axis will serve them
-    [Kristensen2005, section 6]. Assignment looks at `features` alone, an orthonormal map that keeps most of the vectors' energy; means
-    and axes are of the whole vectors. A cluster left with too few vectors starts again at the worst-served ones.
+    This finds better optima than k-means with all axes at once, since vectors move to clusters whose next axis fits them
+    [Kristensen2005, section 6]. Assignment uses `features` only, an orthonormal map that keeps most of the vectors' energy; means and
+    axes use the complete vectors. A cluster with too few vectors restarts at vectors of large distance.
     """
     try:
         from sklearn.cluster import MiniBatchKMeans
@@ -86,7 +86,7 @@ def _growth(axes: int) -> list[int]:
 
 
 def _filled(labels: Int[ndarray, " n"], distance: Float32[ndarray, " n"], count: int, axes: int, rng: np.random.Generator) -> np.ndarray:
-    """`labels` with no cluster of fewer vectors than its axes can be fitted to: such take vectors at random by their distance."""
+    """`labels` in which every cluster has enough vectors to fit its axes; small ones get random vectors, weighted by distance."""
     sizes = np.bincount(labels, minlength=count)
     small = np.flatnonzero(sizes < axes + 2)
     if not len(small) or float(distance.sum()) == 0:

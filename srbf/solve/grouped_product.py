@@ -1,4 +1,4 @@
-"""A streamed product whose columns fall into groups, each with weights of its own."""
+"""A streamed product whose columns fall into groups with separate weights."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class GroupedProduct:
     """X(j, p) = sum_{l,c} W[g(p), j, l, c] B(l, p, c), B of L rows fed block by block, g the group of column p.
 
     weights (G, J, L, C), groups (P,). Rows may be float32 or finite float16. Columns are gathered group by group, so that each piece is
-    one product. Memory: X, an order of the columns, and a gathered piece a core. Work: 2 J L P C flops and one gather of B.
+    one product. Memory: X, an order of the columns, and one gathered piece per core. Cost: 2 J L P C flops and one gather of B.
     """
 
     def __init__(self, weights: Float32[ndarray, "G J L C"], groups: Int[ndarray, " P"]) -> None:
@@ -49,7 +49,7 @@ class GroupedProduct:
 
     @property
     def result(self) -> Float32[ndarray, "J P"]:
-        """X as far as it is fed, in the columns' own order."""
+        """X of the rows fed so far, in the original order of columns."""
         result = np.empty_like(self._sorted)
         result[:, self._order] = self._sorted
         return result

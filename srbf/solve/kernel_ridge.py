@@ -1,4 +1,4 @@
-"""Kernel ridge regression: every penalty after one eigendecomposition, and what is predicted of rows that are left out."""
+"""Kernel ridge regression: all penalties after one eigendecomposition, and predictions at left-out rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float64, Int
 
-GUARD = 1e-9  # of the mean of a group's diagonal: rows that nothing else predicts stay finite
+GUARD = 1e-9  # of the mean of a group's diagonal; keeps rows finite that no others predict
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class KernelPath:
     def left_out_weights(self, ridge: float, groups: Int[ndarray, "G s"]) -> Float64[ndarray, "G s"]:
         """Weights that turn a group's rows of `solve` into the residual of its first row when the whole group is left out.
 
-        With M = (K + ridge I)^-1, rows g left out are mispredicted by (M_gg)^-1 (M B)_g: no fit is repeated.
+        With M = (K + ridge I)^-1, the residual at left-out rows g is (M_gg)^-1 (M B)_g, without another fit.
         """
         blocks = self.blocks(ridge, groups)
         size = groups.shape[1]

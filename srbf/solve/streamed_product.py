@@ -12,19 +12,19 @@ from srbf.arrays import Float, Float32, Float64
 from srbf.compute.threads import cores, one_blas_thread
 from srbf.io.float16 import finite_to_float32
 
-TILE_BYTES = 1 << 19  # of the converted rows and the product's part at a time: what a core's cache holds
-TASK_COLUMNS = 1 << 15  # of one thread's turn; fixed, so that sums are the same on any number of cores
+TILE_BYTES = 1 << 19  # of converted rows and their part of the product, to fit a core's cache
+TASK_COLUMNS = 1 << 15  # per task of a thread; fixed, so that sums are the same on any number of cores
 
 
 class StreamedProduct:
-    """X = sum over rows l of W[:, l] B[l], B of L rows fed block by block, each row of P columns of C components.
+    """X = sum over rows l of W[:, l] B[l], for B of L rows of P columns with C components, which arrive in blocks.
 
-    `weights` (J, L) leave the components apart: X is (J, P C), a plane (P, C) a row. `weights` (J, L, C) sum over them as well:
+    `weights` (J, L) keep the components separate: X is (J, P C). `weights` (J, L, C) also sum over the components:
     X(j, p) = sum_{l,c} W[j, l, c] B(l, p, c), (J, P).
 
-    Rows may be float32 or finite float16, which are converted piece by piece in cache; products and sums are float32, the same
-    bits whatever the number of cores. Memory: X and, a core, TILE_BYTES. Work: 2 J L P C flops. X is read and written once a block, so
-    feed dozens of rows at a time.
+    Rows may be float32 or finite float16, which are converted in cache; products and sums are float32 and
+    bit-identical for any number of cores. Memory: X, and TILE_BYTES per core. Cost: 2 J L P C flops. X is read and written once per
+    block, so feed dozens of rows at a time.
     """
 
     def __init__(self, weights: Float[ndarray, "J L"] | Float[ndarray, "J L C"]) -> None:
@@ -34,13 +34,13 @@ class StreamedProduct:
 
     @property
     def result(self) -> Float32[ndarray, "J M"]:
-        """X as far as it is fed."""
+        """X of the rows fed so far."""
         assert self._result is not None, "no rows were fed"
         return self._result
 
     @property
     def norm_squared(self) -> float:
-        """|B|^2 as far as it is fed, to float32's precision."""
+        """|B|^2 of the rows fed so far, in float32 precision."""
         return self._norm_squared
 
     def add(self, first_row: int, block: Float[ndarray, "*block"]) -> None:
@@ -69,7 +69,7 @@ class StreamedProduct:
                     finite_to_float32(source, values)
                 else:
                     np.copyto(values, source)
-                flat = values.reshape(-1, size)  # a copy only in a task's last, narrower tile
+                flat = values.reshape(-1, size)  # copies only the last, narrower tile of a task
                 np.matmul(weights, flat, out=product[:, :size])
                 if fresh:
                     result[:, tile] = product[:, :size]
@@ -87,7 +87,7 @@ class StreamedProduct:
         return np.sum(in_tasks(lambda task: np.array([np.dot(row, row) for row in result[:, task]], np.float64), result.shape[1]), axis=0)
 
     def transform(self, matrix: Float64[ndarray, "I J"]) -> Float32[ndarray, "I M"]:
-        """`matrix` X by float64 products of pieces of columns; in X's own memory where `matrix` is square, so that X is gone."""
+        """`matrix` X by float64 products of pieces of columns; a square `matrix` overwrites X."""
         result = self.result
         in_place = len(matrix) == len(result)
         transformed = result if in_place else np.empty((len(matrix), result.shape[1]), np.float32)
@@ -101,7 +101,7 @@ class StreamedProduct:
 
 
 def in_tasks(work: Callable[[slice], object], columns: int) -> list:
-    """`work` on pieces of TASK_COLUMNS columns by a thread a core, their matrix products single-threaded; answers in order."""
+    """`work` on pieces of TASK_COLUMNS columns by one thread per core, with single-threaded matrix products; results in order."""
     tasks = [slice(start, min(start + TASK_COLUMNS, columns)) for start in range(0, columns, TASK_COLUMNS)]
     with one_blas_thread(), ThreadPoolExecutor(cores()) as workers:
         return list(workers.map(work, tasks))

@@ -1,1 +1,1 @@
-"""An asset in the browser: the built page, what it is told of an asset, and the server that hands both to one machine."""
+"""An asset in the browser: the built page, its configuration, and a local server for both."""

@@ -11,7 +11,7 @@ FILES = ("index.html", "viewer.js", "viewer.css", "LICENSES.txt")
 
 
 def page_files(root: Path = ROOT) -> dict[str, Path]:
-    """The page's files by name; MissingLibraryError where they were not built."""
+    """The page's files by name; MissingLibraryError if they were not built."""
     found = {name: root / name for name in FILES}
     if missing := [name for name, path in found.items() if not path.is_file()]:
         raise MissingLibraryError(f"expected the built page in {root}, found no {missing[0]}; run `make web`, or install a released srbf")

@@ -1,4 +1,4 @@
-"""The camera of a view, out of its position map: an asset says where its pixels lie, not from where they were seen."""
+"""The camera of a view, estimated from its position map, since an asset does not record its camera."""
 
 from __future__ import annotations
 
@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy import ndarray
-from scipy.linalg import rq
 
 from srbf.arrays import Float, Float64
 from srbf.asset import Asset
 
-POINTS = 4000  # of the picture, evenly spaced: eleven numbers are asked for
-ROUNDS = 8  # of least squares; each leaves out the tenth that fitted the one before worst: pixels across an edge
-KEPT = 0.9
-WORST = 1.0  # pixels, rms: beyond it no pinhole camera saw this picture
-FLAT = 1e-6  # of the largest singular value: points of one plane do not tell where they are seen from
+POINTS = 4000  # of the image, evenly spaced, for eleven unknowns
+ROUNDS = 8  # of least squares; each leaves out the tenth with the largest residuals of the previous one: pixels across an edge
+KEPT_SHARE = 0.9
+MAX_RMS = 1.0  # pixels; beyond, the image has no pinhole camera
+FLAT = 1e-6  # of the largest singular value; points in one plane do not determine the camera
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +29,11 @@ class FittedCamera:
 
 
 def fitted_camera(asset: Asset) -> FittedCamera | None:
-    """The camera that explains best where a view's covered pixels lie; None without positions, or where none explains them.
+    """The pinhole camera that best fits the positions of a view's covered pixels; None without positions, or if none fits.
 
-    Direct linear transformation: u = (P1 x) / (P3 x) and v likewise, multiplied out, P's last entry 1 for x counted from the points'
-    middle, which is in front of the camera; then P = lens · rotation · (1 | −position) by RQ decomposition.
-    Ill-conditioned where all points lie in a plane: None.
+    Direct linear transformation: u = (P1 x) / (P3 x), v = (P2 x) / (P3 x), multiplied out, with the last entry of P set to 1 for x
+    relative to the points' center, which is in front of the camera; then P = lens · rotation · (1 | −position) by RQ decomposition.
+    Ill-conditioned if all points lie in a plane: None.
     """
     if "position" not in asset.images:
         return None
@@ -54,9 +53,9 @@ def fitted_camera(asset: Asset) -> FittedCamera | None:
     for _ in range(ROUNDS):
         matrix = _projection(points[kept], seen[kept])
         error = _error(matrix, points, seen, (asset.width, asset.height))
-        kept = np.argsort(error)[: int(KEPT * len(error))]
+        kept = np.argsort(error)[: int(KEPT_SHARE * len(error))]
     rms = float(np.sqrt((error[kept] ** 2).mean()))
-    return _decomposed(matrix, middle, size, rms) if rms <= WORST else None
+    return _decomposed(matrix, middle, size, rms) if rms <= MAX_RMS else None
 
 
 def _projection(points: Float64[ndarray, "N 3"], seen: Float64[ndarray, "N 2"]) -> Float64[ndarray, "3 4"]:
@@ -77,8 +76,10 @@ def _error(
 
 
 def _decomposed(matrix: Float64[ndarray, "3 4"], middle: Float64[ndarray, " 3"], size: float, rms: float) -> FittedCamera | None:
+    from scipy.linalg import rq
+
     turn = matrix[:, :3]
-    if abs(np.linalg.det(turn)) < 1e-9:  # an orthographic camera: it is nowhere
+    if abs(np.linalg.det(turn)) < 1e-9:  # an orthographic camera has no position
         return None
     position = middle - size * np.linalg.solve(turn, matrix[:, 3])
     lens, rotation = rq(turn)

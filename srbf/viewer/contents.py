@@ -1,4 +1,4 @@
-"""Everything that the page may ask for, by the name that it asks by."""
+"""All content that the page may request, by name."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ Content = bytes | Path | Callable[[], bytes]
 
 
 def read(content: Content) -> bytes:
-    """The bytes of a file, or what is made when it is asked for."""
+    """The bytes of a file, or of content made on request."""
     if isinstance(content, Path):
         return content.read_bytes()
     return content if isinstance(content, bytes) else content()
 
 
 def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path | None = None) -> dict[str, Content]:
-    """Everything the page may ask for of the assets in `folders`, the first of which it shows first.
+    """All content that the page may request of the assets in `folders`; it shows the first one first.
 
-    InputError where they, or the capture, are not of one scene; what `Asset.open`, `Capture.open` and `page_files` raise.
+    InputError if they, or the capture, belong to different scenes; also the errors of `Asset.open`, `Capture.open` and `page_files`.
     """
     page = page_files()
     assets = [Asset.open(folder) for folder in folders]
@@ -72,7 +72,7 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
 
 def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
     def kind(asset: Asset) -> str:
-        return f"{asset.width} x {asset.height} {page_manifest.receiver_kind(asset)} of {asset.quantity}"
+        return f"{asset.width} x {asset.height} {asset.receiver_kind} of {asset.quantity}"
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):
@@ -92,7 +92,7 @@ def _files(asset: Asset, folder: Path, place: str) -> dict[str, Content]:
 
 
 def _named(asset: Asset) -> list[str]:
-    """Files that asset.json names; an asset need not have checksums."""
+    """Files named in asset.json, since an asset may lack checksums."""
     entries = [entry["file"] for entry in asset.layers]
     tables = [asset.manifest[name]["file"] for name in asset.tables]
     scene = [asset.manifest["scene"]] if "scene" in asset.manifest else []

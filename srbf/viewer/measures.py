@@ -1,4 +1,4 @@
-"""What the page asks to be measured when it is asked to show it: the error of every light, and spectra; of a few thousand texels."""
+"""Measurements on request of the page: the error of every light, and spectra, from a few thousand texels."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from srbf.arrays import Float64, Int
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, psnr, squared_errors
-from srbf.evaluation.rate_distortion import components_of, singular_values, spectrum
+from srbf.evaluation.rate_distortion import singular_values, spectrum
 from srbf.evaluation.temporal_stability import sampled_texels
-from srbf.methods import directional_responses
-from srbf.sphere import point_set
+from srbf.light_domain import domain_of_asset, domain_of_capture
+from srbf.methods import method_of
+from srbf.methods import responses as asset_responses
 
-DIRECTIONS = 192  # that an asset is asked for where its own spectrum is taken: as many as it has light to tell apart
+DIRECTIONS = 192  # at which an asset is evaluated for its spectrum, enough for its number of functions
 
 
 class Measures:
-    """Figures of assets of one scene, and of their capture where there is one; each is taken once, when it is first asked for."""
+    """Measurements of assets of one scene, and of their capture if given; each is computed once, on first request."""
 
     def __init__(self, assets: Sequence[Asset], capture: Capture | None = None) -> None:
         self._assets = assets
@@ -33,12 +34,12 @@ class Measures:
 
     def errors(self, index: int) -> bytes:
         """JSON of asset `index` against every light of the capture: `rmse` and `psnr` (dB; of the peak of the train references) by light,
-        and `texels`, how many were looked at. Both are clamped at 0, but of indirect light, where the clamp comes later."""
+        and `texels`, the number of sampled texels. Both images are clamped at 0, except for indirect light."""
         return self._once("errors", index)
 
     def spectrum(self, index: int) -> bytes:
-        """JSON of asset `index`: singular values, largest first, of what it answers (`asset`) and of what the capture did (`capture`, or
-        null), both of the same texels and over the root of the number of answers; `scalars`: numbers that the asset keeps of a texel."""
+        """JSON of asset `index`: singular values, largest first, of its responses (`asset`) and of those of the capture (`capture`, or
+        null), for the same texels and over the root of the number of responses; `scalars`: the asset's numbers per texel."""
         return self._once("spectrum", index)
 
     def _once(self, what: str, index: int) -> bytes:
@@ -56,7 +57,7 @@ class Measures:
     @cached_property
     def _sample(self) -> Capture:
         assert self._capture is not None
-        return self._capture.kept(self._texels)
+        return self._capture.load(self._texels)
 
     def _errors(self, index: int) -> dict[str, object]:
         sample, asset = self._sample, self._assets[index].at(self._texels)
@@ -64,24 +65,29 @@ class Measures:
         every = range(len(sample.lights))
         responses = sample.sample(sample.indices("train") or every, np.arange(len(self._texels)))
         peak = 1.0 if sample.source_bits == 8 else float(np.quantile(np.maximum(responses, 0), PEAK_QUANTILE))
+        coordinates = domain_of_capture(sample).captured(sample, every)
         errors = []
         for first, block in sample.blocks(every):
-            relit = directional_responses(asset, sample.directions(every[first : first + len(block)]))
+            relit = asset_responses(asset, coordinates[first : first + len(block)])
             for response, true in zip(relit.reshape(block.shape), block, strict=True):
                 errors.append(float(np.sqrt(squared_errors(response, true, floor)[0] / true.size)))
         return {"texels": len(self._texels), "peak": peak, "rmse": errors, "psnr": [psnr(peak, error) for error in errors]}
 
     def _spectrum(self, index: int) -> dict[str, object]:
         asset = self._assets[index].at(self._texels)
-        responses = directional_responses(asset, point_set("fibonacci", DIRECTIONS, asset.domain))[:, 0]  # (b, n, 3)
+        responses = asset_responses(asset, domain_of_asset(asset.manifest).probes(DIRECTIONS))[:, 0]  # (b, n, 3)
         own = singular_values(responses.transpose(1, 0, 2).reshape(len(self._texels), -1)) / np.sqrt(responses.size)
         captured = None
         if self._capture is not None:
             captured = spectrum(self._sample) / np.sqrt(len(self._texels) * 3 * len(self._sample.indices("train")))
-        return {"scalars": components_of(asset), "asset": _listed(own), "capture": None if captured is None else _listed(captured)}
+        return {
+            "scalars": method_of(asset).numbers_per_texel(asset),
+            "asset": _listed(own),
+            "capture": None if captured is None else _listed(captured),
+        }
 
 
 def _listed(values: Float64[ndarray, " r"]) -> list[float]:
-    """All but what is rounding: six digits are enough for a plot."""
+    """All values above rounding errors, with six digits."""
     kept = values[values > 1e-5 * max(float(values[0]), 1e-30)]
     return [float(f"{value:.6g}") for value in kept]

@@ -1,4 +1,4 @@
-"""`viewer.json`: what the page is told before it reads an asset."""
+"""`viewer.json`: the page's configuration, read before the assets."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 from srbf.asset import Asset
 from srbf.evaluation.rate_distortion import family_of, name_of
-from srbf.relighting.alpha import receiver_kind
 from srbf.viewer.camera import fitted_camera
 
 NAME = "viewer.json"
@@ -20,7 +19,7 @@ def facts(
     asset: Asset, assets: list[dict[str, Any]], mesh: bool, title: str, capture: str | None = None, notes: tuple[str, ...] = ()
 ) -> dict[str, Any]:
     """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link."""
-    view = receiver_kind(asset) == "view"
+    view = asset.receiver_kind == "view"
     camera = fitted_camera(asset) if view else None
     return {
         "title": title,
@@ -48,15 +47,14 @@ def described(asset: Asset, name: str, folder: str, spectrum: str, errors: str |
 
 
 def names(assets: Sequence[Asset], folders: Sequence[Path]) -> list[str]:
-    """What tells assets apart: their method and size, and the folder's name where two are alike."""
-    told = [name_of(asset) if asset.method == "relighting-map" else f"{family_of(asset)}, {name_of(asset)}" for asset in assets]
+    """Names of assets: their method and size, and the folder's name where two are the same."""
+    told = [f"{family_of(asset)}, {name_of(asset)}" for asset in assets]
     return [f"{folder.resolve().name}: {name}" if told.count(name) > 1 else name for folder, name in zip(folders, told, strict=True)]
 
 
 def receiver_name(asset: Asset) -> str:
     """The object or camera that the asset was baked for."""
-    receiver = asset.manifest.get("source", {}).get("receiver", {})
-    return str(receiver.get("object") or receiver.get("camera") or asset.method)
+    return str(asset.receiver.get("object") or asset.receiver.get("camera") or asset.method)
 
 
 def title(folders: Sequence[Path]) -> str:

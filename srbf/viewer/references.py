@@ -1,4 +1,4 @@
-"""A capture's own pictures, for the page to compare with: its lights, and an image by the light's number."""
+"""The reference images of a capture for the page: its lights, and an image per light."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io.image import write_image
 
-KEPT = 32  # encoded images that are held
+CACHED_IMAGES = 32
 
 
 @dataclass(eq=False)
 class References:
-    """Images as EXRs of floats, whatever the capture holds them as; they are made when asked for."""
+    """Images as float EXRs, for captures of any format, encoded on request."""
 
     capture: Capture
     _made: dict[int, bytes] = field(default_factory=dict)
     _lock: Lock = field(default_factory=Lock)
 
     def check(self, asset: Asset) -> None:
-        """InputError where the capture is of something else than the asset, so that no picture of it could be compared."""
+        """InputError if the capture and the asset are not comparable."""
         self.capture.require_directional("the viewer's comparison")
         ours = (asset.width, asset.height, asset.quantity, asset.transport)
         theirs = (self.capture.width, self.capture.height, self.capture.quantity, self.capture.transport)
         if ours != theirs:
             raise InputError(
-                f"expected the capture that the asset was fitted from ({_said(ours)}), found one of {_said(theirs)}; "
+                f"expected the capture that the asset was fitted from ({_described(ours)}), found one of {_described(theirs)}; "
                 "leave it out, or give the right one"
             )
 
@@ -40,7 +40,7 @@ class References:
         return {"lights": [{"direction": list(light.direction), "role": light.role} for light in self.capture.lights]}
 
     def image(self, index: int) -> bytes:
-        """The EXR of light `index`; IndexError where there is none."""
+        """The EXR of light `index`; IndexError if there is none."""
         if not 0 <= index < len(self.capture.lights):
             raise IndexError(index)
         with self._lock:
@@ -49,11 +49,11 @@ class References:
                     path = Path(folder) / "image.exr"
                     write_image(path, self.capture.image(index), "float")
                     self._made[index] = path.read_bytes()
-                while len(self._made) > KEPT:
+                while len(self._made) > CACHED_IMAGES:
                     self._made.pop(next(iter(self._made)))
             return self._made[index]
 
 
-def _said(facts: tuple[object, ...]) -> str:
+def _described(facts: tuple[object, ...]) -> str:
     width, height, quantity, transport = facts
     return f"{width} x {height}, {quantity}, {transport}"

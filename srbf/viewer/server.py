@@ -1,4 +1,4 @@
-"""The page and one asset on 127.0.0.1: a table of names, and nothing but what stands in it."""
+"""A server on 127.0.0.1 for the page and its assets; it serves the names of one table only."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ HEADERS = {
 
 
 class ViewerServer(ThreadingHTTPServer):
-    """Serves `contents`, name to bytes, a file, or what makes the bytes; hosts other than its own address are refused."""
+    """Serves `contents`: name to bytes, a file, or a function that makes the bytes. Requests for other hosts are refused."""
 
     daemon_threads = True
 
     def __init__(self, contents: dict[str, Content], port: int = 0) -> None:
-        """InputError where the port is taken, or may not be had."""
+        """InputError if the port is not available."""
         try:
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
-            raise InputError(f"expected a free port, found that {port} cannot be had ({error}); choose another --port, or none") from error
+            raise InputError(f"expected a free port, found {port} unavailable ({error}); choose another `port`, or 0") from error
         self.contents = contents
 
     @property
@@ -51,7 +51,7 @@ class ViewerServer(ThreadingHTTPServer):
         return f"http://{HOST}:{self.server_port}/"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A page that was closed while it loaded is no event."""
+        """Ignore pages that were closed while loading."""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -92,4 +92,4 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.write(data)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: the page says itself what fails."""
+        """No log: the page reports errors."""

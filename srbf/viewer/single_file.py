@@ -1,4 +1,4 @@
-"""The page, its asset and its mesh in one HTML file that opens from the disk and asks nobody for anything."""
+"""The page, its asset and its mesh in one HTML file that opens from disk without network access."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ FETCH = """{
 
 
 def single_file(contents: dict[str, Content]) -> str:
-    """HTML of `contents_of` an asset; a capture's images are left out, as many as there are."""
+    """HTML of `contents_of` an asset, without the images of a capture."""
     kept = {name: content for name, content in contents.items() if name not in PAGE}
     held = {name: base64.b64encode(read(content)).decode("ascii") for name, content in kept.items()}
-    names = json.dumps(held).replace("<", r"\u003c")  # none of them ends the script
+    names = json.dumps(held).replace("<", r"\u003c")  # no name ends the script
     script, style = (read(contents[name]).decode("utf-8") for name in ("viewer.js", "viewer.css"))
     parts = [
         f'<meta http-equiv="Content-Security-Policy" content="{POLICY}" />',

@@ -1,4 +1,4 @@
-"""`web`: a folder for any static host: the viewer's page, the asset, and the mesh that it lights."""
+"""`web`: a folder for any static host: the viewer's page, the asset and its mesh."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.export import exr, ktx2, uint8
+from srbf.export import exr, ktx2, png
 from srbf.export.engine_folder import below
 from srbf.export.gltf import model
 from srbf.export.settings import PLAIN, Settings, Target, Written
@@ -18,12 +18,12 @@ from srbf.viewer.built_page import page_files
 from srbf.viewer.measures import Measures
 
 DATA = "data"
-FORMS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": uint8.write, "bc7": ktx2.write, "bc1": ktx2.write}
+FORMS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": ktx2.write, "bc1": ktx2.write}
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `index.html` with its script and style, `viewer.json`, `spectrum.json`, `asset.json` with its images in
-    `data/`, and `mesh.glb` of a lightmap: `settings.mesh`, else rebuilt from its texels.
+    `data/`, and `mesh.glb` of a lightmap: `settings.mesh`, or rebuilt from its texels.
 
     MissingLibraryError without the built page; InputError on a mesh without a UV set.
     """
@@ -47,8 +47,8 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def shown_mesh(asset: Asset, mesh: Path | None, notes: list[str]) -> bytes | None:
-    """The model of a lightmap; None for a view, and, with a note, where the asset has none and none is given."""
-    if mesh is None and page_manifest.receiver_kind(asset) == "view":
+    """The mesh of a lightmap; None for a view, and, with a note, if no mesh is available."""
+    if mesh is None and asset.receiver_kind == "view":
         return None
     try:
         return model(asset, mesh)

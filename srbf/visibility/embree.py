@@ -1,4 +1,4 @@
-"""Triangles behind Embree: what a ray meets."""
+"""Ray intersections with triangles, by Embree."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class EmbreeTriangles:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
-            raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use --direct shadow-map") from error
+            raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use `direct='shadow-map'`") from error
         self._scene: Any = EmbreeScene()
         self._empty = not len(corners)
         if not self._empty:
             self._mesh = TriangleMesh(self._scene, np.ascontiguousarray(corners, np.float32))
 
     def occluded(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Bool[ndarray, " n"]:
-        """Whether anything is in the way."""
+        """Whether each ray hits a triangle within `distance` (None: at any distance)."""
         if self._empty or not len(origin):
             return np.zeros(len(origin), bool)
         far = np.full(len(origin), 1e30, np.float32) if distance is None else distance.astype(np.float32)
@@ -42,7 +42,7 @@ class EmbreeTriangles:
     def first_hit(
         self, origin: np.ndarray, direction: np.ndarray
     ) -> tuple[Int[ndarray, " n"], Float32[ndarray, " n"], Float32[ndarray, "n 3"]]:
-        """(triangle, distance, barycentric place) of the nearest on each ray; -1 where there is none."""
+        """(triangle, distance, barycentric coordinates) of the nearest hit of each ray; triangle -1 without a hit."""
         count = len(origin)
         if self._empty or not count:
             return np.full(count, -1), np.full(count, np.inf, np.float32), np.zeros((count, 3), np.float32)

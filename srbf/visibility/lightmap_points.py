@@ -1,4 +1,4 @@
-"""Points of a lightmap's texels that light is looked up at: on the mesh where it is known, else along the maps' slopes."""
+"""Sample points of a lightmap's texels: on the mesh if it is known, else along the slopes of the maps."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from srbf.visibility.surface import surface_at
 
 @dataclass(frozen=True)
 class Points:
-    """n points: weight in their texel's mean, position, shading normal, face normal, offset onto the rounded surface."""
+    """n points: weight in their texel's mean, position (m), shading normal, face normal, offset to the rounded surface (m)."""
 
     weight: Float32[ndarray, " n"]
     point: Float32[ndarray, "n 3"]
@@ -25,7 +25,7 @@ class Points:
 
 
 class LightmapPoints:
-    """Points of all texels; without Embree's `first_hit` the mesh is known through the scene's lightmap coordinates alone."""
+    """Points of all texels; without Embree's `first_hit`, only the scene's lightmap coordinates locate the mesh."""
 
     def __init__(self, receivers: Receivers, first_hit: FirstHit | None) -> None:
         self._receivers = receivers
@@ -34,7 +34,7 @@ class LightmapPoints:
         self._mesh = footprints(receivers, self._slopes[:2], first_hit)
 
     def at(self, texel: Int[ndarray, " n"], square: Float64[ndarray, "n 2"]) -> Points:
-        """The points at places `square`, in [0, 1)^2 of each texel's footprint."""
+        """The points at `square`, in [0, 1)^2 of each texel's footprint."""
         triangle = self._mesh.triangle[texel]
         lost = triangle < 0
         triangle = np.maximum(triangle, 0)
@@ -50,7 +50,7 @@ class LightmapPoints:
         return Points(weight, point, normal, face, lift)
 
     def _off_mesh(self, texel: ndarray, offset: ndarray) -> tuple[ndarray, ndarray]:
-        """(point, normal) a part of a texel off its center, along the slopes of position and normal map."""
+        """(point, normal) at an offset (texels) from the center, along the slopes of position and normal map."""
         position, normal = (self._receivers.images[name].reshape(-1, 3)[texel] for name in ("position", "normal"))
         right, down, turn_right, turn_down = (slope[texel] for slope in self._slopes)
         normal = normal + turn_right * offset[:, :1] + turn_down * offset[:, 1:]

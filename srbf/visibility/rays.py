@@ -1,4 +1,4 @@
-"""Exact direct light by rays: several per texel, on the mesh over its footprint and over the sun's disc, traced by Embree."""
+"""Direct light by rays: several per texel, over its footprint on the mesh and over the sun's disc, traced by Embree."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy import ndarray
-from scipy import ndimage
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.encode.dilation import dilate, nearest_covered
@@ -18,25 +17,25 @@ from srbf.visibility.receivers import Receivers, disc_points, hashed, pixel_filt
 from srbf.visibility.shadow import transmittance
 from srbf.visibility.surface import surface_at
 
-FIRST = 4  # samples of every texel
-SAMPLES = 32  # of a texel whose first ones differ
-MOST = 512  # of a texel whose samples still differ, at a shadow's edge above all
-BUDGET = 64  # samples that edges may take, for each texel of the picture: where everything is an edge, each gets fewer
-DIFFERENT = 0.02  # in irradiance, between samples of a texel or between neighbors
-JUMP = 0.2  # between neighbors: a shadow's edge may cross a corner that no sample has met
-EDGE = 0.03  # likewise between samples of a texel: it takes up to MOST, as where a shadow's edge crosses it
-KEPT = 1 << 22  # samples kept from light to light; beyond, they are made anew
-TEXELS = 1 << 16  # at a time
-LIFT = 1e-5  # m at the origin and a part of the distance from it: how far off its surface a shadow ray starts
-MOST_WALLS = 32
-TERMINATOR = 0.1  # cosine below which a smooth surface's ray starts on the rounded surface [Hanika2021], as Cycles has it by default
-TINY = 1e-12  # a share below which nothing is diffuse
-NEAREST_FIRST = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # neighbors of a pixel
+FIRST_SAMPLES = 4  # of every texel
+SAMPLES = 32  # of a texel whose first samples differ
+MAX_SAMPLES = 512  # of a texel whose samples still differ, mostly at shadow edges
+EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
+REFINE_STEP = 0.02  # irradiance between samples of a texel, or between neighbors, from which a texel is refined
+NEIGHBOR_STEP = 0.2  # between neighbors: a shadow edge may cross a corner without samples
+EDGE_STEP = 0.03  # between samples of a texel, from which it gets up to MAX_SAMPLES
+CACHED_SAMPLES = 1 << 22  # kept from light to light
+TEXEL_BATCH = 1 << 16
+RAY_OFFSET = 1e-5  # m, plus this share of the distance from the origin: between a surface and the start of its shadow rays
+MAX_WALLS = 32
+TERMINATOR = 0.1  # cosine below which the ray of a smooth surface starts on the rounded surface [Hanika2021], Cycles' default
+MIN_DIFFUSE = 1e-12  # share
+NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
 @dataclass(frozen=True)
 class Samples:
-    """n points on surfaces: texel each belongs to, its weight (0: nothing there), position, shading and face normal, rounding offset."""
+    """n points on surfaces: texel, weight (0: no surface), position (m), shading and face normal, offset to the rounded surface (m)."""
 
     texel: Int[ndarray, " n"]
     weight: Float32[ndarray, " n"]
@@ -44,25 +43,25 @@ class Samples:
     normal: Float32[ndarray, "n 3"]
     face: Float32[ndarray, "n 3"]
     lift: Float32[ndarray, "n 3"]
-    share: Float32[ndarray, "n 3"] | Float32[ndarray, "n 1"]  # in its texel's mean: its albedo, where a pixel shows several
+    share: Float32[ndarray, "n 3"] | Float32[ndarray, "n 1"]  # in its texel's mean; the albedo if a pixel shows several materials
 
 
 class RayTracer:
-    """Direct light on receivers by rays. Deterministic: points and their turns are fixed. MissingLibraryError without embreex."""
+    """Direct light on receivers by rays. Deterministic: the sample points are fixed. MissingLibraryError without embreex."""
 
     def __init__(self, receivers: Receivers, samples: int = SAMPLES) -> None:
         self._receivers = receivers
-        self._count = max(samples, FIRST)
+        self._count = max(samples, FIRST_SAMPLES)
         triangles = receivers.triangles
         self._all = EmbreeTriangles(triangles.corners)
         self._occluders = EmbreeTriangles(triangles.corners[triangles.occluders])
         self._filters = EmbreeTriangles(triangles.corners[triangles.filters])
-        self._tints = triangles.tints
+        self._transmittance = triangles.transmittance
         self._filter_material = triangles.material[triangles.filters]
         self._filter_normals = triangles.normals[triangles.filters]
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
-        self._most = max(self._count, MOST)
+        self._most = max(self._count, MAX_SAMPLES)
         points = spread_points(self._most)
         self._square, self._disc = points[:, :2], points[:, 2:]
         coverage = receivers.images.get("coverage")
@@ -86,7 +85,7 @@ class RayTracer:
         return dilate(total.reshape(height, width, 3), self._nearest) * self._receivers.reflectance()
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
-        """`answer` to a white light from each of many directions."""
+        """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
     def _irradiance(self, light: DirectionalLight | PointLight) -> Float32[ndarray, "P 3"]:
@@ -95,46 +94,48 @@ class RayTracer:
             np.zeros((texels, 3)), np.zeros((texels, 3)), np.full((texels, 3), np.inf, np.float32), np.zeros((texels, 3), np.float32)
         )
         weight = np.zeros(texels)
-        for start in range(0, len(self._texels), TEXELS):
+        for start in range(0, len(self._texels), TEXEL_BATCH):
             samples = self._first(start)
-            sums.add(samples, self._lit(samples, light, range(FIRST)))
+            sums.add(samples, self._lit(samples, light, range(FIRST_SAMPLES)))
             weight += np.bincount(samples.texel, samples.weight, texels)
         ragged = self._ragged(sums.mean(), sums.low, sums.high, weight)
-        self._refine(sums, light, ragged, range(FIRST, self._count))
-        edges = ragged[(sums.spread(ragged) > EDGE) | (self._steps(sums.mean())[ragged] > JUMP)]
-        most = min(self._most, self._count + BUDGET * len(self._texels) // max(1, len(edges)))
+        self._refine(sums, light, ragged, range(FIRST_SAMPLES, self._count))
+        edges = ragged[(sums.spread(ragged) > EDGE_STEP) | (self._steps(sums.mean())[ragged] > NEIGHBOR_STEP)]
+        most = min(self._most, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
         self._refine(sums, light, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
 
     def _refine(self, sums: _Sums, light: DirectionalLight | PointLight, texels: Int[ndarray, " e"], numbers: range) -> None:
         """Add samples `numbers` of `texels`."""
-        step = max(1, TEXELS * SAMPLES // max(1, len(numbers)))
+        step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
         for start in range(0, len(texels) if len(numbers) else 0, step):
             samples = self._samples(texels[start : start + step], numbers)
             sums.add(samples, self._lit(samples, light, numbers))
 
     def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
         """Texels whose samples differ, or that differ from a neighbor."""
-        beside = self._steps(mean) > DIFFERENT
-        within = ((high - low).max(axis=1) > DIFFERENT) | ((weight > 0) & (weight < FIRST))
+        beside = self._steps(mean) > REFINE_STEP
+        within = ((high - low).max(axis=1) > REFINE_STEP) | ((weight > 0) & (weight < FIRST_SAMPLES))
         chosen = (beside | within)[self._texels]
         return self._texels[chosen]
 
     def _steps(self, mean: np.ndarray) -> Float64[ndarray, " P"]:
-        """How far each texel and its neighbors differ."""
+        """Largest difference of each texel to a neighbor."""
         image = mean.max(axis=1).reshape(self._receivers.height, self._receivers.width)
+        from scipy import ndimage
+
         return (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
 
     def _first(self, start: int) -> Samples:
         if start in self._kept:
             return self._kept[start]
-        samples = self._samples(self._texels[start : start + TEXELS], range(FIRST))
-        if len(self._texels) * FIRST <= KEPT:
+        samples = self._samples(self._texels[start : start + TEXEL_BATCH], range(FIRST_SAMPLES))
+        if len(self._texels) * FIRST_SAMPLES <= CACHED_SAMPLES:
             self._kept[start] = samples
         return samples
 
     def _lit(self, samples: Samples, light: DirectionalLight | PointLight, numbers: range) -> Float32[ndarray, "n 3"]:
-        """N.L times what reaches each sample, for a white light."""
+        """N.L times the light that reaches each sample, for a white light."""
         to_light, distance, strength = self._towards(samples, light, numbers)
         NoL = np.einsum("nc,nc->n", samples.normal, to_light)
         lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (strength > 0))
@@ -145,7 +146,7 @@ class RayTracer:
         low_sun = NoL[lit] < TERMINATOR
         amount = np.where(low_sun, 2 - (NgL + NoL[lit]) / TERMINATOR, 1 - NgL / TERMINATOR)
         origin = point + samples.lift[lit] * np.clip(amount, 0, 1)[:, None]
-        origin += face * (np.where(NgL < 0, -1, 1) * LIFT * (1 + np.abs(point).max(axis=1)))[:, None]
+        origin += face * (np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1)))[:, None]
         passed = self._passed(origin, direction, None if distance is None else distance[lit])
         result[lit] = passed * (NoL * strength)[lit, None]
         return result
@@ -174,7 +175,7 @@ class RayTracer:
         return unit / np.linalg.norm(unit, axis=1, keepdims=True), None, np.ones(count)
 
     def _passed(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Float32[ndarray, "n 3"]:
-        """What of a ray's light comes through: 0 behind what is opaque, else the product of the tints on the way."""
+        """Transmittance of each ray: 0 behind opaque surfaces, else the product over the walls on the way."""
         free = ~self._occluders.occluded(origin, direction, distance)
         passed = np.repeat(free.astype(np.float32)[:, None], 3, axis=1)
         if not len(self._filter_material):
@@ -182,26 +183,26 @@ class RayTracer:
         active = np.flatnonzero(free)
         start = origin[active].copy()
         left = None if distance is None else distance[active].copy()
-        for _ in range(MOST_WALLS):
+        for _ in range(MAX_WALLS):
             hit, far, bary = self._filters.first_hit(start, direction[active])
             meets = (hit >= 0) if left is None else (hit >= 0) & (far < left)
             active, start, far, hit, bary = active[meets], start[meets], far[meets], hit[meets], bary[meets]
             if not len(active):
                 break
-            passed[active] *= self._tint(hit, bary, direction[active])
-            step = far + LIFT * (1 + np.abs(start).max(axis=1))
+            passed[active] *= self._wall(hit, bary, direction[active])
+            step = far + RAY_OFFSET * (1 + np.abs(start).max(axis=1))
             start = start + direction[active] * step[:, None]
             left = None if left is None else left[meets] - step
         return passed
 
-    def _tint(self, wall: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
-        """What one wall passes at the angle of each ray."""
+    def _wall(self, wall: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
+        """Transmittance of one wall at the angle of each ray."""
         normal = np.einsum("nk,nkc->nc", bary, self._filter_normals[wall])
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        return transmittance(self._tints[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
+        return transmittance(self._transmittance[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
-        """Points `numbers` of each texel, sample by sample."""
+        """Sample points `numbers` of each texel, ordered by sample."""
         square = (self._square[numbers.start : numbers.stop, None] + self._turn[None, texels, :2]) % 1  # (s, e, 2)
         texel = np.tile(texels, len(numbers))
         square = square.reshape(-1, 2)
@@ -224,7 +225,7 @@ class RayTracer:
         return Samples(texel, weight, point, normal * away, face * away, lift * away, share)
 
     def _looks(self, texel: np.ndarray, square: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
-        """The camera's rays: origin and direction."""
+        """Camera rays: origin (m) and unit direction."""
         camera = self._receivers.camera
         assert camera is not None
         offset = pixel_filter(camera["filter"], camera["filter_width"], square)
@@ -243,24 +244,24 @@ class RayTracer:
         return origin.astype(np.float32), direction.astype(np.float32)
 
     def _materials_of_pixels(self) -> Int[ndarray, " P"]:
-        """The one material that each pixel shows; -1 where its first samples show several, or nothing."""
+        """The material of each pixel; -1 if its first samples hit several, or none."""
         pure = np.full(self._receivers.height * self._receivers.width, -1)
-        for start in range(0, len(self._texels), TEXELS):
-            texels = self._texels[start : start + TEXELS]
-            square = (self._square[:FIRST, None] + self._turn[None, texels, :2]) % 1
-            hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, FIRST), square.reshape(-1, 2)))
-            shown = np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(FIRST, -1)
+        for start in range(0, len(self._texels), TEXEL_BATCH):
+            texels = self._texels[start : start + TEXEL_BATCH]
+            square = (self._square[:FIRST_SAMPLES, None] + self._turn[None, texels, :2]) % 1
+            hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, FIRST_SAMPLES), square.reshape(-1, 2)))
+            shown = np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(FIRST_SAMPLES, -1)
             pure[texels] = np.where((shown == shown[0]).all(axis=0), shown[0], -1)
         return pure
 
     def _albedo(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Float32[ndarray, "n 3"]:
-        """The albedo of a material as its pixel shows it, or the nearest pixel that shows it alone; of the mixture where none does."""
+        """The albedo of a material in its pixel, or in the nearest pixel with that material alone; else that of the mixture."""
         assert self._pure is not None
         width, height = self._receivers.width, self._receivers.height
         image = self._receivers.images["albedo"].reshape(-1, 3)
         source = texel.copy()
         open_ = np.flatnonzero(self._pure[texel] != material)
-        for right, down in NEAREST_FIRST:
+        for right, down in NEIGHBOR_STEPS:
             if not len(open_):
                 break
             column, row = texel[open_] % width + right, texel[open_] // width + down
@@ -273,7 +274,7 @@ class RayTracer:
 
 @dataclass(frozen=True)
 class _Sums:
-    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance whatever mixture it shows; least and most."""
+    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance for any mixture; minimum and maximum."""
 
     total: Float64[ndarray, "P 3"]
     share: Float64[ndarray, "P 3"]
@@ -291,9 +292,9 @@ class _Sums:
         np.maximum.at(self.high, samples.texel[real], light[real])
 
     def mean(self) -> Float64[ndarray, "P 3"]:
-        """Light of every texel so far."""
-        return self.total / np.maximum(self.share, TINY)
+        """Mean light of every texel."""
+        return self.total / np.maximum(self.share, MIN_DIFFUSE)
 
     def spread(self, texels: Int[ndarray, " e"]) -> Float32[ndarray, " e"]:
-        """How far the samples of `texels` differ."""
+        """Difference between the largest and the smallest sample of `texels`."""
         return (self.high[texels] - self.low[texels]).max(axis=1)

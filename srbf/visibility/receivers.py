@@ -1,4 +1,4 @@
-"""Where the receivers of an asset or a capture are, as points within each texel's footprint, and what they answer to direct light."""
+"""Geometry of the receivers of an asset or a capture, and sample points within each texel's footprint."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy import ndarray
-from scipy.stats import qmc
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
@@ -16,13 +15,13 @@ from srbf.errors import InputError
 from srbf.io.scene_glb import Triangles, read_triangles
 
 SAME_SURFACE_COS = 0.9  # of the normals of two neighbors that lie on one smooth surface
-OFF_PLANE = 0.2  # of their distance: how far a neighbor may lie off the tangent plane
-LONGER = 2.0  # a neighbor farther off than this many times the other side's lies across a seam
+OFF_PLANE = 0.2  # of their distance, the largest distance of a neighbor from the tangent plane
+SEAM_RATIO = 2.0  # a neighbor farther than this many times the opposite one is across a seam
 
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """Receivers under direct light: geometry (H, W, 3), each optional but where needed, the scene, and how they were sampled.
+    """Receivers under direct light: geometry (H, W, 3), optional unless needed, the scene, and the sampling of the bake.
 
     `sampling` holds sun_angle (rad) and, for a lightmap, footprint (texels), for a view its camera.
     """
@@ -36,7 +35,7 @@ class Receivers:
 
     @staticmethod
     def of(source: Asset | Capture) -> Receivers:
-        """Of an asset, or of a capture itself; InputError, in one line, where it lacks what direct light needs."""
+        """Of an asset or of a capture; InputError if it lacks data for direct light."""
         if isinstance(source, Asset):
             images, data, what = dict(source.images), source.scene, "asset"
         else:
@@ -44,7 +43,7 @@ class Receivers:
             images = {name: image for name in ("position", "normal", "albedo") if (image := source.geometry(name)) is not None}
             images["coverage"] = source.coverage()
         if data is None:
-            raise InputError(f"expected the {what} to hold scene.glb, found none: direct light needs what casts shadows; bake it indirect")
+            raise InputError(f"expected the {what} to hold scene.glb, found none: direct light needs the shadow casters; bake it indirect")
         needed = ["position", "normal"] + (["albedo"] if source.quantity == "radiance" else [])
         if missing := [name for name in needed if name not in images]:
             raise InputError(f"expected the {what} to hold {', '.join(missing)} for direct light, found none; bake it indirect")
@@ -58,22 +57,22 @@ class Receivers:
 
     @property
     def camera(self) -> dict[str, Any] | None:
-        """The camera that looked, where rays can look alike."""
+        """The camera of the bake, if rays can follow it."""
         return self.sampling.get("camera")
 
     def reflectance(self) -> Float32[ndarray, "H W 3"] | float:
-        """What turns irradiance into the asset's quantity: 1, or albedo / pi."""
+        """The factor from irradiance to the asset's quantity: 1, or albedo / pi."""
         return 1.0 if self.quantity == "irradiance" else self.images["albedo"] / np.float32(np.pi)
 
     def gradients(self, name: str) -> tuple[Float32[ndarray, "H W 3"], Float32[ndarray, "H W 3"]]:
-        """Change of position or normal a texel to the right, and a texel down; 0 where no neighbor lies on the same surface."""
+        """Change of position or normal per texel to the right and down; 0 without a neighbor on the same surface."""
         along = []
         for axis in (1, 0):
             ahead, behind = self._step(name, axis, 1), self._step(name, axis, -1)
             ok_ahead, ok_behind = self._same_surface(axis, 1), self._same_surface(axis, -1)
             length_ahead, length_behind = (np.linalg.norm(self._step("position", axis, s), axis=2) for s in (1, -1))
-            ok_ahead &= ~(ok_behind & (length_ahead > LONGER * length_behind))
-            ok_behind &= ~(ok_ahead & (length_behind > LONGER * length_ahead))
+            ok_ahead &= ~(ok_behind & (length_ahead > SEAM_RATIO * length_behind))
+            ok_behind &= ~(ok_ahead & (length_behind > SEAM_RATIO * length_ahead))
             weight = ok_ahead.astype(np.float32) + ok_behind
             mean = (ahead * ok_ahead[..., None] + behind * ok_behind[..., None]) / np.maximum(weight, 1)[..., None]
             along.append(mean.astype(np.float32))
@@ -99,20 +98,22 @@ class Receivers:
 
 
 def spread_points(count: int) -> Float64[ndarray, "S 4"]:
-    """`count` points that fill the unit hypercube evenly, and best in powers of two of them [Sobol1967]."""
+    """`count` evenly spread points of the unit hypercube, best for powers of two [Sobol1967]."""
+    from scipy.stats import qmc
+
     return qmc.Sobol(4, scramble=False).random_base2(max(0, int(np.ceil(np.log2(count)))))[:count]
 
 
 def disc_points(square: Float64[ndarray, "*s 2"]) -> Float64[ndarray, "*s 2"]:
-    """The unit square onto the unit disc, area kept."""
+    """Area-preserving map of the unit square to the unit disc."""
     radius, turn = np.sqrt(square[..., 0]), 2 * np.pi * square[..., 1]
     return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
 
 
 def pixel_filter(kind: str, width: float, square: Float64[ndarray, "S 2"]) -> Float64[ndarray, "S 2"]:
-    """Offsets (pixels) spread as Cycles spreads its samples about a pixel: by the filter itself, so that all weigh alike.
+    """Offsets (pixels) distributed like the filter, as the samples of Cycles, so that all have equal weight.
 
-    Cycles' Blackman-Harris filter is twice as wide as its setting says, its Gaussian three times, its box always one pixel.
+    Cycles' Blackman-Harris filter is twice as wide as its setting, its Gaussian three times, its box always one pixel.
     """
     x = np.linspace(-0.5, 0.5, 1025)
     if kind == "BLACKMAN_HARRIS":
@@ -130,5 +131,5 @@ def pixel_filter(kind: str, width: float, square: Float64[ndarray, "S 2"]) -> Fl
 
 
 def hashed(height: int, width: int, channels: int) -> Float64[ndarray, "H W c"]:
-    """A fixed random number in [0, 1) a texel and channel, to turn its points so that neighbors do not band."""
+    """A fixed random number in [0, 1) per texel and channel, to shift its points and avoid banding."""
     return np.random.default_rng(0).random((height, width, channels))

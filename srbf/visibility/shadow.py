@@ -1,4 +1,4 @@
-"""Shadow maps in numpy: the twins of `glsl/shadow/`, and the square that a sun's map covers."""
+"""The frame of a directional light's shadow map, and numpy twins of the functions of `glsl/shadow/`, which tests compare."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float64
 from srbf.io.scene_glb import KNOTS
+from srbf.lights import triple
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class SunFrame:
 
     @staticmethod
     def around(points: Float[ndarray, "n 3"], direction: Float64[ndarray, " 3"], margin: float = 0.01) -> SunFrame:
-        """The frame of a sun at `direction` whose square holds all `points`, and a part `margin` more on every side."""
+        """The frame of a light at `direction` whose square holds all `points`, plus a share `margin` on every side."""
         across = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0])
         across /= np.linalg.norm(across)
         up = np.cross(direction, across)
@@ -31,7 +32,7 @@ class SunFrame:
         lowest, highest = flat.min(axis=0), flat.max(axis=0)
         extent = max(float((highest - lowest).max()), 1e-6) * (1 + 2 * margin)
         low = (lowest + highest - extent) / 2
-        return SunFrame(_triple(across), _triple(up), _triple(direction), (float(low[0]), float(low[1])), extent)
+        return SunFrame(triple(across), triple(up), triple(direction), (float(low[0]), float(low[1])), extent)
 
 
 def place(
@@ -50,7 +51,7 @@ def place(
 def fraction(
     heights: Float[ndarray, "H W"], uv: Float[ndarray, "n 2"], height: Float[ndarray, " n"], slope: Float[ndarray, "n 2"], bias: float
 ) -> Float[ndarray, " n"]:
-    """How much of 3 x 3 texels does not stand above a receiver whose plane rises by `slope` (m a texel) [Reeves1987]."""
+    """The share of 3 x 3 texels that is not above a receiver whose plane rises by `slope` (m per texel) [Reeves1987]."""
     size = np.array(heights.shape[::-1])
     at = uv * size - 0.5
     base = np.floor(at)
@@ -67,7 +68,7 @@ def fraction(
 
 
 def transmittance(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n"]) -> Float[ndarray, "n 3"]:
-    """What one wall lets through at the cosine at which light meets its normal, from either side."""
+    """Transmittance of one wall at a cosine between light and normal, from either side."""
     at = np.minimum(np.abs(cosine), 1) * (KNOTS - 1)
     knot = np.minimum(at.astype(int), KNOTS - 2)
     part = (at - knot).astype(curve.dtype)[:, None]
@@ -78,7 +79,3 @@ def transmittance(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n
 def direct(normal: Float[ndarray, "n 3"], to_light: Float[ndarray, " 3"], visibility: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """N.L times visibility: the irradiance by a directional light of unit irradiance."""
     return np.maximum(normal @ to_light, 0)[:, None] * visibility
-
-
-def _triple(vector: ndarray) -> tuple[float, float, float]:
-    return (float(vector[0]), float(vector[1]), float(vector[2]))

@@ -1,4 +1,4 @@
-"""Direct light by a shadow map on the GPU: what an engine would show, to be held against exact rays."""
+"""Direct light by a shadow map on the GPU, as in an engine, for comparison with rays."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from srbf.visibility.shadow import SunFrame
 if TYPE_CHECKING:
     import moderngl
 
-SIZE = 2048  # texels a side
-SUNS = 16  # shadow maps that stand for a sun of some size
-FINE, COARSE = 4, 2  # points a side of a texel's footprint where its light is looked up
-FINE_TEXELS = 1 << 16  # of a lightmap, at most, for FINE points
-NOTHING = -1e30  # height where no occluder is
+SIZE = 2048  # texels per side
+SUN_SAMPLES = 16  # shadow maps of a sun with a disc
+FINE, COARSE = 4, 2  # lookups per side of a texel's footprint
+FINE_TEXELS = 1 << 16  # largest lightmap with FINE lookups
+NO_OCCLUDER = -1e30  # height
 
 
 class ShadowMapper:
-    """Direct light of suns on receivers by one orthographic map each; a context manager.
+    """Direct light of directional lights on receivers by one orthographic map each; a context manager.
 
-    Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their tint. InputError for point and
+    Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their transmittance. InputError for point and
     spot lights, ShaderError without OpenGL 3.3.
     """
 
@@ -67,12 +67,12 @@ class ShadowMapper:
             if isinstance(light, EnvironmentLight):
                 continue
             if not isinstance(light, DirectionalLight):
-                raise InputError("expected directional lights for --direct shadow-map, found a point or spot light; use --direct ray")
+                raise InputError("expected directional lights for `direct='shadow-map'`, found a point or spot light; use `direct='ray'`")
             total += self._irradiance(np.array(light.direction)) * np.array(light.color, np.float32)
         return total * self._receivers.reflectance()
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
-        """`answer` to a white light from each of many directions."""
+        """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
     def _irradiance(self, direction: Float64[ndarray, " 3"]) -> Float32[ndarray, "H W 3"]:
@@ -94,7 +94,7 @@ class ShadowMapper:
         limit = Limits.of(gl).texture_size
         if max(self._size, receivers.width, receivers.height) > limit:
             raise ShaderError(
-                f"expected at most {limit} texels a side on this GPU, found {max(self._size, receivers.width, receivers.height)}"
+                f"expected at most {limit} texels per side on this GPU, found {max(self._size, receivers.width, receivers.height)}"
             )
         position = receivers.images["position"]
         coverage = receivers.images.get("coverage")
@@ -120,16 +120,16 @@ class ShadowMapper:
         vertices = np.concatenate([triangles.corners - center, triangles.normals], axis=2).astype(np.float32)  # (T, 3, 6)
         square = (self._size, self._size)
         self._maps = {name: self._target(square, 1, "f4") for name in ("heights", "wallHeights")}
-        self._maps["tints"] = self._target(square, 4, "f2")
-        self._maps["tints"][0].filter = (gl.LINEAR, gl.LINEAR)
+        self._maps["transmittance"] = self._target(square, 4, "f2")
+        self._maps["transmittance"][0].filter = (gl.LINEAR, gl.LINEAR)
         self._sum_texture, self._sum = self._target((receivers.width, receivers.height), 4, "f4")
         height = self._program("shadow.vert", "shadow_height.frag")
-        tint = self._program("shadow.vert", "shadow_transmittance.frag")
+        transmittance = self._program("shadow.vert", "shadow_transmittance.frag")
         self._occluders = self._mesh(height, vertices[triangles.occluders])
         self._walls = []
         for material in np.unique(triangles.material[triangles.filters]):
             chosen = vertices[triangles.filters & (triangles.material == material)]
-            self._walls.append((padded(triangles.tints[material]), self._mesh(height, chosen), self._mesh(tint, chosen)))
+            self._walls.append((padded(triangles.transmittance[material]), self._mesh(height, chosen), self._mesh(transmittance, chosen)))
         lookup = self._program("fullscreen.vert", "direct_on_mesh.frag")
         corners = self._kept(gl.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
         self._lookup = self._kept(gl.vertex_array(lookup, [(corners, "2f", "corner")]))
@@ -140,11 +140,11 @@ class ShadowMapper:
         for name, meshes in (("heights", [self._occluders]), ("wallHeights", [mesh for _, mesh, _ in self._walls])):
             target = self._maps[name][1]
             target.use()
-            target.clear(NOTHING, NOTHING, NOTHING, NOTHING)
+            target.clear(NO_OCCLUDER, NO_OCCLUDER, NO_OCCLUDER, NO_OCCLUDER)
             gl.blend_equation = gl.MAX
             for mesh in meshes:
                 self._render(mesh, _uniforms(frame))
-        target = self._maps["tints"][1]
+        target = self._maps["transmittance"][1]
         target.use()
         target.clear(1, 1, 1, 1)
         gl.blend_equation = gl.FUNC_ADD
@@ -207,7 +207,7 @@ class ShadowMapper:
         return texture, self._kept(self._context.framebuffer([texture]))
 
     def _kept(self, resource: Any) -> Any:
-        """`resource`, to be released on close."""
+        """`resource`, registered for release on close."""
         self._resources.callback(resource.release)
         return resource
 
@@ -217,13 +217,13 @@ def _uniforms(frame: SunFrame) -> dict[str, Any]:
 
 
 def _suns(direction: Float64[ndarray, " 3"], angle: float) -> Iterator[Float64[ndarray, " 3"]]:
-    """Unit directions that fill a sun's disc."""
+    """Unit directions evenly spread over a sun's disc."""
     if angle == 0:
         yield direction
         return
     across = np.cross(direction, [1.0, 0.0, 0.0] if abs(direction[0]) < 0.9 else [0.0, 1.0, 0.0])
     across /= np.linalg.norm(across)
     up = np.cross(direction, across)
-    for x, y in disc_points(spread_points(SUNS)[:, 2:]) * np.tan(angle / 2):
+    for x, y in disc_points(spread_points(SUN_SAMPLES)[:, 2:]) * np.tan(angle / 2):
         vector = direction + x * across + y * up
         yield vector / np.linalg.norm(vector)

@@ -1,4 +1,4 @@
-"""Where a place on a triangle faces, and how high the surface that its corner normals round lies above it."""
+"""Normals at points of triangles, and the offset to the surface that the corner normals round."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from numpy import ndarray
 from srbf.arrays import Float, Float64, Int
 from srbf.io.scene_glb import Triangles
 
-SMOOTH_COS = 1 - 1e-6  # corner normals closer than that to the face's are a flat face's
+SMOOTH_COS = 1 - 1e-6  # corner normals closer than that to the face normal belong to a flat face
 
 
 def surface_at(
     triangles: Triangles, triangle: Int[ndarray, " n"], bary: Float[ndarray, "n 3"]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(shading normal, face normal, offset onto the surface that the corner normals round) at places of triangles.
+    """(shading normal, face normal, offset (m) to the surface that the corner normals round) at points of triangles.
 
-    The offset is that of Cycles: half a parabola through the corners, or the lowest of the planes at the corners, whichever is more
+    The offset is that of Cycles: half a parabola through the corners, or the lowest of the planes at the corners, whichever is larger
     [Hanika2021].
     """
     corners, normals = triangles.corners[triangle].astype(np.float64), triangles.normals[triangle].astype(np.float64)
@@ -34,7 +34,7 @@ def surface_at(
 def _rounding(
     corners: Float64[ndarray, "n 3 3"], normals: Float64[ndarray, "n 3 3"], bary: Float[ndarray, "n 3"]
 ) -> Float64[ndarray, " n"]:
-    """Height (m) of the rounded surface above its triangle, as Cycles estimates it."""
+    """Height (m) of the rounded surface above its triangle, by the estimate of Cycles."""
 
     def along(i: int, edge_from: int, edge_to: int) -> np.ndarray:
         return np.einsum("nc,nc->n", normals[:, i], corners[:, edge_to] - corners[:, edge_from])

@@ -1,4 +1,4 @@
-"""One bake by many machines: dask workers that die, parts in any order, a render farm's job; bit for bit what one process bakes."""
+"""One bake by many machines: dask workers that die, shards in any order, a render farm's job; bit for bit what one process bakes."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from faults import contents
 from test_resume import wait_for_lights
 
 from srbf.asset import Asset
-from srbf.bake.folder import hold, hold_part
+from srbf.bake.accumulation import Accumulation
+from srbf.bake.folder import hold, hold_shard
 from srbf.bake.images import CaptureImages
 from srbf.bake.light_pass import add_pass
 from srbf.bake.openjd import LIGHT_LIST, arguments, template
-from srbf.bake.part import Part
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.schedule import render_order
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
-from srbf.bake.sums import Sums
+from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import Response, Task, WorkerPoolSettings
 from srbf.capture import Capture
 from srbf.cli.fit import fit
@@ -115,7 +115,7 @@ def test_a_stopped_dask_bake_is_gone_on_with_by_anyone(blend, machines: LocalClu
     wait_for_lights(folder, 3, process)
     os.kill(process.pid, signal.SIGINT)
     _, err = process.communicate(timeout=240)
-    assert process.returncode == 1 and "goes on" in err and "Traceback" not in err
+    assert process.returncode == 1 and "resumes" in err and "Traceback" not in err
     assert Capture.open(folder).lights
     counted = int(re.search(r"(\d+) of 22 lights are done", run("bake", blend("emissive"), "-o", folder, *FLAGS).stderr)[1])
     assert counted >= 3
@@ -137,20 +137,20 @@ def test_parts_in_any_order_give_the_same_bits(blend, plain: Path, tmp_path: Pat
     folder = tmp_path / "capture"
     settings = BakeSettings(Receiver("lightmap", "Plane"), 24, 24, lights=20, samples=8, validation=1, holdout=1, holdout_samples=8)
     bake = Bake(blend("emissive"), folder, settings)
-    with pytest.raises(BakeError, match="--part prepare first"):
-        bake.run(Reporter(), part=Part(1, 3))
-    assert bake.run(Reporter(), part=Part.parse("prepare"))
-    assert bake.run(Reporter(), part=Part(3, 3))
+    with pytest.raises(BakeError, match="shard=prepare` first"):
+        bake.run(Reporter(), shard=Shard(1, 3))
+    assert bake.run(Reporter(), shard=Shard.parse("prepare"))
+    assert bake.run(Reporter(), shard=Shard(3, 3))
     assert not (folder / "capture.json").exists()
-    with hold_part(folder, Part(2, 3)), pytest.raises(BakeError, match="parts 2/3"):
+    with hold_shard(folder, Shard(2, 3)), pytest.raises(BakeError, match="shards 2/3"):
         bake.run(Reporter())
     (folder / "lights" / ".0003.1234.partial.exr").write_bytes(b"of a machine that went away")
-    assert bake.run(Reporter(), part=Part(1, 3))
+    assert bake.run(Reporter(), shard=Shard(1, 3))
     said: list[str] = []
-    assert bake.run(Reporter(say=said.append))  # bakes what part 2 would have
+    assert bake.run(Reporter(say=said.append))  # bakes what shard 2 would have
     assert any(re.search(r"1[45] of 22 lights are done", line) for line in said), said
     assert contents(folder) == contents(plain)
-    assert not bake.run(Reporter(), part=Part(2, 3))  # a farm may repeat a task
+    assert not bake.run(Reporter(), shard=Shard(2, 3))  # a farm may repeat a task
     assert contents(folder) == contents(plain)
 
 
@@ -171,68 +171,73 @@ def test_an_openjd_job_bakes_the_same_bits_and_fits(blend, plain: Path, tmp_path
     assert evaluate(asset, capture, roles=["holdout"])["holdout"]["relative_rmse"] < 1
 
 
-def bake_of(folder: Path, seconds: float | None = None, crew: WorkerPoolSettings | None = None, **settings: object) -> Bake:
+def bake_of(folder: Path, time_limit: float | None = None, crew: WorkerPoolSettings | None = None, **settings: object) -> Bake:
     scene = folder / "scene.blend"
     scene.write_bytes(b"never opened")
     return Bake(
-        scene, folder / "capture", BakeSettings(Receiver("lightmap", "A b"), 8, 8, **settings), None, crew or WorkerPoolSettings(), seconds
+        scene,
+        folder / "capture",
+        BakeSettings(Receiver("lightmap", "A b"), 8, 8, **settings),
+        None,
+        crew or WorkerPoolSettings(),
+        time_limit,
     )
 
 
 def test_every_light_is_in_one_part() -> None:
     order = render_order(plan_lights(BakeSettings(Receiver("view"), lights=30)))
     for count in (1, 7, 100):
-        lights = [light for number in range(1, count + 1) for light in Part(number, count).of(order)]
+        lights = [light for number in range(1, count + 1) for light in Shard(number, count).of(order)]
         assert sorted(light.index for light in lights) == list(range(len(order)))
-    assert Part.parse("prepare").of(order) == []
+    assert Shard.parse("prepare").of(order) == []
     for text in ("0/3", "4/3", "1", "prepared", "1/3/5", "-1/3"):
-        with pytest.raises(InputError, match="--part"):
-            Part.parse(text)
+        with pytest.raises(InputError, match="expected `shard` prepare or I/N"):
+            Shard.parse(text)
 
 
 def test_a_part_and_a_whole_bake_refuse_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.bake.folder.FINDING_A_PLACE", 0.1)
-    with hold(tmp_path), pytest.raises(BakeError, match="process .* is baking all"), hold_part(tmp_path, Part(1, 2)):
+    monkeypatch.setattr("srbf.bake.folder.LOCK_PATIENCE", 0.1)
+    with hold(tmp_path), pytest.raises(BakeError, match="process .* is baking all"), hold_shard(tmp_path, Shard(1, 2)):
         pass
-    with hold_part(tmp_path, Part(1, 2)), hold_part(tmp_path, Part(2, 2)):
-        with pytest.raises(BakeError, match="part 1/2"), hold_part(tmp_path, Part(1, 2)):
+    with hold_shard(tmp_path, Shard(1, 2)), hold_shard(tmp_path, Shard(2, 2)):
+        with pytest.raises(BakeError, match="shard 1/2"), hold_shard(tmp_path, Shard(1, 2)):
             pass
-        with pytest.raises(BakeError, match="parts of 3"), hold_part(tmp_path, Part(1, 3)):
+        with pytest.raises(BakeError, match="shards of 3"), hold_shard(tmp_path, Shard(1, 3)):
             pass
-        with pytest.raises(BakeError, match="parts 1/2, 2/2"), hold(tmp_path):
+        with pytest.raises(BakeError, match="shards 1/2, 2/2"), hold(tmp_path):
             pass
     with hold(tmp_path):
         pass
-    assert not list(tmp_path.glob(".part*"))
+    assert not list(tmp_path.glob(".shard*"))
 
 
 def test_a_pass_is_added_once_and_in_order(tmp_path: Path) -> None:
     light = plan_lights(BakeSettings(Receiver("view"), lights=1))[0]
     (tmp_path / "lights").mkdir()
-    images, sums = CaptureImages(tmp_path), Sums(tmp_path, [light])
-    for name in ("readable", "hit", "coverage", "position", "normal", "albedo"):
+    images, accumulation = CaptureImages(tmp_path), Accumulation(tmp_path, [light])
+    for name in ("valid", "hit", "coverage", "position", "normal", "albedo"):
         images.take(name, np.ones((2, 3, 3), np.float32))
     images.prepare({"blender": "4.5"}, {}, None)
     first, second = (Task(light, 2, 5 + i, i, keep=True) for i in range(2))
     one, three = (Response(np.full((2, 3, 3), value, np.float32), None, 0.1) for value in (1.0, 3.0))
-    assert add_pass(images, sums, second, three) is None  # the first is not in
-    np.testing.assert_array_equal(add_pass(images, sums, first, one), one.whole)
-    assert add_pass(images, sums, first, three) is None
-    np.testing.assert_array_equal(add_pass(images, sums, second, three), 2 * one.whole)
-    assert (sums.passes(light), sums.samples(light)) == (2, 4)
+    assert add_pass(images, accumulation, second, three) is None  # the first is not in
+    np.testing.assert_array_equal(add_pass(images, accumulation, first, one), one.whole)
+    assert add_pass(images, accumulation, first, three) is None
+    np.testing.assert_array_equal(add_pass(images, accumulation, second, three), 2 * one.whole)
+    assert (accumulation.passes(light), accumulation.samples(light)) == (2, 4)
     with pytest.raises(BakeError, match="values of light 0"):
-        add_pass(images, sums, Task(light, 2, 7, 2), Response(np.ones((3, 3, 3), np.float32), None, 0.1))
-    assert Sums(tmp_path, [light]).refresh(light, 2) and not sums.refresh(light, 3)
+        add_pass(images, accumulation, Task(light, 2, 7, 2), Response(np.ones((3, 3, 3), np.float32), None, 0.1))
+    assert Accumulation(tmp_path, [light]).refresh(light, 2) and not accumulation.refresh(light, 3)
 
 
 @pytest.mark.slow
 def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.compute.dask_client.CONNECTING", 1.0)
-    for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, seconds=60.0)):
-        with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
+    for bake in (bake_of(tmp_path, samples="auto"), bake_of(tmp_path, time_limit=60.0)):
+        with pytest.raises(InputError, match="fixed number of `samples`.*found `samples=auto` or `time_limit`"):
             template(bake)
-        with pytest.raises(InputError, match="expected --samples N, found --samples auto or --time"):
-            bake.run(Reporter(), part=Part(1, 2))
+        with pytest.raises(InputError, match="fixed number of `samples`.*found `samples=auto` or `time_limit`"):
+            bake.run(Reporter(), shard=Shard(1, 2))
     with pytest.raises(InputError, match="rename"):
         template(Bake(bake_of(tmp_path).scene, tmp_path / "c", BakeSettings(Receiver("lightmap", "{{Param.Scene}}"))))
     with pytest.raises(InputError, match="tcp://"):
@@ -241,7 +246,7 @@ def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatc
         pass
     with pytest.raises(InputError, match="relighting-map.*eigen-map"):
         fit(tmp_path, tmp_path / "asset", method="eigen-map", dask="tcp://x:1")
-    for flags in (["--part", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--part", "1/2", "--force"]):
+    for flags in (["--shard", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--shard", "1/2", "--force"]):
         words = srbf("bake", tmp_path / "scene.blend", "-o", tmp_path / "x", "--receiver", "view", *flags)
         refused = subprocess.run(words, capture_output=True, text=True)
         assert refused.returncode == 1 and len(refused.stderr.strip().splitlines()) == 1 and not (tmp_path / "x").exists()
@@ -271,15 +276,15 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     ):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise"}
-    assert not missing and "--no-shadow=Roof" in flags
+    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise", "no_shadow"}
+    assert not missing and "--no-cast-shadow=Roof" in flags
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
     assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))
     point_lights = PointGrid(0.1 + 0.2, (-1.0, 0.0, 0.1, 1.0, 2.0, 1 / 3), ((0.0, 0.0, 0.0),))
     flags = arguments(BakeSettings(Receiver("view"), points=point_lights))
     (light_set,) = (flag.removeprefix("--light-set=") for flag in flags if flag.startswith("--light-set="))
-    (light_box,) = (flag.removeprefix("--light-box=") for flag in flags if flag.startswith("--light-box="))
+    (light_box,) = (flag.removeprefix("--light-bounds=") for flag in flags if flag.startswith("--light-bounds="))
     assert PointGrid.parse(light_set, light_box) == PointGrid(point_lights.spacing, point_lights.box)
     job = template(bake_of(tmp_path, lights=77), None)
     assert [step["name"] for step in job["steps"]] == ["Prepare", "Bake", "Finish", "Fit"]

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.blender
 
 LEFT, RIGHT, ABOVE = (-0.8, -0.2, 0.56), (0.8, -0.2, 0.56), (0.05, -0.1, 0.99)
 WIDTH, HEIGHT = 48, 36
-SEALED = 1 - 1e-5  # coverage where no ray leaves the scene, but for rounding
+SEALED = 1 - 1e-5  # coverage where no ray leaves the scene, except for rounding
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def test_walls_color_the_floor_before_them(bake) -> None:
     assert near_red[0] / near_red[1] > 1.15 * near_green[0] / near_green[1]
 
 
-def test_leaves_and_laths_shade_the_floor_anew_under_every_sun(bake) -> None:
+def test_leaves_and_laths_shade_the_floor_differently_under_every_sun(bake) -> None:
     directions = [LEFT, RIGHT, ABOVE, (-0.5, 0.55, 0.65), (0.6, 0.6, 0.5), (0.5, -0.6, 0.6)]
     capture = bake("lattice", "view", directions)
     assert capture.coverage().min() > SEALED
@@ -78,8 +78,8 @@ def test_leaves_and_laths_shade_the_floor_anew_under_every_sun(bake) -> None:
     assert switching.mean() > 0.35
     x, y = position[floor][:, 0], position[floor][:, 1]
     below = (np.abs(x + 0.65) < 1.3) & (np.abs(y - 0.85) < 1.2)
-    open_sky = (x < -0.5) & (y < -1.2)
-    assert 0.25 < lit[2][below].mean() < 0.85 < lit[2][open_sky].mean()  # a sun overhead, through slats and leaves
+    in_the_open = (x < -0.5) & (y < -1.2)
+    assert 0.25 < lit[2][below].mean() < 0.85 < lit[2][in_the_open].mean()  # a sun overhead, through slats and leaves
 
 
 def test_the_lattice_floor_is_a_lightmap_of_its_own(bake) -> None:

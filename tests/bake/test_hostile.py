@@ -15,7 +15,7 @@ pytestmark = pytest.mark.blender
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "data" / "scenes" / "hostile.py"
-CONFINE = ROOT / "blender_bake" / "confine.py"
+CONFINE = ROOT / "blender_bake" / "sandbox.py"
 SMALL = ["--size", "8", "--lights", "4", "--samples", "2", "--validation", "0", "--holdout", "1", "--holdout-samples", "4"]
 
 

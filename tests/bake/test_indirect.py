@@ -55,7 +55,7 @@ def test_indirect_and_direct_add_up_to_combined(bake, scene: str, receiver: str,
     ("scene", "receiver"), [("occluder", "lightmap:Plane"), ("pane", "lightmap:Plane"), ("sharp", "view"), ("sharp ortho", "view")]
 )
 def test_rays_give_the_direct_light_back(bake, scene: str, receiver: str) -> None:
-    """Cycles' own direct light of 64 samples a texel, but for its noise at the shadow's edge."""
+    """Cycles' own direct light of 64 samples per texel, except for its noise at the shadow's edge."""
     size = 32 if receiver != "view" else 96
     capture = bake(scene, receiver, width=size, height=size, transport="indirect", holdout=3, holdout_samples=64).capture
     tracer = RayTracer(Receivers.of(capture))
@@ -92,19 +92,19 @@ def decibels(error: np.ndarray) -> float:
 
 
 def test_glass_leaves_little_in_the_images(bake) -> None:
-    """What a pane lets through is traded for its tint by angle: light behind it is direct light then, not caustic."""
+    """A pane is replaced by its transmittance by angle: the light behind it is then direct light, not caustic."""
     capture = bake("pane", "lightmap:Plane", transport="indirect", lights=24).capture
     direct = np.mean([np.abs(capture.combined().image(i) - capture.image(i)).mean() for i in capture.indices("train")])
     left = np.mean([np.abs(capture.image(i)).mean() for i in capture.indices("train")])
     assert left < 0.02 * direct
     triangles = read_triangles(capture.scene())
-    (tint,) = [t for t in triangles.tints if t.any()]
-    np.testing.assert_allclose(tint[4:], np.tile([0.8, 0.4, 0.2], (4, 1)), atol=0.02)  # steep light met it everywhere
+    (transmittance,) = [t for t in triangles.transmittance if t.any()]  # words: ok
+    np.testing.assert_allclose(transmittance[4:], np.tile([0.8, 0.4, 0.2], (4, 1)), atol=0.02)  # steep light passed it everywhere
 
 
 @pytest.mark.parametrize(("scene", "named"), [("leaves", True), ("pane", False)])
 def test_a_cut_out_is_named(bake, scene: str, named: bool) -> None:
-    """A texture's alpha cannot be a tint; an even pane's can."""
+    """A texture's alpha cannot be a transmittance; an even pane's can."""
     lines = [line for line in bake(scene, "lightmap:Plane", transport="indirect", lights=2).said if "cut-out" in line]
     assert len(lines) == named and all("'Leaf'" in line for line in lines)
 

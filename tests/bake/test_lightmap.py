@@ -1,4 +1,4 @@
-"""Lightmap bakes by real Cycles: calibration, axes and rows, shadows at world points, skies, ambient, materials, UV layers."""
+"""Lightmap bakes by real Cycles: calibration, axes and rows, shadows at world points, environment maps, ambient, materials, UV layers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from srbf.bake.settings import plan_lights
 from srbf.errors import BakeError
 from srbf.io.image import write_image
 from srbf.lights import DirectionalLight, EnvironmentLight
-from srbf.methods.relighting_map import RelightingMap, relight
+from srbf.methods import relight
+from srbf.methods.relighting_map import RelightingMap
 
 pytestmark = pytest.mark.blender
 
@@ -22,9 +23,9 @@ TEXEL_CENTER = 0.01  # texels: the first sample of a bake stands this near to th
 
 
 @pytest.mark.parametrize(("quantity", "scale"), [("irradiance", 1.0), ("radiance", 1 / np.pi)])
-def test_a_white_plane_answers_the_cosine(bake, quantity: str, scale: float) -> None:
+def test_a_white_plane_responds_by_the_cosine(bake, quantity: str, scale: float) -> None:
     capture = bake("plane", "lightmap:Plane", quantity=quantity).capture
-    assert capture.ambient() is None  # its lamp and world were off
+    assert capture.ambient() is None  # its light and world were off
     for index, light in enumerate(capture.lights):
         np.testing.assert_allclose(capture.image(index), max(0.0, light.direction[2]) * scale, rtol=HALF, atol=1e-6)
     assert capture.manifest["receiver"] == {"kind": "lightmap", "object": "Plane", "uv_layer": "UV"}
@@ -81,27 +82,27 @@ def test_shadows_fall_where_the_wall_casts_them(bake) -> None:
     assert checked > 100
 
 
-def test_cycles_under_a_sky_equals_the_environment_relight(bake, blend, tmp_path: Path) -> None:
+def test_cycles_under_an_environment_equals_the_environment_relight(bake, blend, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
-    sky = rng.random((16, 32, 3)).astype(np.float32)
-    sky[3:5, 20:23] = [8, 6, 4]
-    sky[8:] = 0  # below the horizon nothing was captured
-    write_image(tmp_path / "sky.exr", sky, "float")
+    environment = rng.random((16, 32, 3)).astype(np.float32)
+    environment[3:5, 20:23] = [8, 6, 4]
+    environment[8:] = 0  # below the horizon nothing was captured
+    write_image(tmp_path / "environment.exr", environment, "float")
     scenes = Path(__file__).parents[2] / "data" / "scenes" / "closed_form_scenes.py"
     scene = blend("occluder")
     subprocess.run(
-        [sys.executable, str(scenes), "hdri", str(scene), str(tmp_path / "sky.exr"), str(tmp_path / "e.npy")],
+        [sys.executable, str(scenes), "hdri", str(scene), str(tmp_path / "environment.exr"), str(tmp_path / "e.npy")],
         check=True,
         capture_output=True,
     )
     reference = np.load(tmp_path / "e.npy")
     capture = bake("occluder", "lightmap:Plane", lights=300, samples=2, holdout=0).capture
     asset = RelightingMap(k=60).encode(capture)
-    relit = relight(asset, [EnvironmentLight(sky)])
-    # Skies average over the fit's ringing: 4 % of the mean where single suns of this scene err by 15 %. Cycles filters the sky bilinearly.
+    relit = relight(asset, [EnvironmentLight(environment)])
+    # Environments average over the fit's ringing: 4 % of the mean, where single suns of this scene err by 15 %. Cycles filters bilinearly.
     assert np.sqrt(((relit - reference) ** 2).mean()) < 0.04 * reference.mean()
-    # Mirrored or turned, the same sky is far from it: the axes are right.
-    for wrong in (sky[:, ::-1], np.roll(sky, 16, axis=1), np.roll(sky, 8, axis=1)):
+    # Mirrored or turned, the same environment is far from it: the axes are right.
+    for wrong in (environment[:, ::-1], np.roll(environment, 16, axis=1), np.roll(environment, 8, axis=1)):
         other = relight(asset, [EnvironmentLight(np.ascontiguousarray(wrong))])
         assert np.sqrt(((other - reference) ** 2).mean()) > 2 * np.sqrt(((relit - reference) ** 2).mean())
 

@@ -79,7 +79,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def surroundings(folder: Path) -> Scene:
-    """With the capture of its ground, by the command; its materials have node groups, which a bake must bear too."""
+    """With the capture of its ground, by the command; its materials have node groups, which a bake must keep."""
     build = built("surroundings.py", folder)
     baked(build("surroundings"), folder / "capture", Receiver("lightmap", "Ground", "lightmap"))
     line = ["mesh", build("surroundings"), "-o", folder / "scene.glb", "--capture", folder / "capture", "--json"]

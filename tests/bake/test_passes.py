@@ -1,4 +1,4 @@
-"""Passes of one sample: each one spreads over the footprint anew, so that their mean is what one bake of many samples gives."""
+"""Passes of one sample: each is spread over the footprint again, so that their mean is what one bake of many samples gives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Captures under point lights: which places are free, what lamps of unit irradiance at a meter give, and assets measured against them."""
+"""Captures under point lights: which places are free, irradiance of point lights, and assets measured against them."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake
+from srbf.bake.scene_query import with_free_point_lights
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
-from srbf.bake.survey import with_free_point_lights
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.evaluation.errors_by_role import evaluate
@@ -47,8 +47,8 @@ def test_words_of_a_light_set() -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"sun_angle": 0.1}, "--sun-angle"),
-        ({"light_list": Path("l.lp")}, "--light-list"),
+        ({"sun_angle": 0.1}, "`sun_angle`"),
+        ({"light_list": Path("l.lp")}, "`light_list`"),
         ({"transport": "indirect"}, "combined"),
         ({"samples": "auto"}, "auto"),
     ],
@@ -64,12 +64,12 @@ def test_planned_point_lights_have_their_roles_and_places() -> None:
     lights = plan_lights(settings)
     assert [light.role for light in lights] == ["train"] * 2 + ["validation"] * 2 + ["holdout"] * 3
     assert [light.place[0] for light in lights] == [0, 1, 0.1, 0.2, 0.3, 0.4, 0.5]
-    assert lights[2].job() | {"seed": 0} == {"index": 2, "kind": "point", "position": [0.1, 0, 1], "samples": 1, "seed": 0}
+    assert lights[2].placed() == {"kind": "point", "position": [0.1, 0, 1]}
     record = json.loads(json.dumps(settings.record()))
     assert "lights" not in record and record["points"]["spacing"] == 1 and record["points"]["box"] == list(BOX)
     moved = settings_with(PointGrid(1.0, BOX, ((0, 0, 1.5), (1, 0, 1)), points.random))
     assert moved.record()["points"]["positions"] != record["points"]["positions"]
-    with pytest.raises(InputError, match="survey"):
+    with pytest.raises(InputError, match="with_free_point_lights"):
         plan_lights(settings_with(PointGrid(1.0)))
     with pytest.raises(InputError, match="point lights"):
         settings.with_matched_sun()
@@ -90,7 +90,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
     assert inside.sum() == 4 * 4 * 4
     expected = {tuple(point) for point in every[~inside]}
     assert {tuple(point) for point in train.round(9)} == expected and len(train) == len(expected)
-    assert "64 places in or at geometry" in said[-1]
+    assert "64 places in or near geometry" in said[-1]
     for point in np.concatenate([validation, holdout]):
         outside = np.abs(point - [-1, 0, 1]).max() - 0.5  # the block's distance, in its own norm
         assert outside > 0.025 / np.sqrt(3) and point[2] > 0.025 and (np.abs(point[:2]) <= 2).all()
@@ -101,7 +101,7 @@ def test_places_inside_blocks_are_left_out(blend, tmp_path: Path) -> None:
 @pytest.mark.blender
 def test_no_room_is_said(blend, tmp_path: Path) -> None:
     settings = settings_with(PointGrid(0.2, (-1.2, -0.2, 0.8, -0.8, 0.2, 1.2)))
-    with pytest.raises(BakeError, match="--light-box"):
+    with pytest.raises(BakeError, match="`light_bounds`"):
         with_free_point_lights(Bake(blend("blocks"), tmp_path, settings))
     settings = settings_with(PointGrid(0.001))
     with pytest.raises(BakeError, match="larger spacing"):
@@ -110,9 +110,9 @@ def test_no_room_is_said(blend, tmp_path: Path) -> None:
 
 @pytest.mark.blender
 def test_a_white_plane_under_point_lights(blend, tmp_path: Path) -> None:
-    """cos / d^2 of irradiance, through the command; and a directional asset of the plane foretells it, since nothing casts a shadow."""
+    """cos / d^2 of irradiance, through the command; and a directional asset of the plane predicts it, since nothing casts a shadow."""
     flags = ["--receiver", "lightmap:Plane", "--size", 16, "--samples", 64, "--holdout-samples", 64]
-    points = ["--light-set", "point:0.8", "--light-box", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
+    points = ["--light-set", "point:0.8", "--light-bounds", "9,4,0.4,11,6,2", "--validation", 2, "--holdout", 3]
     done = subprocess.run(
         [sys.executable, "-m", "srbf", "bake", blend("plane"), "-o", tmp_path / "point_lights", *map(str, flags + points)],
         capture_output=True,

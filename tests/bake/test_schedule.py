@@ -31,7 +31,7 @@ def test_every_prefix_covers_the_domain(domain: str) -> None:
 
 
 def test_hammersleys_own_order_does_not() -> None:
-    """Why there is an order: half of the set in its own order leaves a hole as wide as a quarter of the sky."""
+    """Why there is an order: half of the set in its own order leaves a hole as wide as a quarter of the hemisphere."""
     points = point_set("hammersley", 400, "sphere")
     assert covering_radius(points[:200], "sphere") > np.pi / 3
     chosen = points[farthest_points(points, 200)]

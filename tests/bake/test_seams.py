@@ -30,7 +30,7 @@ def handed_over(blend: Callable[[str], Path], tmp_path: Path) -> Seams:
         scratch = tmp_path / f"{scene} {quantity}"
         scratch.mkdir()
         settings = BakeSettings(Receiver("lightmap", name), 32, 32, quantity=quantity)
-        job = {**base_job(blend(scene), settings, scratch), "geometry": True, "ambient": None, "lights": [], "probes": []}
+        job = {**base_job(blend(scene), settings, scratch), "channels": ["seams"]}
         with Worker(job, scratch, scratch / "log") as worker:
             found = [np.load(scratch / event["file"]) for event in worker.events(print) if event.get("name") == "seams"]
         return found[0].reshape(-1, 8) if found else None
@@ -67,8 +67,8 @@ def test_only_smooth_edges_are_seams(handed_over: Seams) -> None:
 def test_a_torus_looks_whole(bake) -> None:
     capture = bake("torus", "lightmap:Torus", width=64, height=64, lights=40, domain="sphere", samples=2, holdout=6).capture
     assert len(capture.seam_edges()) == 4 * 24 + 48
-    for method in (RelightingMap(k=25), EigenMap(scalars=12)):
-        plain, stitched = encode(method, capture, stitched=False), encode(method, capture)
+    for method in (RelightingMap(k=25), EigenMap(components=12)):
+        plain, stitched = encode(method, capture, stitch=False), encode(method, capture)
         seams = stitched.manifest["seams"]
         assert seams["before"] > 0.1 and seams["after"] < 0.05 * seams["before"], seams
         errors = [evaluate(asset, capture, roles=("holdout",))["holdout"]["rmse"] for asset in (plain, stitched)]

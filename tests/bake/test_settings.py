@@ -1,4 +1,4 @@
-"""What is planned before Blender starts: a sun as large as the lights stand apart."""
+"""What is planned before Blender starts: a sun as wide as the light spacing."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
 from srbf.bake.folder import STATE
 from srbf.bake.job import base_job
 from srbf.bake.openjd import arguments
 from srbf.bake.run import Bake
+from srbf.bake.scene_query import size_of_begun, with_frame
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.bake.survey import size_of_begun, with_frame
 from srbf.capture import MANIFEST
-from srbf.cli.parameters import parse_sun_angle
+from srbf.cli.values import AUTO_OR_ANGLE
 from srbf.errors import InputError
 from srbf.sphere import point_set
 
@@ -42,11 +43,11 @@ def test_a_lone_light_gets_the_largest_sun() -> None:
 
 
 def test_sun_angle_as_text() -> None:
-    assert parse_sun_angle("auto") == "auto" and parse_sun_angle("0.1") == 0.1
-    with pytest.raises(InputError, match="--sun-angle auto or a number of radians, found 'wide'"):
-        parse_sun_angle("wide")
+    assert AUTO_OR_ANGLE("auto") == "auto" and AUTO_OR_ANGLE("0.1") == 0.1
+    with pytest.raises(typer.BadParameter, match="auto or a number .*found 'wide'"):
+        AUTO_OR_ANGLE("wide")
     with pytest.raises(InputError, match="sun angle"):
-        BakeSettings(Receiver("view"), sun_angle=parse_sun_angle("nan"))
+        BakeSettings(Receiver("view"), sun_angle=float("nan"))
 
 
 def test_lightmaps_share_an_atlas_and_others_stand_alone() -> None:
@@ -90,7 +91,7 @@ def test_a_receiver_comes_back_from_its_manifest() -> None:
     [
         ("surfel:A", None, "lightmap:OBJECT, vertices:OBJECT or view"),
         ("vertices:", None, "vertices:OBJECT"),
-        ("vertices:A", "UV", "--uv-layer belongs to a lightmap receiver, found it with vertices"),
+        ("vertices:A", "UV", "expected `uv_layer` with a lightmap receiver, found it with vertices"),
     ],
 )
 def test_receivers_that_no_bake_has(word: str, layer: str | None, words: str) -> None:
@@ -102,7 +103,7 @@ def test_what_only_some_receivers_can() -> None:
     with pytest.raises(InputError, match="vertices with transport combined"):
         BakeSettings(Receiver("vertices", "A"), transport="indirect")
     for receiver, transport in ((Receiver("lightmap", "A"), "combined"), (Receiver("view"), "indirect")):
-        with pytest.raises(InputError, match="--denoise is for views"):
+        with pytest.raises(InputError, match="a view of combined transport.*`denoise`"):
             BakeSettings(receiver, transport=transport, denoise=True)
 
 
@@ -124,6 +125,6 @@ def test_a_capture_that_is_begun_keeps_its_size(tmp_path: Path) -> None:
     (tmp_path / STATE).write_text("{")
     assert size_of_begun(tmp_path) == (64, 36)
     job = Bake(tmp_path / "no.blend", tmp_path, BakeSettings(Receiver("view")))
-    assert with_frame(job, 256, anew=False).settings.height == 36  # no Blender is asked
+    assert with_frame(job, 256, replacing=False).settings.height == 36  # no Blender is asked
     with pytest.raises(InputError, match="expected a .blend"):
-        with_frame(job, 256, anew=True)
+        with_frame(job, 256, replacing=True)

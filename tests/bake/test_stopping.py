@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from srbf.bake.accumulation import NOTHING, Sum
 from srbf.bake.stopping import Measure, is_enough, measure
-from srbf.bake.sums import NOTHING, Sum
 from srbf.capture import Capture
 
-NOISE = 0.5  # of one sample, on answers between 0 and 1
+NOISE = 0.5  # of one sample, on responses between 0 and 1
 PASSES = (1, 3, 4)
 
 

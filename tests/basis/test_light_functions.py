@@ -29,8 +29,8 @@ def test_evaluate_is_the_formula(functions: LightFunctions) -> None:
     np.testing.assert_allclose(functions.evaluate(directions), expected, atol=ROUNDING * np.abs(expected).max())
 
 
-def test_folding_is_a_sum_of_answers(functions: LightFunctions) -> None:
+def test_projected_weights_are_a_sum_over_lights(functions: LightFunctions) -> None:
     rng = np.random.default_rng(2)
     directions, colors = random_directions(50, "sphere", rng), rng.normal(size=(50, 3))
     expected = np.einsum("nfc,nc->fc", functions.evaluate(directions), colors)
-    np.testing.assert_allclose(functions.fold(directions, colors), expected, atol=ROUNDING * np.abs(expected).max())
+    np.testing.assert_allclose(functions.project(directions, colors), expected, atol=ROUNDING * np.abs(expected).max())

@@ -8,6 +8,7 @@ import pytest
 from srbf.basis.gaussian import weight
 from srbf.basis.light_kernel import LightKernel, narrowest
 from srbf.encode.light_function_fit import dense_centers
+from srbf.light_domain import Directions
 from srbf.sphere import mean_spacing, point_set, random_directions
 
 REPLACED = 1e-2  # of the largest value, of functions as rough as noise: wide Gaussians by narrow ones at 0.7 of their spacing
@@ -18,7 +19,7 @@ REPLACED = 1e-2  # of the largest value, of functions as rough as noise: wide Ga
 def test_functions_of_two_spreads_are_the_kernel(domain: str, count: int) -> None:
     rng = np.random.default_rng(0)
     lights = point_set("fibonacci", count, domain)
-    centers = dense_centers(lights, domain)
+    centers = dense_centers(lights, Directions(domain))
     spacing = mean_spacing(lights)
     kernel = LightKernel(max(0.7 * spacing, narrowest(centers)), min(2 * spacing, 1.0), 0.9)
     solved = rng.normal(size=(count, 6))

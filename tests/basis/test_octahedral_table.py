@@ -63,7 +63,7 @@ def test_mixing_error_falls_with_the_square_of_the_step() -> None:
         mixed = np.stack([lookup(table.atlas, size, table.columns, np.full(len(probes), f), probes) for f in range(5)], axis=1)
         errors.append(np.sqrt(((mixed - exact) ** 2).mean() / (exact**2).mean()))
         assert table.error == pytest.approx(errors[-1], rel=0.2)  # two sets of some thousand directions
-    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3  # 4 but for halves and for cells that a fold bends
+    assert errors[0] / errors[1] > 3 and errors[1] / errors[2] > 3  # 4 except halves and for cells that a fold bends
 
 
 @pytest.mark.parametrize("spread", [0.9, 0.35, 0.2])

@@ -1,4 +1,4 @@
-"""The command line as a user has it: every verb, what it prints, and bad input as one line and exit 1."""
+"""The command line as a user has it: every verb, what it prints, and bad input as one line: wrong usage exits 2, failed work 1."""
 
 from __future__ import annotations
 
@@ -33,12 +33,17 @@ def ok(*arguments: object) -> str:
     return done.stdout
 
 
-def refused(*arguments: object) -> str:
+def refused(*arguments: object, status: int = 1) -> str:
     """One line on stderr that starts with srbf:, nothing on stdout, exit 1."""
     done = srbf(*arguments)
     lines = done.stderr.strip().splitlines()
-    assert done.exit_code == 1 and done.stdout == "" and len(lines) == 1 and lines[0].startswith("srbf: "), done
+    assert done.exit_code == status and done.stdout == "" and len(lines) == 1 and lines[0].startswith("srbf: "), (done, done.stderr)
     return lines[0]
+
+
+def misused(*arguments: object) -> str:
+    """The same of wrong usage, exit 2."""
+    return refused(*arguments, status=2)
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +80,13 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert [shown[name] for name in ("format", "method", "k", "width", "height")] == ["srbf-asset", "relighting-map", "9", "14", "10"]
 
 
+def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {"point_lights": [[0, 0, 1]], "by_distance": []}
+    monkeypatch.setattr("srbf.cli.evaluate.compare_with_point_lights", lambda *_: found)
+    result = json.loads(ok("evaluate", asset, tmp_path / "scene.blend", "--point-reference", 1, "--json"))
+    assert result == {**found, "lamps": [[0, 0, 1]]}  # for one version; words: ok
+
+
 @pytest.mark.parametrize(
     "flags", [[], ["--centers", "hammersley3", "--spread", "min"], ["--domain", "sphere", "--ridge", "0.1", "--spread", "0.7"]]
 )
@@ -91,8 +103,8 @@ def test_fit_flags_reach_the_asset(capture: Capture, tmp_path: Path, flags: list
 
 @pytest.mark.parametrize("renderer", ["numpy", "gl"])
 def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, renderer: str) -> None:
-    sky = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
-    write_image(tmp_path / "sky.exr", sky, "float")
+    environment = np.random.default_rng(0).random((8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "environment.exr", environment, "float")
     flags = [
         "--directional",
         "-1,0,1,1,0.5,0.2",
@@ -101,15 +113,15 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
         "--point",
         "-0.2,0.1,0.8",
         "--environment",
-        tmp_path / "sky.exr",
+        tmp_path / "environment.exr",
     ]
-    flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--a0", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
+    flags += ["--spot", "0,0,1,0,0,-1,0.2,0.5,2,2,2", "--reference-distance", 0.7, "--falloff", "inverse-square", "--renderer", renderer]
     ok("relight", asset, "-o", tmp_path / "out.exr", *flags)
     lights = [
         DirectionalLight((-1, 0, 1), (1, 0.5, 0.2)),
         DirectionalLight((0, 0, 1)),
         PointLight((-0.2, 0.1, 0.8), a0=0.7, falloff="inverse-square"),
-        EnvironmentLight(sky),
+        EnvironmentLight(environment),
         SpotLight((0, 0, 1), (2, 2, 2), direction=(0, 0, -1), inner=0.2, outer=0.5, a0=0.7, falloff="inverse-square"),
     ]
     expected = methods.relight(Asset.open(asset), lights)
@@ -120,7 +132,7 @@ def test_relight_adds_up_every_kind_of_light(asset: Path, tmp_path: Path, render
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("flags", [["eigen-map", "--scalars", 6], ["clustered-eigen-map", "--scalars", 3, "--clusters", 4]])
+@pytest.mark.parametrize("flags", [["eigen-map", "--components", 6], ["clustered-eigen-map", "--components", 3, "--clusters", 4]])
 def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_path: Path, flags: list) -> None:
     waves = np.random.default_rng(6).normal(size=(10, 14, 3, 3))
     capture = make_capture(lambda d: 1 + np.sin(waves @ d), position=plane_positions)
@@ -135,12 +147,12 @@ def test_both_renderers_relight_every_method(make_capture, plane_positions, tmp_
 
 
 def test_frames(asset: Path, tmp_path: Path) -> None:
-    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
+    write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
     spot = {"kind": "spot", "position": [0, 0, 1], "direction": [0, 0, -1], "inner": 0.1, "outer": 0.4}
     point = {"kind": "point", "position": [0, 0, 1], "color": [1, 2, 3], "a0": 2, "falloff": "inverse-square"}
     frames = [
         [{"kind": "directional", "direction": [0, 0, 3], "color": [1, 1, 1]}, point],
-        [spot, {"kind": "environment", "file": "sky.exr"}],
+        [spot, {"kind": "environment", "file": "environment.exr"}],
         [],
     ]
     (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": lights} for lights in frames]}))
@@ -185,7 +197,7 @@ def test_import_to_relight(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_report_of_a_synthetic_capture(asset: Path, capture: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.report.METHODS", ())
+    monkeypatch.setattr("srbf.report.compared_methods", lambda: ())
     ok("report", asset, capture.folder, "-o", tmp_path / "report")
     assert (tmp_path / "report" / "index.html").is_file() and (tmp_path / "report" / "contact_sheet.png").is_file()
     page = tmp_path / "page.html"
@@ -200,16 +212,16 @@ def test_outputs_that_exist_are_refused_unless_forced(asset: Path, capture: Capt
     assert (asset / "asset.json").read_bytes() == before
     ok("fit", capture.folder, "-o", asset, "-k", 4, "--force")
     assert Asset.open(asset).k == 4 and not list(asset.glob("map_05*"))
-    ok("relight", asset, "-o", tmp_path / "a.exr")
-    assert "--force" in refused("relight", asset, "-o", tmp_path / "a.exr")
-    ok("relight", asset, "-o", tmp_path / "a.exr", "--force")
+    ok("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only")
+    assert "--force" in refused("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only")
+    ok("relight", asset, "-o", tmp_path / "a.exr", "--ambient-only", "--force")
 
 
 def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tmp_path: Path) -> None:
     out = tmp_path / "new"
     assert "capture.json" in refused("fit", tmp_path, "-o", out)
     (tmp_path / "file").write_text("")
-    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset")
+    assert "folder" in refused("fit", capture.folder, "-o", tmp_path / "file" / "asset", "-k", 4)
     assert "60 lights for -k 200" in refused("fit", capture.folder, "-o", out, "-k", 200, "--ridge", 0)
     light = capture.folder / capture.lights[3].file
     pixels = capture.image(3).copy()
@@ -220,9 +232,9 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     target.open(str(light), oiio.ImageSpec(14, 10, 3, oiio.FLOAT))
     target.write_image(pixels)
     target.close()
-    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out, "-k", 4)
     light.write_bytes(light.read_bytes()[:200])
-    assert "0003.exr" in refused("fit", capture.folder, "-o", out)
+    assert "0003.exr" in refused("fit", capture.folder, "-o", out, "-k", 4)
     assert "0003.exr" in refused("evaluate", asset, capture.folder, "--json")
     light.unlink()
     assert "0003.exr" in refused("info", capture.folder)
@@ -233,29 +245,42 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
     ("arguments", "words"),
     [
         (["--directional", "0,0,0"], "direction"),
-        (["--directional", "0,0"], "X,Y,Z"),
-        (["--directional", "a,b,c"], "X,Y,Z"),
-        (["--point", "0,0,1", "--a0", "0"], "a0"),
+        (["--directional", "0,0"], "expected --directional X,Y,Z[,R,G,B], found '0,0'"),
+        (["--directional", "a,b,c"], "--directional X,Y,Z"),
+        (["--point", "0,0,1", "--reference-distance", "0"], "--reference-distance: expected a number above 0, found '0'"),
         (["--spot", "0,0,1,0,0,-1,0.5,0.2"], "inner"),
-        (["--environment", "nowhere.exr"], "nowhere.exr"),
+        (["--exposure", "bright"], "--exposure: expected a number from -100 to 100, found 'bright'"),
+        ([], "expected a light, found none; add --directional, --point, --spot, --environment or --ambient-only"),
+        (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
+        (["--lights", "frames.json", "--point", "0,0,1"], "put all lights into the file"),
     ],
 )
-def test_bad_lights(asset: Path, tmp_path: Path, arguments: list[str], words: str) -> None:
-    assert words in refused("relight", asset, "-o", tmp_path / "x.exr", *arguments)
+def test_bad_lights(tmp_path: Path, arguments: list[str], words: str) -> None:
+    """Wrong usage: no asset is looked at."""
+    assert words in misused("relight", tmp_path / "none", "-o", tmp_path / "x.exr", *arguments)
     assert not (tmp_path / "x.exr").exists()
 
 
+def test_an_environment_map_that_is_not_there(asset: Path, tmp_path: Path) -> None:
+    assert "nowhere.exr" in refused("relight", asset, "-o", tmp_path / "x.exr", "--environment", "nowhere.exr")
+
+
+def test_the_ambient_light_alone_is_asked_for(asset: Path, tmp_path: Path) -> None:
+    ok("relight", asset, "-o", tmp_path / "x.exr", "--ambient-only")
+    np.testing.assert_array_equal(read_image(tmp_path / "x.exr"), methods.relight(Asset.open(asset), []))
+
+
 def test_a_full_or_read_only_target(asset: Path) -> None:
-    assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr")
-    assert "no folder" in refused("relight", asset, "-o", asset / "none" / "x.exr")
-    assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr")
+    assert "cannot write" in refused("relight", asset, "-o", "/proc/x.exr", "--ambient-only")
+    assert "no folder" in refused("relight", asset, "-o", asset / "none" / "x.exr", "--ambient-only")
+    assert "cannot write" in refused("relight", asset, "-o", asset / "asset.json" / "x.exr", "--ambient-only")
 
 
 @pytest.mark.slow
 def test_gl_missing(asset: Path, tmp_path: Path) -> None:
     code = "import sys; sys.modules['moderngl'] = None; from srbf.cli import app; app()"
     done = subprocess.run(
-        [sys.executable, "-c", code, "relight", str(asset), "-o", str(tmp_path / "x.exr"), "--renderer", "gl"],
+        [sys.executable, "-c", code, "relight", str(asset), "-o", str(tmp_path / "x.exr"), "--renderer", "gl", "--ambient-only"],
         capture_output=True,
         text=True,
     )
@@ -264,10 +289,10 @@ def test_gl_missing(asset: Path, tmp_path: Path) -> None:
 
 def test_usage_is_exit_2_and_version(tmp_path: Path) -> None:
     assert ok("--version").startswith("srbf 0.")
-    for arguments in (["fit"], ["nonsense"], ["relight", "x"], ["fit", "x", "-o", "y", "--encoding", "jpeg"]):
-        assert srbf(*arguments).exit_code == 2
-    assert "--size" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "view", "--size", "large")
-    assert "receiver" in refused("bake", "x.blend", "-o", tmp_path / "y", "--receiver", "mirror")
+    for arguments in (["fit"], ["nonsense"], ["--nonsense"], ["relight", "x"], ["fit", "x", "-o", "y", "--encoding", "jpeg"]):
+        misused(*arguments)
+    assert "Did you mean 'info'" in misused("inof") and "--output" in misused("fit", "x", "--outptu", "y")
+    assert "expected CAPTURE, found none; see " in misused("fit")
     assert "x.blend" in refused("bake", tmp_path / "x.blend", "-o", tmp_path / "y", "--receiver", "view")
     assert not (tmp_path / "y").exists()
 
@@ -312,8 +337,8 @@ def test_the_library_needs_numpy_and_scipy_alone() -> None:
 @pytest.mark.parametrize(
     "flags",
     [
-        ["--method", "eigen-map", "--scalars", "6", "--weighting", "relative", "--encoding", "uint8"],
-        ["--method", "clustered-eigen-map", "--scalars", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
+        ["--method", "eigen-map", "--components", "6", "--weighting", "relative", "--encoding", "uint8"],
+        ["--method", "clustered-eigen-map", "--components", "2", "--clusters", "3", "--ridge", "0.1", "--spread", "0.5"],
         ["--method", "relighting-map", "-k", "9", "--basis", "spherical-harmonics"],
         ["--method", "relighting-map", "-k", "6", "--basis", "ptm", "--ridge", "0.1"],
     ],
@@ -336,7 +361,7 @@ def test_every_method_fits_shows_and_relights(capture: Capture, tmp_path: Path, 
 @pytest.mark.slow
 def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--budget", 6)
-    assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
+    assert done.exit_code == 0 and "chose 4 components as bytes" in done.stderr  # Lambert needs one, and an image holds four
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
     ok("fit", capture.folder, "-o", tmp_path / "asset", "--method", "auto", "--psnr", 20, "--force")
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
@@ -345,32 +370,39 @@ def test_a_budget_chooses_and_says_so(capture: Capture, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("flags", "words"),
     [
-        (["--method", "relighting-map", "--scalars", 4], "--scalars with --method eigen-map or clustered-eigen-map"),
-        (["--method", "relighting-map", "--budget", 8], "--budget with --method auto"),
-        (["-k", 9, "--budget", 8], "-k with --method relighting-map"),
-        (["-k", 9, "--clusters", 8], "--clusters with --method clustered-eigen-map"),
-        (["--method", "eigen-map", "-k", 9], "-k with --method relighting-map"),
-        (["--method", "eigen-map", "--clusters", 4], "--clusters"),
-        (["--method", "eigen-map", "--psnr", 30], "--psnr with --method auto"),
+        (["--method", "relighting-map", "--components", 4], "--components applies only to method eigen-map or clustered-eigen-map"),
+        (["--method", "relighting-map", "--budget", 8], "--budget applies only to method auto"),
+        (["-k", 9, "--budget", 8], "-k applies only to method relighting-map"),
+        (["-k", 9, "--clusters", 8], "-k applies only to method relighting-map"),
+        (["--method", "eigen-map", "-k", 9], "-k applies only to method relighting-map"),
+        (["--method", "eigen-map", "--clusters", 4], "--clusters applies only to"),
+        (["--method", "eigen-map", "--psnr", 30], "--psnr applies only to method auto"),
         (["--method", "eigen-map", "--basis", "ptm"], "--basis"),
-        (["--method", "eigen-map", "--spread", "mean"], "--spread"),
+        (["--method", "eigen-map", "--spread", "mean"], "spread"),
         (["--method", "eigen-map", "--ridge", 0], "ridge"),
-        (["--method", "eigen-map", "--scalars", 0], "scalars"),
-        (["--method", "eigen-map", "--scalars", 181], "at most 180 scalars for 60 lights"),
+        (["--method", "eigen-map", "--components", 0], "--components: expected a whole number of 1 or more, found '0'"),
         (["--method", "clustered-eigen-map", "--weighting", "plain"], "--weighting"),
         (["--method", "clustered-eigen-map", "--clusters", 300], "256 clusters"),
         (["--method", "auto", "--encoding", "half"], "--encoding"),
-        (["--method", "auto", "--budget", 3], "at least 4"),
-        (["--method", "auto", "--budget", 8, "--psnr", 30], "found both"),
-        (["--method", "auto", "--psnr", "nan"], "psnr"),
-        (["--basis", "ptm", "-k", 7], "-k 6"),
+        (["--method", "auto", "--budget", 3], "a --budget of at least 4"),
+        (["--budget", 8, "--psnr", 30], "a --budget or a --psnr, found both"),
+        (["--psnr", "nan"], "--psnr: expected a number, found 'nan'"),
+        (["--basis", "ptm", "-k", 7], "-k of 6"),
         (["--basis", "spherical-harmonics", "-k", 10], "found 10"),
-        (["--ridge", "some"], "--ridge"),
-        (["--ridge", "-1"], "ridge"),
-        (["--spread", "narrow"], "--spread"),
-        (["-k", 0], "-k 0"),
+        (["--ridge", "some"], "--ridge: expected auto or a number, found 'some'"),
+        (["--spread", "narrow"], "--spread: expected auto, mean, min or a number, found 'narrow'"),
+        (["-k", 0], "-k: expected a whole number of 1 or more, found '0'"),
     ],
 )
-def test_flags_that_do_not_go_together(made: Path, tmp_path: Path, flags: list, words: str) -> None:
+def test_flags_that_do_not_go_together(tmp_path: Path, flags: list, words: str) -> None:
+    """Wrong usage: no capture is looked at."""
+    assert words in misused("fit", tmp_path / "none", "-o", tmp_path / "asset", *flags)
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [(["--components", 181], "at most 180 components for 60 lights"), (["-k", 200, "--ridge", 0], "60 lights for -k 200")],
+)
+def test_flags_that_a_capture_does_not_allow(made: Path, tmp_path: Path, flags: list, words: str) -> None:
     assert words in refused("fit", made / "capture", "-o", tmp_path / "asset", *flags)
     assert not (tmp_path / "asset").exists()

@@ -18,7 +18,7 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.lights import DirectionalLight
-from srbf.methods.relighting_map import relight
+from srbf.methods import relight
 
 BOUNCE = np.array([0.2, 0.1, 0.05])
 
@@ -99,8 +99,8 @@ def test_frames_and_point_lights_take_rays(asset: Path, tmp_path: Path) -> None:
 
 
 def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
-    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32), "float")
-    done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--environment", tmp_path / "sky.exr")
+    write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
+    done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--environment", tmp_path / "environment.exr")
     assert done.exit_code == 0 and "environment's direct light is not added" in done.stderr
 
 
@@ -108,7 +108,7 @@ def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
 def test_evaluate_compares_with_what_was_asked_for(asset: Path, capture: Capture, make_capture, plane_positions: np.ndarray) -> None:
     alone = json.loads(ok("evaluate", asset, capture.folder, "--json"))["holdout"]
     highest = capture.directions(capture.indices("train"))[:, 2].max()
-    assert alone["peak"] == pytest.approx(1.2 * highest, rel=0.01)  # of the combined answer
+    assert alone["peak"] == pytest.approx(1.2 * highest, rel=0.01)  # of the combined response
     whole = make_capture(lambda d: np.full((10, 14, 3), d[2]) * (1 + BOUNCE), name="combined", position=plane_positions)
     for direct in ("ray", "shadow-map"):
         for reference in (capture, whole):
@@ -122,7 +122,7 @@ def test_a_combined_asset_takes_no_direct_light(capture: Capture, make_capture, 
     whole = make_capture(lambda d: np.full((10, 14, 3), d[2]), name="combined")
     ok("fit", whole.folder, "-o", tmp_path / "combined asset", "-k", 9)
     combined = tmp_path / "combined asset"
-    for command in (("relight", combined, "-o", tmp_path / "x.exr"), ("evaluate", combined, whole.folder)):
+    for command in (("relight", combined, "-o", tmp_path / "x.exr", "--ambient-only"), ("evaluate", combined, whole.folder)):
         assert "holds the direct light already" in refused(*command, "--direct", "ray")
 
 
@@ -143,7 +143,7 @@ def test_what_the_asset_lacks_is_named(asset: Path, tmp_path: Path) -> None:
     assert "scene.glb" in refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--direct", "ray")
 
 
-def test_a_capture_without_direct_images_has_no_combined_answer(asset: Path, capture: Capture) -> None:
+def test_a_capture_without_direct_images_has_no_combined_response(asset: Path, capture: Capture) -> None:
     del capture.manifest["lights"][3]["direct"]
     files.write_json(capture.folder / "capture.json", capture.manifest)
     assert "direct image" in refused("evaluate", asset, capture.folder, "--direct", "ray")

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.cli import app
-from srbf.fitting.options import method_of
+from srbf.fitting.options import implied_method
 from srbf.sphere import fibonacci
 
 
@@ -28,16 +28,18 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Capture:
 @pytest.mark.parametrize(
     ("flags", "method"),
     [
-        ([], "relighting-map"),
-        (["--spread", 0.3, "--ridge", 0.01], "relighting-map"),
+        ([], "eigen-map"),
+        (["--spread", 0.3, "--ridge", 0.01], "eigen-map"),
+        (["-k"], "relighting-map"),
+        (["--components"], "eigen-map"),
         (["-k", 9], "relighting-map"),
         (["--basis", "ptm", "-k", 6], "relighting-map"),
         (["--centers", "hammersley"], "relighting-map"),
-        (["--scalars", 4], "eigen-map"),
+        (["--components", 4], "eigen-map"),
         (["--weighting", "relative"], "eigen-map"),
         (["--clusters", 2], "clustered-eigen-map"),
-        (["--clusters", 2, "--scalars", 3], "clustered-eigen-map"),
-        (["--method", "clustered-eigen-map", "--scalars", 3], "clustered-eigen-map"),
+        (["--clusters", 2, "--components", 3], "clustered-eigen-map"),
+        (["--method", "clustered-eigen-map", "--components", 3], "clustered-eigen-map"),
     ],
 )
 def test_flags_name_their_method(capture: Capture, tmp_path: Path, flags: list, method: str) -> None:
@@ -50,16 +52,16 @@ def test_flags_name_their_method(capture: Capture, tmp_path: Path, flags: list, 
 @pytest.mark.parametrize("flags", [["--budget", 6], ["--psnr", 20]])
 def test_bytes_or_decibels_alone_choose(capture: Capture, tmp_path: Path, flags: list) -> None:
     done = srbf("fit", capture.folder, "-o", tmp_path / "asset", *flags)
-    assert done.exit_code == 0 and "chose 4 scalars as bytes" in done.stderr  # Lambert needs one, and an image holds four
+    assert done.exit_code == 0 and "chose 4 components as bytes" in done.stderr  # Lambert needs one, and an image holds four
     assert Asset.open(tmp_path / "asset").bytes_per_texel()["directional"] == 4
 
 
 def test_leaving_one_out_takes_the_same_method(make_capture) -> None:
     folder = make_capture(lambda d: np.full((2, 3, 3), max(0, d[2])), holdout=2, directions=fibonacci(24)[:12]).folder
-    assert srbf("evaluate", "--leave-one-out", folder, "--scalars", 2).exit_code == 0
-    done = srbf("evaluate", "--leave-one-out", folder, "--scalars", 2, "--method", "relighting-map")
-    assert done.exit_code == 1 and "--scalars with --method eigen-map" in done.stderr
-    assert method_of(None, {"scalars": 2, "clusters": None}) == "eigen-map"
+    assert srbf("evaluate", "--leave-one-out", folder, "--components", 2).exit_code == 0
+    done = srbf("evaluate", "--leave-one-out", folder, "--components", 2, "--method", "relighting-map")
+    assert done.exit_code == 2 and "--components applies only to" in done.stderr
+    assert implied_method({"components": 2}) == "eigen-map" and implied_method({}) == "auto"
 
 
 def test_more_maps_than_lights_is_a_caution(make_capture, tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def test_scene_and_output(scene: Path, tmp_path: Path) -> None:
     assert "found a folder" in refused("mesh", tmp_path, "-o", tmp_path / "scene.glb")
     assert "expected -o NAME.glb, found 'scene.blend'" in refused("mesh", scene, "-o", scene, "--force")
     (tmp_path / "scene.glb").write_bytes(b"kept")
-    assert "found one; choose another -o, or add --force" in refused("mesh", scene, "-o", tmp_path / "scene.glb")
+    assert "found one; choose another, or --force" in refused("mesh", scene, "-o", tmp_path / "scene.glb")
     (tmp_path / "folder.glb").mkdir()
     assert "expected no" in refused("mesh", scene, "-o", tmp_path / "folder.glb", "--force")
     assert (tmp_path / "scene.glb").read_bytes() == b"kept"

@@ -85,8 +85,8 @@ def test_a_picture_shows_what_a_texture_holds_only_when_asked(view: Path, tmp_pa
     filled = relight(Asset.open(view), [DirectionalLight((0.3, 0.2, 1))])
     np.testing.assert_array_equal(read_image(tmp_path / "none.exr"), filled)
     assert np.abs(read_image(tmp_path / "none.png") - encode_srgb(np.clip(filled, 0, 1))).max() < 0.003
-    done = CliRunner().invoke(app, ["relight", str(view), "-o", str(tmp_path / "x.png"), "--alpha", "premultiplied"])
-    assert done.exit_code == 1 and "straight" in done.stderr and not (tmp_path / "x.png").exists()
+    done = CliRunner().invoke(app, ["relight", str(view), "-o", str(tmp_path / "x.png"), *FLAGS, "--alpha", "premultiplied"])
+    assert done.exit_code == 2 and "straight" in done.stderr and not (tmp_path / "x.png").exists()
 
 
 def test_every_frame_of_a_sequence_has_its_alpha(view: Path, tmp_path: Path) -> None:

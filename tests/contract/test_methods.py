@@ -11,7 +11,8 @@ from made_captures import write_capture
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
-from srbf.methods import directional_responses, linear_response, projected_weights, relight
+from srbf.methods import linear_response, projected_weights, relight
+from srbf.methods import responses as asset_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -24,11 +25,11 @@ METHODS: dict[str, Method] = {
     "maps-hammersley3": RelightingMap(k=9, centers="hammersley3", spread="min", ridge=0.01),
     "maps-bytes": RelightingMap(k=12, encoding="uint8"),
     "maps-harmonics": RelightingMap(k=9, basis="spherical-harmonics", encoding="float"),
-    "eigen": EigenMap(scalars=6),
-    "eigen-float": EigenMap(scalars=5, encoding="float", spread=0.4, ridge=0.01),
-    "eigen-bytes": EigenMap(scalars=8, encoding="uint8", weighting="relative"),
-    "clustered": ClusteredEigenMap(clusters=3, scalars=4),
-    "clustered-bytes": ClusteredEigenMap(clusters=4, scalars=3, encoding="uint8", spread=0.5, ridge=0.1),
+    "eigen": EigenMap(components=6),
+    "eigen-float": EigenMap(components=5, encoding="float", spread=0.4, ridge=0.01),
+    "eigen-bytes": EigenMap(components=8, encoding="uint8", weighting="relative"),
+    "clustered": ClusteredEigenMap(clusters=3, components=4),
+    "clustered-bytes": ClusteredEigenMap(clusters=4, components=3, encoding="uint8", spread=0.5, ridge=0.1),
 }
 FEW = 30  # lights: enough to fit all of them, in half the time of sixty
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
@@ -96,7 +97,7 @@ def test_negative_sums_are_clamped_before_ambient(asymmetric: Asset) -> None:
 
 def test_many_directions_at_once_are_each_by_itself(asymmetric: Asset) -> None:
     directions = random_directions(7, "sphere", np.random.default_rng(0))
-    together = directional_responses(asymmetric, directions)
+    together = asset_responses(asymmetric, directions)
     apart = np.stack([linear_response(asymmetric, [DirectionalLight(tuple(d))]) for d in directions])
     np.testing.assert_allclose(together, apart, atol=FLOAT32 * np.abs(apart).max() * 10)
 
@@ -118,11 +119,10 @@ def test_an_environment_is_the_sum_of_its_texels(asymmetric: Asset) -> None:
 
 def test_rows_at_a_time_make_no_difference(asymmetric: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
     directions = random_directions(3, "hemisphere", np.random.default_rng(2))
-    whole, many = linear_response(asymmetric, LIGHTS), directional_responses(asymmetric, directions)
-    for module in ("methods.receivers", "methods.coefficient_maps", "methods.relighting_map"):
-        monkeypatch.setattr(f"srbf.{module}.CHUNK", 3 * 14)  # does not divide the 10 rows
+    whole, many = linear_response(asymmetric, LIGHTS), asset_responses(asymmetric, directions)
+    monkeypatch.setattr("srbf.methods.over_lights.CHUNK", 3 * 14)  # does not divide the 10 rows
     np.testing.assert_allclose(linear_response(asymmetric, LIGHTS), whole, atol=FLOAT32 * np.abs(whole).max() * 10)
-    np.testing.assert_allclose(directional_responses(asymmetric, directions), many, atol=FLOAT32 * np.abs(many).max() * 10)
+    np.testing.assert_allclose(asset_responses(asymmetric, directions), many, atol=FLOAT32 * np.abs(many).max() * 10)
 
 
 def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
@@ -131,7 +131,7 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
     to_asset = np.eye(4)
     to_asset[:3, :3], to_asset[:3, 3] = turn.T / size, -turn.T @ at / size
     instance = replace(asymmetric, manifest={**asymmetric.manifest, "asset_from_world": to_asset.tolist()})
-    sun, point_light, spot, sky = LIGHTS
+    sun, point_light, spot, environment = LIGHTS
 
     def placed(light: PointLight) -> PointLight:
         return replace(light, position=tuple(size * turn @ light.position + at), a0=size * light.a0, radius=size * light.radius)
@@ -140,7 +140,7 @@ def test_a_moved_asset_is_lit_where_it_stands(asymmetric: Asset) -> None:
         replace(sun, direction=tuple(turn @ sun.direction)),
         placed(point_light),
         replace(placed(spot), direction=tuple(turn @ spot.direction)),
-        replace(sky, image=np.roll(sky.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
+        replace(environment, image=np.roll(environment.image, -4, axis=1)),  # a quarter turn about z is a quarter of the columns
     ]
     here = linear_response(asymmetric, LIGHTS)
     np.testing.assert_allclose(linear_response(instance, moved), here, atol=FLOAT32 * np.abs(here).max() * 10)
@@ -160,9 +160,9 @@ def test_permuting_receivers_permutes_the_picture(make_capture, method) -> None:
         np.testing.assert_allclose(two.stored.reshape(-1, 30, 3), one.stored.reshape(-1, 30, 3)[:, order], rtol=0, atol=atol)
         return
     directions = random_directions(5, "hemisphere", rng)
-    responses = directional_responses(one, directions).reshape(5, 30, 3)[:, order]
+    responses = asset_responses(one, directions).reshape(5, 30, 3)[:, order]
     step = {"half": 2.0**-11, "float": 1e-4, "uint8": 1 / 255}[method.encoding]  # axes turn by rounding, and planes with them
-    np.testing.assert_allclose(directional_responses(two, directions).reshape(5, 30, 3), responses, atol=4 * step * np.abs(responses).max())
+    np.testing.assert_allclose(asset_responses(two, directions).reshape(5, 30, 3), responses, atol=4 * step * np.abs(responses).max())
 
 
 def test_uncovered_texels_hold_their_nearest_covered_neighbor(asymmetric: Asset) -> None:

@@ -102,7 +102,7 @@ def _is_whole(command: Command, words: list[str]) -> bool:
 
 
 def asked_for(command: Command) -> str:
-    """What a command runs, but for where it writes: two of the same need one run."""
+    """What a command runs, except where it writes: two of the same need one run."""
     if command.words[0] != "srbf" or command.words[1] not in COMMANDS:
         return command.text
     parsed = [COMMANDS[words[0]].make_context(words[0], words[1:]).params for words in variants(command)]

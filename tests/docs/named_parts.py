@@ -42,7 +42,7 @@ def _paths(words: list[str], command: Command) -> str | None:
 
 def _pip(words: list[str], command: Command) -> str | None:
     extras = PROJECT["optional-dependencies"]
-    ours = {re.split(r"[^\w.-]", line)[0] for lines in extras.values() for line in lines} | {"srbf", ".", "pip"}
+    ours = {re.split(r"[^\w.-]", line)[0] for lines in extras.values() for line in lines} | {"srbf", ".", "pip", "blender_bake"}
     for word in words[1:]:
         found = re.fullmatch(r"([\w.-]+)(?:\[([\w,]+)\])?", word)
         if word.startswith("-"):

@@ -1,6 +1,6 @@
 """What to write where the documentation has a placeholder, how a run is made short, and who runs what cannot be run here in seconds.
 
-A new command of `srbf` or a new script needs no line here: it is run as it stands, in the folder of `workplace.py`, which holds files of
+A new command of `srbf` or a new script needs no line here: it is run unchanged, in the folder of `workplace.py`, which holds files of
 the documented names. A line is needed for a placeholder that is no file's name, for what takes long, and for other programs.
 """
 
@@ -49,6 +49,7 @@ ELSEWHERE = {
     "dask worker *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
     "srbf bake --dask *": f"{FARM}::test_dask_workers_bake_the_same_bits_though_one_is_killed",
     "srbf fit --dask *": f"{FARM}::test_dask_workers_fit_tiles",
+    "mkdocs build *": "tests/packaging/test_docs_site.py::test_the_site_builds_without_a_warning",
     "openjd run *": f"{FARM}::test_an_openjd_job_bakes_the_same_bits_and_fits",
     "python -m blender_bake *": "tests/bake/test_end_to_end.py::test_scene_to_image",  # as every bake does
     "python -m scripts.gallery *": "tests/test_gallery.py::test_it_goes_on_after_a_kill",
@@ -67,7 +68,7 @@ ELSEWHERE = {
 NOT_RUN = {
     "python benchmarks/bake.py": "four bakes and twelve fits of each scene, half a minute at their smallest",
     "python benchmarks/quality.py": "its own scene of 300 lights takes minutes",
-    "python benchmarks/quality.py REALRTI": "fits anew for each light left out: minutes for one small item",
+    "python benchmarks/quality.py REALRTI": "fits again for each light left out: minutes for one small item",
     "python scripts/test_godot.py": "wants the chroot with Godot that scripts/godot-chroot makes, as root",
     "godot *": "the same",
     "blender --command extension install-file *": "wants a Blender with a user's folder; the zip itself is built and validated by a test",

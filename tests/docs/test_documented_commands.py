@@ -15,6 +15,7 @@ from npm_package import npm
 from tables import ELSEWHERE
 from workplace import Workplace, prepare
 
+from srbf.cli.flags import FORMER_FLAGS
 from srbf.viewer.built_page import FILES
 from srbf.viewer.built_page import ROOT as PAGE
 
@@ -156,3 +157,10 @@ def test_a_command_has_one_class_or_fails(text: str, script: bool, expected: str
         assert expected in str(error) and f"x.md:7: {text}" in str(error)
     else:
         assert found == [expected]
+
+
+def test_no_command_is_shown_with_a_former_flag() -> None:
+    commands = [command for page in PAGES for command in (*page.calls, *(step for block in page.blocks for step in block))]
+    ours = [command for command in commands if command.words and command.words[0] == "srbf"]
+    assert len(ours) > 50
+    assert [str(command) for command in ours if {word.partition("=")[0] for word in command.words} & set(FORMER_FLAGS)] == []

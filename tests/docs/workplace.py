@@ -103,7 +103,7 @@ class Workplace:
         program = command.words[0]
         before = frozenset(self.made)
         for words in variants(command):
-            self.made = set(before)  # a choice does not go on with what another has written
+            self.made = set(before)  # a choice does not resume what another has written
             self._make_room(words)
             words = [*words, *shortened(command)]
             if program == "srbf":
@@ -186,7 +186,7 @@ class Workplace:
         )
 
     def npm(self, words: Sequence[str], variables: dict[str, str]) -> str | None:
-        """Run npm in web/: the package packed as it stands, or the examples served, fetched once and ended; what was wrong."""
+        """Run npm in web/: the package packed, or the examples served, fetched once and ended; what was wrong."""
         program = shutil.which("npm", path=PATH)
         assert program is not None
         if words[0] == "pack":
@@ -212,7 +212,7 @@ class Workplace:
 
 
 def fetched(url: str, server: subprocess.Popen[bytes]) -> bytes:
-    """What a server that is about to start answers; nothing where it ends or half a minute is up."""
+    """What a server that is about to start returns; nothing where it ends or half a minute is up."""
     until = time.monotonic() + 30
     while time.monotonic() < until and server.poll() is None:
         try:

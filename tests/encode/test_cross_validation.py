@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from srbf.basis.gaussian import weight
-from srbf.encode.cross_validation import BANDED_LIGHTS, HeldOut, bands
+from srbf.encode.cross_validation import HeldOut
+from srbf.light_domain.directions import BANDED_LIGHTS, Directions
 from srbf.solve.kernel_ridge import KernelPath
 from srbf.sphere import mean_spacing, point_set, random_directions
 
@@ -24,7 +25,7 @@ def ring_dome(counts: tuple[int, ...] = (12, 10, 8), elevations: tuple[float, ..
 
 def test_a_ring_is_a_band() -> None:
     lights = ring_dome()
-    groups = [list(group) for array in bands(lights) for group in array]
+    groups = [list(group) for array in Directions.left_out_groups(lights) for group in array]
     assert sorted(group[0] for group in groups) == list(range(30))
     rings = [set(range(12)), set(range(12, 22)), set(range(22, 30))]
     assert all(set(group) in rings for group in groups)
@@ -32,7 +33,7 @@ def test_a_ring_is_a_band() -> None:
 
 def test_of_many_lights_some_are_the_middle() -> None:
     lights = point_set("fibonacci", 300, "sphere")
-    groups = [group for array in bands(lights) for group in array]
+    groups = [group for array in Directions.left_out_groups(lights) for group in array]
     assert len(groups) == BANDED_LIGHTS
     height = 0.4 * mean_spacing(lights)
     for group in groups:
@@ -47,7 +48,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
     centers = point_set("fibonacci", 50, "hemisphere")
     basis = weight(lights @ centers.T, 0.4)
     images = basis @ rng.normal(size=(50, 300)) + 0.01 * rng.normal(size=(count + 7, 300))
-    held_out = HeldOut.of(images @ images.T / 300, lights, count)
+    held_out = HeldOut.of(images @ images.T / 300, Directions.left_out_groups(lights[:count]), count)
     kernel = basis @ basis.T
     path = KernelPath(kernel[:count, :count])
 
@@ -58,7 +59,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
     def error(light: int, without: np.ndarray) -> float:
         return float(((images[light] - predicted(light, np.setdiff1d(np.arange(count), without))) ** 2).mean())
 
-    tolerance = ROUNDING if count <= 128 else 0.2  # what is beyond the principal directions counts as noise, alike at all lights
+    tolerance = ROUNDING if count <= 128 else 0.2  # what is beyond the principal directions counts as noise, equally at all lights
     single = held_out.single(path, RIDGE)
     assert single[:12] == pytest.approx([error(i, np.array([i])) for i in range(12)], rel=tolerance)
     groups = [group for array in held_out.groups for group in array]
@@ -69,7 +70,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
 
 def test_no_light_drowns_the_rest() -> None:
     lights = ring_dome()
-    held_out = HeldOut.of(np.eye(30), lights, 30)
+    held_out = HeldOut.of(np.eye(30), Directions.left_out_groups(lights), 30)
     even, spiked = np.full(30, 1e-2), np.full(30, 1e-3)
     spiked[29] = 10.0
     assert held_out.score(spiked, spiked) < held_out.score(even, even)

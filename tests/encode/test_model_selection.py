@@ -1,4 +1,4 @@
-"""What is chosen, against slow twins that fit every candidate anew and look."""
+"""What is chosen, against slow twins that fit every candidate again and look."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import pytest
 
 from srbf.basis.gaussian import weight
 from srbf.capture import STRIP, Capture
-from srbf.encode.cross_validation import HeldOut, bands
 from srbf.encode.model_selection import TexelSample, choose
-from srbf.encode.weighted_rows import LightSpace, solid_angles
+from srbf.encode.weighted_rows import LightSpace
 from srbf.errors import InputError
+from srbf.light_domain import Directions
 from srbf.sphere import normalize, point_set, random_directions
 
 TRAIN, VALIDATION = 40, 15
@@ -27,11 +27,11 @@ def sample(noise: float, validated: bool, spread: float = 0.5, seed: int = 0) ->
     directions = directions if validated else directions[:TRAIN]
     responses = np.einsum("lk,nkc->nlc", weight(directions @ centers.T, spread), rng.normal(size=(30, 12, 3)))
     responses += noise * rng.normal(size=responses.shape)
-    return TexelSample(np.arange(30), responses.astype(np.float32), directions, TRAIN), centers
+    return TexelSample(np.arange(30), responses.astype(np.float32), directions, TRAIN, Directions("hemisphere")), centers
 
 
 def candidates(of: TexelSample, centers: np.ndarray) -> list[tuple[float, np.ndarray]]:
-    return [(s, weight(of.directions @ centers.T, s)) for s in SPREADS]
+    return [(s, weight(of.coordinates @ centers.T, s)) for s in SPREADS]
 
 
 def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
@@ -42,9 +42,9 @@ def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
 @pytest.mark.parametrize("noise", [0.0, 0.3, 2.0])
 def test_choice_equals_the_slow_twin(validated: bool, noise: float) -> None:
     given, centers = sample(noise, validated)
-    values = given.responses.transpose(1, 0, 2).reshape(len(given.directions), -1).astype(np.float64)
-    groups = [group for array in bands(given.directions[:TRAIN]) for group in array]
-    held_out = HeldOut.of(given.gram, given.directions, TRAIN)
+    values = given.responses.transpose(1, 0, 2).reshape(len(given.coordinates), -1).astype(np.float64)
+    groups = [group for array in Directions.left_out_groups(given.coordinates[:TRAIN]) for group in array]
+    held_out = given.held_out()
     scores: dict[tuple[float, float], tuple[float, float]] = {}
     for spread, weights in candidates(given, centers):
         for ridge in RIDGES:
@@ -106,7 +106,7 @@ def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeyp
     lights = [*capture.indices("train"), *capture.indices("validation")]
     images = np.stack([capture.image(i).reshape(-1, 3) for i in lights], axis=1)
     np.testing.assert_array_equal(sampled.responses, images[sampled.texels])
-    np.testing.assert_array_equal(sampled.directions, capture.directions(lights))
+    np.testing.assert_array_equal(sampled.coordinates, capture.directions(lights))
 
 
 def test_a_sample_is_of_covered_texels(make_capture) -> None:
@@ -124,13 +124,13 @@ def test_gram_is_the_images_mean_products() -> None:
     np.testing.assert_allclose(given.gram, images @ images.T / 90, rtol=FLOAT32, atol=1e-5)
 
 
-def test_solid_angles_of_a_lattice_are_equal_and_twins_share() -> None:
-    assert solid_angles(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
+def test_quadrature_weights_of_a_lattice_are_equal_and_twins_share() -> None:
+    assert Directions.quadrature(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
     octahedron = np.concatenate([np.eye(3), -np.eye(3)])
-    np.testing.assert_allclose(solid_angles(octahedron), 1)
+    np.testing.assert_allclose(Directions.quadrature(octahedron), 1)
     lights = point_set("fibonacci", 60, "sphere")
     twin = normalize(lights[:1] + 1e-6)
-    shares = solid_angles(np.concatenate([lights, twin]))
+    shares = Directions.quadrature(np.concatenate([lights, twin]))
     assert shares[[0, -1]] == pytest.approx(shares[1:-1].mean() / 2, rel=0.1)
 
 
@@ -150,9 +150,9 @@ def test_the_usual_stays_unless_another_is_much_better() -> None:
     given, centers = sample(0.5, False)
     options = candidates(given, centers)
     best = choose(given, options, RIDGES)
-    alike = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
-    kept = choose(given, options, RIDGES, usual=alike)
-    assert (kept.spread, kept.ridge) == alike and kept.error < 1.5 * best.error
+    same = (best.spread, RIDGES[1] if best.ridge != RIDGES[1] else RIDGES[0])
+    kept = choose(given, options, RIDGES, usual=same)
+    assert (kept.spread, kept.ridge) == same and kept.error < 1.5 * best.error
     assert choose(given, options, RIDGES, usual=(9.0, 9.0)) == best  # not among them
     clean, centers = sample(1e-3, False)
     sure = choose(clean, candidates(clean, centers), RIDGES)

@@ -10,11 +10,12 @@ import pytest
 from srbf.capture import STRIP, Capture
 from srbf.encode.row_blocks import fit_tiles, tiles_of
 from srbf.errors import ImageError
+from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 from srbf.solve.streamed_product import TASK_COLUMNS
 
 METHOD = RelightingMap(k=9, spread="mean", ridge=0.1, encoding="float")
-ROUNDING = 1e-5  # of the largest coefficient: float32 sums over 30 lights in another order, times at most 1/(2 sqrt(ridge)) of the answer
+ROUNDING = 1e-5  # of the largest coefficient: float32 sums over 30 lights in another order, times at most 1/(2 sqrt(ridge)) of the result
 FLOAT64 = 1e-12
 
 
@@ -38,7 +39,7 @@ def test_tiles_give_the_fit_of_the_whole(make_capture, height: int, width: int, 
         assert len(tiles_of(capture.height, capture.width, METHOD.k, threads)) > 1
         return fit_tiles(capture, lights, matrix, ridge, backwards, threads, lambda done, total: seen.append((done, total)))
 
-    whole, parts = METHOD.encode(capture), METHOD.encode(capture, tiles=tiles)
+    whole, parts = METHOD.encode(capture), METHOD.encode(capture, FitRun(solve_rows=tiles))
     assert seen[-1][0] == seen[-1][1] == len(seen) > 1
     if exact:
         np.testing.assert_array_equal(parts.coefficients(), whole.coefficients())
@@ -59,7 +60,7 @@ def test_tiles_cover_every_row_once_and_keep_to_strips() -> None:
 
 def test_indirect_and_kept_captures_stream_rows_too(make_capture) -> None:
     capture = make_capture(noisy(40, 6), lights=7, holdout=0, encoding="half")
-    for opened in (capture, capture.kept()):
+    for opened in (capture, capture.load()):
         whole = np.concatenate([block.astype(np.float32) for _, block in opened.stream(range(7))])
         rows = np.concatenate([block.astype(np.float32) for _, block in opened.stream(range(7), rows=[(3, 20), (39, 40)])])
         np.testing.assert_array_equal(rows, whole.reshape(7, 40, 6, 3)[:, [*range(3, 20), 39]].reshape(7, -1, 3))
@@ -73,4 +74,6 @@ def test_an_error_of_a_tile_is_the_fits(make_capture) -> None:
         yield 1, ImageError("a worker died")
 
     with pytest.raises(ImageError, match="a worker died"):
-        METHOD.encode(capture, tiles=lambda *given: partial(fit_tiles, distribute=failing, threads=1)(*given[:4], progress=given[4]))
+        METHOD.encode(
+            capture, FitRun(solve_rows=lambda *given: partial(fit_tiles, distribute=failing, threads=1)(*given[:4], progress=given[4]))
+        )

@@ -17,7 +17,7 @@ from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import encode
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -119,10 +119,10 @@ def test_it_is_linear_keeps_what_agrees_and_touches_seams_alone() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
-@pytest.mark.parametrize("method", [RelightingMap(k=30), EigenMap(scalars=16)], ids=["relighting-map", "eigen-map"])
+@pytest.mark.parametrize("method", [RelightingMap(k=30), EigenMap(components=16)], ids=["relighting-map", "eigen-map"])
 def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap | EigenMap, encoding: str) -> None:
     method = type(method)(**{**method.__dict__, "encoding": encoding})
-    plain, stitched = encode(method, cut, stitched=False), encode(method, cut)
+    plain, stitched = encode(method, cut, stitch=False), encode(method, cut)
     assert "seams" not in plain.manifest
     seams = stitched.manifest["seams"]
     assert seams["edges"] == PIECES and seams["samples"] == len(edge_points(cut.seam_edges(), SIZE, SIZE)[0])
@@ -137,15 +137,15 @@ def test_seams_close_and_nothing_gets_worse(cut: Capture, method: RelightingMap 
 @pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_clusters_agree_as_well_as_they_hold_the_images(cut: Capture, encoding: str) -> None:
-    method = ClusteredEigenMap(clusters=3, scalars=12, encoding=encoding)
-    plain, stitched = encode(method, cut, stitched=False), encode(method, cut)
+    method = ClusteredEigenMap(clusters=3, components=12, encoding=encoding)
+    plain, stitched = encode(method, cut, stitch=False), encode(method, cut)
     seams = stitched.manifest["seams"]
     assert seams["before"] > 0.05 and seams["after"] < CLUSTERS_LEAVE * seams["before"]
     stitch = Stitch.of(cut)
     assert stitch is not None
     # `before` is what an asset fitted without stitching shows.
     directions = cut.directions(cut.indices("train")[:: -(-80 // 32)])
-    relit = directional_responses(plain, directions).reshape(len(directions), -1, 3)
+    relit = responses(plain, directions).reshape(len(directions), -1, 3)
     mean = np.abs(relit[:, (cut.coverage() > 0).ravel()]).mean()
     gap = stitch.difference(relit[:, stitch.texels].transpose(1, 0, 2).reshape(len(stitch.texels), -1)) / mean
     assert seams["before"] == pytest.approx(gap, rel=0.1)  # the two fits share their clusters, and their ranges nearly

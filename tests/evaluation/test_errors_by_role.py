@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from srbf.capture import Capture
-from srbf.evaluation.errors_by_role import PeakHistogram, TrainWatch, evaluate
+from srbf.evaluation.errors_by_role import PeakHistogram, TrainErrorAccumulator, evaluate
+from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 
 ROUNDING = 1e-5  # relative: float32 products of other shapes
@@ -27,8 +28,8 @@ def capture(make_capture, request: pytest.FixtureRequest) -> Capture:
 
 @pytest.mark.parametrize("encoding", ["half", "uint8"])
 def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding: str) -> None:
-    watch = TrainWatch(capture)
-    asset = RelightingMap(k=9, encoding=encoding).encode(capture, look=watch.look)
+    watch = TrainErrorAccumulator(capture)
+    asset = RelightingMap(k=9, encoding=encoding).encode(capture, FitRun(on_image=watch.look))
     watched, read = evaluate(asset, capture, watch=watch), evaluate(asset, capture)
     assert watched["holdout"] == read["holdout"]  # the peak of the train images included
     assert watched["train"] == pytest.approx(read["train"], rel=ROUNDING)
@@ -37,11 +38,11 @@ def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding
 
 
 def test_a_sample_of_texels_comes_near(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.evaluation.errors_by_role.WATCHED_BYTES", 6 * 40 * 900)
-    watch = TrainWatch(capture)
+    monkeypatch.setattr("srbf.evaluation.errors_by_role.MEMORY_BYTES", 6 * 40 * 900)
+    watch = TrainErrorAccumulator(capture)
     assert len(watch.texels) == 900 and (np.diff(watch.texels) > 0).all()
     assert (capture.coverage().ravel()[watch.texels] == 1).all()
-    asset = RelightingMap(k=9).encode(capture, look=watch.look)
+    asset = RelightingMap(k=9).encode(capture, FitRun(on_image=watch.look))
     watched, read = evaluate(asset, capture, watch=watch), evaluate(asset, capture)
     assert watched["train"]["texels"] == 900 and watched["holdout"] == read["holdout"]
     assert watched["train"]["peak"] == read["train"]["peak"]

@@ -7,7 +7,7 @@ import pytest
 
 from srbf.evaluation.errors_by_role import psnr
 from srbf.evaluation.flip import Flip
-from srbf.evaluation.held_out import DIMMEST, EDGES, SUMS, negative, shadow_edges, sums_of_lights, unseen_error
+from srbf.evaluation.held_out import EDGE_SHARE, MIN_COLOR, SUMS, held_out_error, negative, shadow_edges, sums_of_lights
 
 COVERED = np.ones((12, 16), bool)
 
@@ -21,7 +21,7 @@ def stacks(noise: float, count: int = 5) -> tuple[np.ndarray, np.ndarray]:
 
 def test_one_light_is_the_pictures_themselves() -> None:
     true, relit = stacks(0.05)
-    error = unseen_error(true, relit, COVERED, 1, 2.0, Flip(0.0))
+    error = held_out_error(true, relit, COVERED, 1, 2.0, Flip(0.0))
     each = [psnr(2.0, float(np.sqrt(((np.maximum(b, 0) - a) ** 2).mean()))) for a, b in zip(true, relit, strict=True)]
     assert error.pictures == 5 and error.psnr == pytest.approx(np.mean(each), abs=1e-4)
     assert error.worst == pytest.approx(min(each), abs=1e-4)
@@ -36,12 +36,12 @@ def test_a_sum_is_linear_and_as_bright_as_one_light(lights: int, count: int) -> 
     assert np.allclose(ones.mean(axis=(1, 2, 3)), 1, atol=1e-6)  # colors add up to one white light, whichever lights were drawn
     again, doubled = sums_of_lights((flat, 2 * ramp), lights, np.random.default_rng(0))
     assert np.allclose(doubled, 2 * weighed) and (again == ones).all()
-    assert ones.std(axis=3).max() > 0.01 and ones.min() > DIMMEST / 2  # colored, none extinguished
+    assert ones.std(axis=3).max() > 0.01 and ones.min() > MIN_COLOR / 2  # colored, none extinguished
 
 
 def test_errors_of_independent_lights_average_out() -> None:
     true, relit = stacks(0.05, count=16)
-    one, eight = (unseen_error(true, relit, COVERED, n, 1.0, Flip(0.0)).psnr for n in (1, 8))
+    one, eight = (held_out_error(true, relit, COVERED, n, 1.0, Flip(0.0)).psnr for n in (1, 8))
     assert eight - one == pytest.approx(
         10 * np.log10(8), abs=1.2
     )  # noise of eight equal shares is √8 times less, a little more for unequal
@@ -54,7 +54,7 @@ def test_shadow_edges_are_the_steps_of_light_and_not_of_paint() -> None:
     shadowed[:, 20:] *= 0.1
     edges = shadow_edges(shadowed, mean, np.ones((40, 40), bool))
     columns = np.flatnonzero(edges.any(axis=0))
-    assert columns.tolist() == [19, 20] and 0 < edges.mean() <= EDGES + 0.01
+    assert columns.tolist() == [19, 20] and 0 < edges.mean() <= EDGE_SHARE + 0.01
     holed = np.ones((40, 40), bool)
     holed[:, 20:] = False
     assert not shadow_edges(np.where(holed[..., None], mean, 0), mean, holed)[:, 19].all()  # a step into a hole is none

@@ -11,7 +11,7 @@ from srbf.sphere import mean_spacing, normalize, point_set
 
 
 def behind_walls(sun_angle: float, directions: np.ndarray, texels: int = 400) -> np.ndarray:
-    """(L, n) answers of Lambert texels facing anywhere upwards, each with a half-space of its own hiding the sun's disc."""
+    """(L, n) responses of Lambert texels facing anywhere upwards, each with a half-space of its own hiding the sun's disc."""
     rng = np.random.default_rng(5)
     normals, walls = normalize(rng.normal(size=(texels, 3)) * [0.5, 0.5, 0.1] + [0, 0, 1]), normalize(rng.normal(size=(texels, 3)))
     walls *= np.sign((walls * normals).sum(axis=1, keepdims=True))  # every texel sees what is before it

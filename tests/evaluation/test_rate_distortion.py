@@ -1,4 +1,4 @@
-"""What a byte buys: samples answer as their capture does, baselines are what they say, and a spectrum bounds every method."""
+"""Error by bytes: a sample scores like its capture, baselines have their bytes, and a spectrum bounds every method."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from srbf.evaluation.rate_distortion import (
     ALL,
     IMAGE_BYTES,
     NEAREST,
-    components_of,
     contest,
     error_of,
     nearest_image,
@@ -21,7 +20,8 @@ from srbf.evaluation.rate_distortion import (
     score_asset,
     spectrum,
 )
-from srbf.methods import directional_responses
+from srbf.methods import method_of
+from srbf.methods import responses as asset_responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -50,34 +50,34 @@ def test_a_sample_of_all_texels_scores_as_the_whole(capture: Capture) -> None:
     asset = method.encode(capture)
     whole = evaluate(asset, capture)["holdout"]
     texels = np.arange(WIDTH, HEIGHT * WIDTH)  # the first row is not covered
-    sample = capture.kept(texels)
+    sample = capture.load(texels)
     kept = score_asset(asset.at(texels), sample, "holdout", whole["peak"])
     (fitted, *_) = contest(sample, [method], "holdout", whole["peak"])
     for score in (kept, fitted):
         assert score.psnr == pytest.approx(whole["psnr"], abs=0.01)  # sums in another order, float32
         assert score.relative_rmse == pytest.approx(whole["relative_rmse"], rel=1e-3)
         assert (score.family, score.name, score.bytes_per_texel) == ("relighting map", "12 maps, float", 12 * 16)
-    assert components_of(asset) == 36
+    assert method_of(asset).numbers_per_texel(asset) == 36
 
 
 @pytest.mark.slow
 def test_every_family_is_told_apart(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     methods = [
         RelightingMap(k=9, basis="spherical-harmonics"),
-        EigenMap(scalars=8),
-        ClusteredEigenMap(clusters=3, scalars=4, encoding="uint8"),
+        EigenMap(components=8),
+        ClusteredEigenMap(clusters=3, components=4, encoding="uint8"),
     ]
     harmonics, eigen, clustered, *_ = contest(sample, methods, "holdout", 1.0)
     assert (harmonics.family, harmonics.name, harmonics.bytes_per_texel) == ("spherical harmonics", "9 maps", 72)
-    assert (eigen.family, eigen.name, eigen.bytes_per_texel) == ("eigen map", "8 scalars", 16)
-    assert (clustered.family, clustered.name) == ("clustered eigen map", "4 scalars, 3 clusters, bytes")
+    assert (eigen.family, eigen.name, eigen.bytes_per_texel) == ("eigen map", "8 components", 16)
+    assert (clustered.family, clustered.name) == ("clustered eigen map", "4 components, 3 clusters, bytes")
     assert clustered.bytes_per_texel == 5  # four scalars and the index
-    assert eigen.psnr > harmonics.psnr  # at fewer bytes: the facets' answers have a few components
+    assert eigen.psnr > harmonics.psnr  # at fewer bytes: the facets' responses have a few components
 
 
 def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     nearest, every = contest(sample, [], "holdout", 1.0)
     found = nearest_image(sample, np.arange(sample.width))
     train = sample.indices("train")
@@ -86,11 +86,11 @@ def test_baselines_at_the_bytes_of_all_images(capture: Capture) -> None:
     assert np.array_equal(found(tilted)[0], sample.image(train[0]).reshape(-1, 3))
     assert (nearest.family, every.family) == (NEAREST, ALL)
     assert nearest.bytes_per_texel == every.bytes_per_texel == 60 * IMAGE_BYTES
-    assert every.psnr > nearest.psnr + 3  # smooth answers are interpolated far better than they are picked
+    assert every.psnr > nearest.psnr + 3  # smooth responses are interpolated far better than they are picked
 
 
-def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Capture) -> None:
-    sample = capture.kept(np.arange(WIDTH, HEIGHT * WIDTH))
+def test_the_spectrum_is_that_of_the_responses_and_bounds_every_fit(capture: Capture) -> None:
+    sample = capture.load(np.arange(WIDTH, HEIGHT * WIDTH))
     train = sample.indices("train")
     responses = np.concatenate([sample.image(i).reshape(-1, 3) for i in train], axis=1)
     values = spectrum(sample)
@@ -100,9 +100,9 @@ def test_the_spectrum_is_that_of_the_answers_and_bounds_every_fit(capture: Captu
     bound = planes_bound(values, responses.size, 1.0)
     assert (np.diff(bound) >= 0).all()
     assert bound[0] == pytest.approx(-10 * np.log10(((responses - responses.mean(axis=0)) ** 2).mean()), abs=0.01)
-    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(scalars=3, encoding="float")):
+    for method in (RelightingMap(k=2, spread=1.0, ridge=0.0, encoding="float"), EigenMap(components=3, encoding="float")):
         asset = method.encode(sample)
-        fitted = np.concatenate(list(directional_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
+        fitted = np.concatenate(list(asset_responses(asset, sample.directions(train))[:, 0]), axis=1)  # not clamped
         reached = -10 * np.log10(((fitted - responses) ** 2).mean())
-        assert reached <= bound[components_of(asset)] + 0.01
+        assert reached <= bound[method_of(asset).numbers_per_texel(asset)] + 0.01
     assert reached > bound[1]  # the eigen map comes near it

@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 
 from srbf.errors import InputError
-from srbf.evaluation.temporal_stability import LOWEST, compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
+from srbf.evaluation.temporal_stability import compare, dense_reference, frames, great_circles, lambert_sweep, sampled_texels, sweep
+from srbf.light_domain.directions import LOWEST
 from srbf.lights import DirectionalLight
 from srbf.methods import relight
 from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
-ROUNDING = 1e-5  # float32 answers, differences of neighboring frames
+ROUNDING = 1e-5  # float32 responses, differences of neighboring frames
 PATH = great_circles("hemisphere", 300, 3)  # (3, 100, 3)
 STEPS = 99
 
 
 def curve(values: np.ndarray, texels: int = 5) -> np.ndarray:
-    """(C, F) or (F,) values as answers of gray texels."""
+    """(C, F) or (F,) values as responses of gray texels."""
     values = np.broadcast_to(values, PATH.shape[:2])
     return np.repeat(np.repeat(values[:, :, None, None], texels, axis=2), 3, axis=3).astype(np.float32)
 
@@ -53,35 +54,35 @@ def shadowed() -> np.ndarray:
 def test_a_perfect_relighter() -> None:
     motion = compare(PATH, shadowed(), shadowed())
     assert (motion.change_ratio, motion.largest_step) == (1, 1)
-    assert (motion.brightness_error, motion.largest_ripple, motion.ghosting) == (0, 0, 0)
+    assert (motion.brightness_error, motion.largest_flicker, motion.ghosting) == (0, 0, 0)
     assert motion.edge_kept == pytest.approx(1, rel=ROUNDING)
     assert motion.edge_texels == 1 and motion.edge.sum() > 0
 
 
-def test_without_shadows_nothing_ghosts_and_nothing_is_kept() -> None:
+def test_without_shadows_there_is_no_ghosting_and_nothing_is_kept() -> None:
     motion = compare(PATH, curve(np.ones(100)), curve((np.arange(100) >= 50).astype(float)))
     assert (motion.ghosting, motion.edge_kept, motion.change_ratio) == (0, 0, 0)
 
 
-def test_a_gain_is_no_ripple() -> None:
+def test_a_gain_is_no_flicker() -> None:
     reference = curve(PATH[..., 2])
     motion = compare(PATH, np.float32(1.3) * reference, reference)
     assert motion.change_ratio == pytest.approx(1.3, rel=ROUNDING)
     assert motion.brightness_error == pytest.approx(0.3, rel=1e-4)
-    assert motion.largest_ripple < ROUNDING
+    assert motion.largest_flicker < ROUNDING
     assert motion.edge_texels == 0 and motion.ghosting == 0  # a cosine is no shadow edge
 
 
-def test_a_wave_is_the_ripple_of_its_height() -> None:
+def test_a_wave_is_flicker_of_its_height() -> None:
     reference = PATH[..., 2]
     angle = np.linspace(LOWEST, np.pi - LOWEST, 100)
     motion = compare(PATH, curve(reference + 0.03 * np.sin(16 * angle)), curve(reference))
     # Waves this short are nearly orthogonal to an affine function of the direction: it takes up a few per cent, at the ends.
-    assert motion.largest_ripple == pytest.approx(0.03 / reference.mean(), rel=0.1)
+    assert motion.largest_flicker == pytest.approx(0.03 / reference.mean(), rel=0.1)
     assert motion.change_ratio > 1
 
 
-def test_held_frames_pop() -> None:
+def test_held_frames_are_popping() -> None:
     """Change of 1 a step, shown every eleventh step only: steps of 11, rms sqrt(11)."""
     ramp = np.arange(100.0) + 1
     motion = compare(PATH, curve(1 + np.floor((np.arange(100)) / 11) * 11), curve(ramp))
@@ -90,7 +91,7 @@ def test_held_frames_pop() -> None:
 
 
 @pytest.mark.parametrize("fade", [4, 10, 24])
-def test_cross_fading_ghosts_by_what_it_shows_outside_the_edge(fade: int) -> None:
+def test_cross_fading_is_ghosting_by_its_share_outside_the_edge(fade: int) -> None:
     """A hard edge passes in one step, with a step on either side 3; a fade of M even steps shows M - 3 parts of M beside them."""
     frame = np.arange(100)
     hard = (frame >= 50).astype(float)
@@ -113,7 +114,7 @@ def test_an_echo_counts_twice_its_height_and_a_still_texel_nothing() -> None:
     assert compare(PATH, relit, reference).ghosting == pytest.approx(0.5, rel=ROUNDING)
 
 
-def test_negative_answers_are_clamped_as_the_picture_is() -> None:
+def test_negative_responses_are_clamped_as_the_picture_is() -> None:
     reference = curve(np.maximum(0, PATH[..., 0]))
     assert compare(PATH, curve(PATH[..., 0]), reference).change_ratio == 1
 
@@ -128,12 +129,12 @@ def test_twenty_five_gaussians_of_the_hemisphere_pulse_and_those_of_the_sphere_h
     lights = point_set("hammersley", 400, "hemisphere")
     paper = lambert_sweep(RelightingMap(k=25, spread="mean", ridge=0).encode, lights)
     assert 0.06 < paper.brightness_error < 0.1
-    assert paper.largest_ripple > 0.015
+    assert paper.largest_flicker > 0.015
     around = lambert_sweep(RelightingMap(k=25, domain="sphere", spread="mean", ridge=0, encoding="float").encode, lights)
     assert around.brightness_error < 0.02
     chosen = lambert_sweep(RelightingMap(k=25).encode, lights)  # spread and ridge by what they predict
     assert chosen.brightness_error < 0.02
-    assert around.largest_ripple < 0.01
+    assert around.largest_flicker < 0.01
 
 
 def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray) -> None:
@@ -153,7 +154,7 @@ def test_a_sweep_is_the_relit_picture(make_capture, plane_positions: np.ndarray)
         assert brightness == pytest.approx((expected - 0.25).reshape(-1, 3)[texels].mean(), abs=1e-4)
     assert motion.change_ratio == pytest.approx(1, abs=0.15)
     document = json.loads(json.dumps(motion.as_dict(), allow_nan=False))
-    np.testing.assert_array_equal(document["ripple"], motion.ripple)
+    np.testing.assert_array_equal(document["flicker"], motion.flicker)
 
 
 def test_a_dense_reference_is_the_truth_where_lights_are_dense(make_capture) -> None:

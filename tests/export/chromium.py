@@ -1,4 +1,4 @@
-"""Headless Chromium with WebGPU by SwiftShader: a page that draws what it is told and posts the pixels back."""
+"""Headless Chromium with WebGPU by SwiftShader: a page that draws its jobs and posts the pixels back."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def encoded(values: np.ndarray) -> str:
 
 
 def ask(cases: dict[str, Any]) -> dict[str, Any]:
-    """What the page answers to `cases`: by name the pixels of `pictures`, the errors of `modules`."""
+    """What the page returns for `cases`: by name the pixels of `pictures`, the errors of `modules`."""
     responses: list[dict[str, Any]] = []
-    answered = threading.Event()
+    returned = threading.Event()
 
     class Handler(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
@@ -48,7 +48,7 @@ def ask(cases: dict[str, Any]) -> dict[str, Any]:
             responses.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
             self.send_response(204)
             self.end_headers()
-            answered.set()
+            returned.set()
 
         def log_message(self, *_: object) -> None:
             pass
@@ -61,7 +61,7 @@ def ask(cases: dict[str, Any]) -> dict[str, Any]:
             [str(browser()), *FLAGS, f"--user-data-dir={profile}", url], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
         try:
-            assert answered.wait(SECONDS), "Chromium did not answer"
+            assert returned.wait(SECONDS), "Chromium did not respond"
         finally:
             process.terminate()
             process.wait(10)

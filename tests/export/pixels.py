@@ -16,9 +16,8 @@ from srbf.export import spirv
 from srbf.gl.context import create_context
 from srbf.gl.textures import AssetTextures, Limits
 from srbf.gl.uniforms import padded, point_light_uniforms
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation
-from srbf.methods.coefficient_maps import first_function, planes_of
-from srbf.methods.receivers import light_vectors
+from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation, light_vectors
+from srbf.methods.coefficient_maps import components_of, first_function
 from srbf.methods.relighting_map import basis_weights
 
 FLOAT = 1e-5  # the contract, of the sum of the terms' magnitudes
@@ -45,9 +44,9 @@ def corner_shader() -> str:
 
 
 def weights_of(asset: Asset, lights: Sequence[Light]) -> np.ndarray:
-    """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of scalar planes, float32."""
+    """What the shaders take: (K, 4) of relighting maps, (C, S + 1, 4) of coefficient maps, float32."""
     weights = padded(methods.projected_weights(asset, lights).astype(np.float32))
-    return weights if asset.method == "relighting-map" else weights.reshape(asset.clusters, asset.scalars + 1, 4)
+    return weights if asset.method == "relighting-map" else weights.reshape(asset.clusters, asset.components + 1, 4)
 
 
 def magnitude(asset: Asset, light: Light) -> np.ndarray:
@@ -71,7 +70,7 @@ def magnitude(asset: Asset, light: Light) -> np.ndarray:
     def function(j: int) -> np.ndarray:
         return lookup(table, entry["size"], entry["columns"], first + j, unit) * color if point_light else weights[first + j]
 
-    planes = planes_of(layers, asset.scalars)
+    planes = components_of(layers, asset.components)
     return function(0) + sum(plane[..., None] * function(j) for j, plane in enumerate(planes, start=1))
 
 

@@ -15,7 +15,7 @@ import pytest
 from srbf.asset import Asset
 from srbf.errors import InputError, ManifestError
 from srbf.export import Settings, export
-from srbf.export.gltf import EXTENSION, white_sky
+from srbf.export.gltf import EXTENSION, under_white
 from srbf.io.glb import Glb
 from srbf.io.image import decode_srgb, read_image
 from srbf.io.scene_glb import read_triangles
@@ -93,10 +93,10 @@ def test_it_is_plain_gltf_with_a_picture(make_asset: Callable[..., Asset], tmp_p
     assert texture == {"index": 0, "texCoord": 1}
     view = document["bufferViews"][document["images"][document["textures"][0]["source"]]["bufferView"]]
     (tmp_path / "picture.png").write_bytes(body[view["byteOffset"] : view["byteOffset"] + view["byteLength"]])
-    sky = np.clip(white_sky(asset), 0, 1)
-    assert np.ptp(sky) > 0.5
+    expected = np.clip(under_white(asset), 0, 1)
+    assert np.ptp(expected) > 0.5
     slope = 0.0031308 / 0.04045 * 2.6 * 12.92  # of the sRGB curve, at most
-    np.testing.assert_allclose(decode_srgb(read_image(tmp_path / "picture.png", 3)), sky, atol=BYTE * slope)
+    np.testing.assert_allclose(decode_srgb(read_image(tmp_path / "picture.png", 3)), expected, atol=BYTE * slope)
     assert (tmp_path / "out" / material["extensions"][EXTENSION]["manifest"]).is_file()
     told = json.loads((tmp_path / "out" / "asset.json").read_text())
     assert "model.glb" in told["sha256"]
@@ -153,7 +153,7 @@ def test_a_view_is_a_rectangle(make_planes: Callable[..., Asset], tmp_path: Path
 def test_what_cannot_be_written_is_refused(make_asset: Callable[..., Asset], tmp_path: Path) -> None:
     asset, out = bowl(make_asset), tmp_path / "out"
     bare = replace(asset, images={"coverage": asset.images["coverage"]})
-    with pytest.raises(InputError, match="--mesh FILE.glb"):
+    with pytest.raises(InputError, match="give a `mesh`"):
         export(bare, "gltf", out)
     lonely = np.zeros_like(asset.images["coverage"])
     lonely[::3, ::3] = 1

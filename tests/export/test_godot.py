@@ -13,11 +13,13 @@ import pytest
 
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
-from srbf.export.godot import METHODS, method_include, translated, write
+from srbf.export.godot import method_include, translated, write
 from srbf.export.settings import Settings
 from srbf.lights import DirectionalLight, PointLight
 from srbf.methods import relight
+from srbf.registry import all_methods
 
+METHODS = {method.name: method.stem() for method in all_methods()}
 LIGHTS = (DirectionalLight((0.3, -0.4, 0.8), (1.0, 0.5, 0.2)), PointLight((0.3, 0.2, 1.1), (0.4, 0.9, 0.7)))
 Made = Callable[..., Asset]
 
@@ -42,7 +44,7 @@ def projects(assets: dict[str, Asset], tmp_path_factory: pytest.TempPathFactory)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_project_is_an_asset_of_the_same_answer(method: str, assets: dict[str, Asset], projects: dict[str, Path]) -> None:
+def test_the_project_is_an_asset_of_the_same_response(method: str, assets: dict[str, Asset], projects: dict[str, Path]) -> None:
     np.testing.assert_array_equal(relight(Asset.open(projects[method]), LIGHTS), relight(assets[method], LIGHTS))
 
 
@@ -98,7 +100,7 @@ def test_a_rule_takes_what_godot_lacks_and_no_more(glsl: str, godot: str) -> Non
     "stage", ["void main() {}\n", "in vec2 uv;\n", "layout(location = 0) out vec4 c;\n", "vec4 f() { return gl_FragCoord; }\n"]
 )
 def test_a_stage_is_refused(stage: str) -> None:
-    with pytest.raises(ShaderError, match="expected functions alone"):
+    with pytest.raises(ShaderError, match="expected only functions"):
         translated(stage)
 
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from srbf.asset import LAYERS, Asset
+from srbf.asset import Asset
 from srbf.export import Settings, export
 from srbf.export.mips import chart_gap, levels_without_bleeding, smaller_levels
 from srbf.io.containers import read_texture_array
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.sphere import random_directions
 
 FLOAT32 = 1e-5  # of sums of some hundred terms about 1
@@ -38,7 +38,7 @@ def charts(make: Callable[..., Asset], height: int = 45, width: int = 70, **flag
 def as_level(asset: Asset, layers: np.ndarray, coverage: np.ndarray | None = None) -> Asset:
     """The asset with float layers of another size."""
     entries = [{**entry, "encoding": "float"} for entry in asset.layers]
-    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], LAYERS[asset.method]: entries}
+    manifest = {**asset.manifest, "height": layers.shape[1], "width": layers.shape[2], asset.layers_key: entries}
     one = np.ones((len(layers), layers.shape[3]), np.float32)
     return replace(
         asset, manifest=manifest, stored=layers, scale=one, bias=0 * one, images={} if coverage is None else {"coverage": coverage}
@@ -67,9 +67,9 @@ def test_a_level_relit_is_the_picture_filtered(method: str, make_asset: Callable
     if method == "maps":
         asset.images["coverage"][asset.images["coverage"] > 0] = np.linspace(0.2, 1, int(asset.images["coverage"].sum()))  # a view's
     coverage = asset.images["coverage"]
-    full = directional_responses(asset, DIRECTIONS)
+    full = responses(asset, DIRECTIONS)
     for level, layers in enumerate(smaller_levels(asset.coefficients(), coverage, 4)):
-        relit = directional_responses(as_level(asset, layers), DIRECTIONS)
+        relit = responses(as_level(asset, layers), DIRECTIONS)
         for response, picture in zip(relit, full, strict=True):
             mean, area = slow_mean(picture, coverage, level)
             np.testing.assert_allclose(response[area > 1e-9], mean[area > 1e-9], atol=FLOAT32 * np.abs(picture[coverage > 0]).max())
@@ -82,12 +82,12 @@ def test_chart_edges_of_the_file(form: str, make_asset: Callable[..., Asset], tm
     export(asset, "dds", tmp_path / "out", Settings(form, levels=4))  # type: ignore[arg-type]
     texture, out = read_texture_array(tmp_path / "out" / "maps.dds"), Asset.open(tmp_path / "out")
     coverage = asset.images["coverage"]
-    full = directional_responses(asset, DIRECTIONS)
+    full = responses(asset, DIRECTIONS)
     peak = np.abs(full[:, coverage > 0]).max()
     for level in range(4):
         texels = texture.pixels(level)[..., :3].astype(np.float32) / (1 if form == "half" else 255)
         layers = texels * out.scale[:, None, None] + out.bias[:, None, None]
-        relit = directional_responses(as_level(asset, layers), DIRECTIONS)
+        relit = responses(as_level(asset, layers), DIRECTIONS)
         squares = []
         for response, picture in zip(relit, full, strict=True):
             mean, area = slow_mean(picture, coverage, level)

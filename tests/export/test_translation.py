@@ -15,11 +15,11 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import ShaderError
 from srbf.export import hlsl, spirv
-from srbf.export.asset_shader import MOST_POINT_LIGHTS
 from srbf.export.translation import library_paths, pack_files, parse, render_plain, tokens
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import packed_point_lights
 from srbf.lights import PointLight
+from srbf.methods.protocol import MOST_POINT_LIGHTS
 
 pytestmark = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 

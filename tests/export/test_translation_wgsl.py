@@ -150,7 +150,7 @@ def test_wgsl_gives_the_pixels_of_numpy(assets: dict[str, Asset], responses: dic
     [
         ("float f(float a) { a += 1.0; return a; }", "leave its parameters"),
         ("float f(float a) { if (a > 0.0) return a; return 0.0; }", "put it in braces"),
-        ("float f(float a) { float b = a, c = a; return b + c; }", "one variable a declaration"),
+        ("float f(float a) { float b = a, c = a; return b + c; }", "one variable per declaration"),
     ],
 )
 def test_glsl_that_wgsl_has_no_form_for_is_refused(text: str, complaint: str) -> None:

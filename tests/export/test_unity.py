@@ -17,7 +17,6 @@ from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
 from srbf import methods
 from srbf.asset import Asset
 from srbf.export import spirv, unity
-from srbf.export.asset_shader import MOST_POINT_LIGHTS
 from srbf.export.engine_folder import engine_root
 from srbf.export.settings import Settings
 from srbf.gl.textures import pairs_of
@@ -25,6 +24,7 @@ from srbf.gl.uniforms import packed_point_lights
 from srbf.io.containers import read_texture_array
 from srbf.io.containers.dds_header import DXGI
 from srbf.lights import DirectionalLight, PointLight, SpotLight
+from srbf.methods.protocol import MOST_POINT_LIGHTS
 
 needs_spirv = pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
 needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono")), reason="needs mono-mcs and mono-runtime (Debian)")

@@ -91,7 +91,7 @@ def shader_of(folder: Path) -> str:
 
 
 def in_unreal(place: Any, scale: float) -> np.ndarray:
-    """Unreal's coordinates of a place or a direction of Blender's: y turned, centimetres by the scale."""
+    """Unreal's coordinates of a place or a direction of Blender's: y turned, centimeters by the scale."""
     return np.asarray(place, np.float64) * [scale, -scale, scale]
 
 
@@ -125,7 +125,7 @@ def test_the_custom_node_gives_numpys_pixels(folders: dict[str, Path], method: s
     scale = 1 if quantity == "radiance" else 1 / math.pi
     expected = (np.maximum(expected, 0) + asset.images.get("ambient", 0)) * scale
     # the receiver's place rounds twice more on its way through Unreal's space, which the weights follow
-    asset.manifest["asset_from_world"] = np.eye(4).tolist()  # magnitudes are those of lamps near the asset
+    asset.manifest["asset_from_world"] = np.eye(4).tolist()  # magnitudes are those of point lights near the asset
     allowed = scale * (
         4 * FLOAT * (magnitude(asset, SUN) + magnitude(asset, LIGHTS["inverse-square"]) + magnitude(asset, POINT_LIGHT)) + 1e-6
     )
@@ -134,7 +134,7 @@ def test_the_custom_node_gives_numpys_pixels(folders: dict[str, Path], method: s
 
 
 def by_table(asset: Asset) -> np.ndarray:
-    """The sun as a lamp so far away that its direction is the same everywhere: planes read their table, not their functions."""
+    """The sun as a point light so far away that its direction is the same everywhere: planes read their table, not their functions."""
     far = 1e6
     distance = PointLight(tuple(far * np.array(SUN.direction)), SUN.color, a0=far)  # type: ignore[arg-type]
     return methods.linear_response(asset, [distance])
@@ -149,7 +149,7 @@ def test_an_export_is_an_asset(assets: dict[str, Asset], folders: dict[str, Path
 
 
 class Recorder:
-    """Stands for anything of Unreal's: remembers properties, answers every call with another of its kind."""
+    """Stands for anything of Unreal's: remembers properties, returns another for every call of its kind."""
 
     def __init__(self, kind: str, log: list[tuple[Any, ...]]) -> None:
         self.kind, self.log, self.properties = kind, log, {}
@@ -169,7 +169,7 @@ class Recorder:
 
 
 class StandIn(ModuleType):
-    """`unreal` as far as the script asks: classes by name are made, libraries and enumerations answer."""
+    """`unreal` as far as the script asks: classes by name are made, libraries and enumerations respond."""
 
     def __init__(self, project: Path) -> None:
         super().__init__("unreal")

@@ -22,7 +22,7 @@ SCRIPT = Path(__file__).parent / "in_blender.py"
 
 @pytest.fixture
 def in_blender() -> Callable[..., Any]:
-    """Run a function of in_blender.py with a JSON argument; its JSON answer."""
+    """Run a function of in_blender.py with a JSON argument; its JSON result."""
 
     def call(name: str, **case: Any) -> Any:
         done = subprocess.run([sys.executable, str(SCRIPT), name, json.dumps(case)], capture_output=True, text=True, timeout=60)

@@ -47,7 +47,7 @@ def point_light(kind: str, name: str, energy: float, color: list[float], locatio
     light.energy, light.color = energy, color
     obj = bpy.data.objects.new(name, light)
     obj.location = location
-    if axis is not None:  # a lamp shines along its own -z
+    if axis is not None:  # a light shines along its own -z
         obj.rotation_euler = Vector(axis).to_track_quat("Z", "Y").to_euler()
     bpy.context.scene.collection.objects.link(obj)
 

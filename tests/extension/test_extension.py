@@ -15,7 +15,7 @@ from srbf.cli import app
 pytestmark = pytest.mark.blender
 ROOT = Path(__file__).parents[2]
 
-# In the library's place: tells what it was asked, speaks as a bake does, and ends as one does.
+# A stand-in for the library: reports its arguments, prints what a bake prints, and ends like one.
 DOUBLE = """
 import json, pathlib, sys, time
 pathlib.Path({asked!r}).write_text(json.dumps(sys.argv[1:]))
@@ -49,7 +49,7 @@ def test_registers_and_unregisters_twice(in_blender) -> None:
 
 def test_what_is_refused_and_when(in_blender, make_asset, tmp_path) -> None:
     make_asset("moved", asset_from_world=[[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
-    make_asset("view", source={"receiver": {"kind": "view", "camera": "Camera"}})
+    make_asset("view", receiver={"kind": "view", "camera": "Camera"})  # its own key, before what the source says
     make_asset("other layer", source={"receiver": {"kind": "lightmap", "object": "Plane", "uv_layer": "gone"}})
     make_asset("outside")
     manifest = json.loads((tmp_path / "outside" / "asset.json").read_text())

@@ -9,15 +9,15 @@ import pytest
 
 from srbf.basis.gaussian import TABLE_TOLERANCE
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.relighting_map import relight
+from srbf.methods import relight
 
 pytestmark = pytest.mark.blender
 
 # The library looks R up in its table, the nodes compute it: off by TABLE_TOLERANCE of each |c_i| times the light. The maps are the same.
 FLOAT32 = 2e-5  # relative to the same sum: a k-term sum, arccosine and exponential in Cycles' single precision
-TEXEL = 2e-3  # of the step to a neighbor: Cycles' first sample stands within 0.001 texel of the center, along either axis
+TEXEL = 2e-3  # of the step to a neighbor: Cycles' first sample lies within 0.001 texel of the center, along either axis
 SUN = {"kind": "SUN", "name": "Sun", "energy": 2.0, "color": [1.0, 0.5, 0.25], "location": [0, 0, 0], "axis": [0.4, -0.3, 0.8]}
-SECOND = {"kind": "SUN", "name": "Sky", "energy": 0.5, "color": [0.1, 0.2, 0.9], "location": [0, 0, 5], "axis": [-0.7, 0.1, 0.3]}
+SECOND = {"kind": "SUN", "name": "Fill", "energy": 0.5, "color": [0.1, 0.2, 0.9], "location": [0, 0, 5], "axis": [-0.7, 0.1, 0.3]}
 POINT = {"kind": "POINT", "name": "Bulb", "energy": 30.0, "color": [1.0, 0.8, 0.6], "location": [0.3, -0.4, 0.7]}
 LOW = {"kind": "POINT", "name": "Candle", "energy": 4.0, "color": [0.9, 0.3, 0.1], "location": [-0.8, 0.5, 0.2]}
 
@@ -97,13 +97,13 @@ def test_albedo_over_pi(make_asset, emitted) -> None:
 
 
 def test_lights_that_come_later(make_asset, emitted) -> None:
-    """A lamp and a sun added after Show: the handler sees to the weights, and to the nodes of one lamp more."""
+    """A point light and a sun added after Show: the handler updates the weights, and adds nodes for the point light."""
     asset = make_asset()
     spot = {**POINT, "kind": "SPOT", "name": "Spot"}
     found, response = emitted(asset, [SUN, spot], later=[SECOND, POINT])
     lights = [light_of(point_light) for point_light in (SUN, SECOND, POINT)]
     assert (np.abs(found - relight(asset, lights)) <= tolerance(asset, lights)).all()
-    assert response["notes"] == ["not shown: light of Spot (suns and points are)"]
+    assert response["notes"] == ["not shown: light of Spot (only suns and point lights are)"]
 
 
 def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:
@@ -114,7 +114,7 @@ def test_a_layer_that_the_bake_made(make_asset, emitted, tmp_path) -> None:
     (tmp_path / "capture" / "uv.json").write_text(json.dumps({"uv_layer": "srbf lightmap", "per_loop": turned}))
     found, _ = emitted(asset, [SUN], capture=str(tmp_path / "capture"), layer="other")
     lights = [light_of(SUN)]
-    # what is emitted is baked into the plane's own active layer: there the picture stands on its head
+    # what is emitted is baked into the plane's own active layer: there the picture is upside down
     assert (np.abs(found[::-1, ::-1] - relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 

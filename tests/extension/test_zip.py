@@ -11,6 +11,7 @@ import pytest
 
 pytestmark = pytest.mark.blender
 ROOT = Path(__file__).parents[2]
+OWN = ["srbf-0.1.0-py3-none-any.whl", "srbf_blender-0.1.0-py3-none-any.whl"]
 FETCHED = ["numpy-2.3.0-cp313-cp313-win_amd64.whl", "scipy-1.17.0-cp313-cp313-win_amd64.whl", "rich-15.0.0-py3-none-any.whl"]
 
 
@@ -23,7 +24,7 @@ def building(monkeypatch):
 
     def pip(*arguments):
         calls.append([str(word) for word in arguments])
-        names = ["srbf-0.1.0-py3-none-any.whl"] if arguments[0] == "wheel" else FETCHED
+        names = OWN if arguments[0] == "wheel" else FETCHED
         folder = Path(arguments[arguments.index("--wheel-dir" if arguments[0] == "wheel" else "--dest") + 1])
         folder.mkdir(exist_ok=True)
         for name in names:
@@ -40,7 +41,7 @@ def test_the_zip_builds_and_validates(building, tmp_path) -> None:
         names = set(archive.namelist())
         manifest = tomllib.loads(archive.read("blender_manifest.toml").decode())
         assert b"GNU GENERAL PUBLIC LICENSE" in archive.read("LICENSE")
-    kept = {f"wheels/{name}" for name in [*FETCHED[1:], "srbf-0.1.0-py3-none-any.whl"]}
+    kept = {f"wheels/{name}" for name in [*FETCHED[1:], *OWN]}
     assert {name for name in names if name.endswith(".whl")} == kept == {name.removeprefix("./") for name in manifest["wheels"]}
     assert {path.name for path in (ROOT / "blender_extension").glob("*.py")} == {name for name in names if name.endswith(".py")}
     assert (manifest["version"], manifest["blender_version_min"], manifest["platforms"]) == ("0.1.0", "5.1.0", ["windows-x64"])

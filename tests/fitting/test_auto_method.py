@@ -39,12 +39,12 @@ def smooth(bumps: np.random.Generator):
 
 @pytest.fixture
 def shadows(make_capture) -> Capture:
-    return make_capture(shadowed(np.random.default_rng(0)), lights=150, validation=20, holdout=0, encoding="half", name="shadows").kept()
+    return make_capture(shadowed(np.random.default_rng(0)), lights=150, validation=20, holdout=0, encoding="half", name="shadows").load()
 
 
 @pytest.fixture
 def cosines(make_capture) -> Capture:
-    return make_capture(smooth(np.random.default_rng(1)), lights=60, validation=12, holdout=0, encoding="half").kept()
+    return make_capture(smooth(np.random.default_rng(1)), lights=60, validation=12, holdout=0, encoding="half").load()
 
 
 def size(method: EigenMap | ClusteredEigenMap, capture: Capture) -> int:
@@ -54,9 +54,9 @@ def size(method: EigenMap | ClusteredEigenMap, capture: Capture) -> int:
 @pytest.mark.slow
 def test_shadows_ask_for_clusters_and_smooth_light_does_not(shadows: Capture, cosines: Capture) -> None:
     clustered = within_budget(shadows, 9, spread=0.3, ridge=0.01)
-    assert isinstance(clustered, ClusteredEigenMap) and clustered.scalars == 8 and clustered.encoding == "uint8"
+    assert isinstance(clustered, ClusteredEigenMap) and clustered.components == 8 and clustered.encoding == "uint8"
     shared = within_budget(cosines, 9, spread=0.3, ridge=0.01)
-    assert isinstance(shared, EigenMap) and shared.scalars == 8
+    assert isinstance(shared, EigenMap) and shared.components == 8
     assert size(clustered, shadows) <= 9 and size(shared, cosines) <= 9
 
 
@@ -73,17 +73,18 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
     low, high = (size(within_budget(shadows, psnr=dB, say=said.append, **settings), shadows) for dB in (15.0, 25.0))
     assert low < high
     assert not any("at most" in line for line in said)
-    monkeypatch.setattr("srbf.fitting.auto_method.MOST_COMPONENTS", 4)
+    monkeypatch.setattr("srbf.fitting.auto_method.MOST_SIZE", 8)
     within_budget(shadows, psnr=90.0, say=said.append, **settings)
     assert "expected 90 dB" in said[-2] and said[-1].startswith("chose")
 
 
 def test_train_lights_stand_in_for_validation(make_capture) -> None:
-    capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).kept()
+    capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).load()
     assert isinstance(within_budget(capture, 4), EigenMap)
-    few = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS - 1, holdout=3, name="few").kept()
-    with pytest.raises(InputError, match=f"at least {LEAST_LIGHTS} train lights"):
-        within_budget(few, 4)
+    few = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS - 1, holdout=3, name="few").load()
+    said: list[str] = []
+    assert within_budget(few, 4, say=said.append) == EigenMap(components=4, encoding="uint8")
+    assert f"fewer than {LEAST_LIGHTS} train lights" in said[0]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from srbf.errors import InputError
 from srbf.fitting.fewer_maps import keep
-from srbf.methods import directional_responses
+from srbf.methods import responses
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
@@ -27,8 +27,8 @@ def test_projection_keeps_the_picture_where_dropping_does_not(make_capture) -> N
     asset = RelightingMap(k=25, encoding="float").encode(make_capture(smooth, lights=80))
     kept = keep(asset, 12)
     directions = all_around("hemisphere", 300)
-    before = directional_responses(asset, directions)
-    change = np.sqrt(((directional_responses(kept, directions) - before) ** 2).mean())
+    before = responses(asset, directions)
+    change = np.sqrt(((responses(kept, directions) - before) ** 2).mean())
     assert change < 0.05 * before.std()
     assert change < 0.1 * np.sqrt(((dropped(asset, 12) - before) ** 2).mean())
     assert kept.manifest["source"]["kept"]["relative_residual"] == pytest.approx(change / np.sqrt((before**2).mean()), rel=0.2)
@@ -43,12 +43,12 @@ def test_keeping_fewer_loses_more(make_capture) -> None:
 @pytest.mark.slow
 def test_an_eigen_map_drops_its_last_planes(make_capture, tmp_path) -> None:
     capture = make_capture(smooth, lights=80)
-    asset, fewer = EigenMap(scalars=6, encoding="float").encode(capture), EigenMap(scalars=3, encoding="float").encode(capture)
+    asset, fewer = EigenMap(components=6, encoding="float").encode(capture), EigenMap(components=3, encoding="float").encode(capture)
     kept = keep(asset, 3)
     kept.save(tmp_path / "kept")
     directions = all_around("hemisphere", 50)
     opened = type(kept).open(tmp_path / "kept")
-    np.testing.assert_allclose(directional_responses(opened, directions), directional_responses(fewer, directions), atol=1e-4)
+    np.testing.assert_allclose(responses(opened, directions), responses(fewer, directions), atol=1e-4)
 
 
 def test_what_cannot_be_kept_is_refused(make_capture) -> None:
@@ -57,4 +57,4 @@ def test_what_cannot_be_kept_is_refused(make_capture) -> None:
     with pytest.raises(InputError, match="1 to 4"):
         keep(asset, 5)
     with pytest.raises(InputError, match="clustered"):
-        keep(ClusteredEigenMap(clusters=2, scalars=2).encode(capture), 1)
+        keep(ClusteredEigenMap(clusters=2, components=2).encode(capture), 1)

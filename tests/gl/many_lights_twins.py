@@ -1,4 +1,4 @@
-"""Twins of the functions for many lights in one pass, folded weights, R by formula and skies."""
+"""Twins of the functions for many lights in one pass, projected weights, R by formula and environments."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from srbf.basis import gaussian, octahedral_table
 from srbf.gl.coefficient_maps import projected_rows
 from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import packed_point_lights, padded, point_light_uniforms
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples, light_vectors
 from srbf.methods import coefficient_maps as coefficient_maps
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import basis_weights, linear_response, projected_weights
+from srbf.methods import linear_response, projected_weights
+from srbf.methods.relighting_map import basis_weights
 from srbf.sphere import octahedral_encode
 
 SUNS: list[Light] = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
@@ -27,7 +27,7 @@ POINT_LIGHTS = [
     replace(SPOT, position=(0.0, 0.0, 50.0), inner=0.0, outer=1e-4),  # passes every receiver by
     replace(SPOT, falloff="linear", inner=0.2, outer=1.2),
 ]
-PLACES = 8  # more than there are lamps
+PLACES = 8  # more than there are point lights
 MANY = "pointLights, pointLightCount"
 COUNT = {"pointLightCount": len(POINT_LIGHTS)}
 
@@ -110,7 +110,7 @@ def _(evaluate: Evaluate, make_asset: Callable[..., Asset]) -> None:
                 defines=defines[by],
             )[:, 0]
             np.testing.assert_allclose(found, expected[:, i], atol=SUM)
-    assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that each is told from the other
+    assert np.abs(exact["table"] - exact["formula"]).max() > SUM  # so that a mix-up shows
 
 
 @twin("lights/unpack_point_light.glsl")
@@ -161,7 +161,7 @@ def _(evaluate: Evaluate) -> None:
         )
 
     vectors = [light_vectors(light, positions) for light in POINT_LIGHTS]
-    strengths = np.stack([strength for _, strength in vectors])  # (lamps, N)
+    strengths = np.stack([strength for _, strength in vectors])  # (lights, N)
     shines = strengths > 0
     edge = (shines & (strengths < 1e-5)).any(axis=0)  # a cone's edge: single precision may say otherwise
     assert edge.sum() < N / 10 and len({*shines.sum(axis=0)}) > 1
@@ -178,7 +178,7 @@ def _(evaluate: Evaluate) -> None:
 
 
 def _far_and_point_lights(asset: Asset) -> tuple[dict[str, Any], np.ndarray]:
-    """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and LAMPS."""
+    """What the functions of relighting maps read, for one row of N receivers, and the bound on sums over SUNS and POINT_LIGHTS."""
     weights = projected_weights(asset, SUNS)
     positions = asset.images["position"][0]
     bias = np.abs(asset.bias[:, None])
@@ -333,14 +333,14 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
         images={"gaussians": np.pad(gaussians, ((0, 0), (0, 1)))[None], "coefficients": rows},
     )[:, :3]
     sizes = np.abs(functions.coefficients).sum(axis=1) * gaussians.max()
-    assert (np.abs(found - coefficient_maps.projected_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
+    assert (np.abs(found - projected_weights(asset, [ENVIRONMENT])) <= SUM * sizes).all()
 
 
 def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any], np.ndarray]:
-    """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `lamps`."""
-    weights = coefficient_maps.projected_weights(asset, SUNS)
-    bias = coefficient_maps.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
-    planes = np.abs(coefficient_maps.planes_of(asset.coefficients(), asset.scalars)[:, 0]) + 2 * bias
+    """What the functions of planes read, for one row of M receivers, and the bound on sums over SUNS and `point_lights`."""
+    weights = projected_weights(asset, SUNS)
+    bias = coefficient_maps.components_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.components)[:, 0]
+    planes = np.abs(coefficient_maps.components_of(asset.coefficients(), asset.components)[:, 0]) + 2 * bias
     terms = np.concatenate([np.ones((1, M)), planes])  # (S + 1, M)
     function = coefficient_maps.first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
     bound = np.einsum("fn,nfc->nc", terms, np.abs(weights[function]))
@@ -360,7 +360,7 @@ def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any
             "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias, "pointLights": packed_point_lights(point_lights, PLACES)},
-        "defines": {"SRBF_COMPONENTS": asset.scalars, "SRBF_POINT_LIGHTS": PLACES},
+        "defines": {"SRBF_COMPONENTS": asset.components, "SRBF_POINT_LIGHTS": PLACES},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS]; uniform vec4 pointLights[4 * SRBF_POINT_LIGHTS]; "
         "uniform int pointLightCount;",
         "uniforms": COUNT,
@@ -369,7 +369,7 @@ def _planes(asset: Asset, point_lights: list[PointLight]) -> tuple[dict[str, Any
 
 
 def _equals_planes(found: np.ndarray, asset: Asset, lights: list[Any], bound: np.ndarray) -> None:
-    assert (np.abs(found[:, :3] - coefficient_maps.linear_response(asset, lights)[0]) <= bound).all()
+    assert (np.abs(found[:, :3] - linear_response(asset, lights)[0]) <= bound).all()
     assert (np.abs(found[:, :3]) > bound).any()
 
 
@@ -408,7 +408,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
 def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(K, None, "uint8", 1, M)
     uploads, bound = _planes(asset, [])
-    rows = projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS))[0]
+    rows = projected_rows(asset, projected_weights(asset, SUNS))[0]
     offset = ", ".join(map(repr, rows[0, :3].tolist()))
     found = evaluate(
         "combine/components_projected.glsl",
@@ -432,7 +432,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
         vec4(asset.tables["cluster_index"][0]),
         images={
             "planes": uploads["images"]["planes"],
-            "weights": projected_rows(asset, coefficient_maps.projected_weights(asset, SUNS)),
+            "weights": projected_rows(asset, projected_weights(asset, SUNS)),
         },
         defines={"SRBF_COMPONENTS": K},
     )

@@ -1,4 +1,4 @@
-"""Skies integrated by shaders: the weights of every method, and pictures lit by them, against numpy."""
+"""Environments integrated by shaders: the weights of every method, and pictures lit by them, against numpy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SUM = 1e-5  # the contract, of the sum of all terms' sizes
 TURN = [[0, 0, 2.0, 0.1], [2.0, 0, 0, 0.2], [0, 2.0, 0, -0.3], [0, 0, 0, 1]]  # lays the horizon on its side, twice as large
 
 
-def sky(seed: int) -> EnvironmentLight:
+def environment(seed: int) -> EnvironmentLight:
     image = np.random.default_rng(seed).random((9, 20, 3)).astype(np.float32) ** 4  # its middle row straddles the horizon
     return EnvironmentLight(image, (0.3, 0.2, 0.1))
 
@@ -34,7 +34,8 @@ def asset(request: Any, make_asset: Callable[..., Asset], make_planes: Callable[
 def sizes(asset: Asset) -> np.ndarray:
     """What the terms of a weight add up to at most, (F, 1)."""
     total = sum(
-        float((light.image.max(axis=2) * np.array(light.color).max()).sum()) / light.image[..., 0].size for light in (sky(1), sky(2))
+        float((light.image.max(axis=2) * np.array(light.color).max()).sum()) / light.image[..., 0].size
+        for light in (environment(1), environment(2))
     )
     if asset.method == "relighting-map":
         return np.full((asset.k, 1), 4 * np.pi * total)
@@ -43,16 +44,16 @@ def sizes(asset: Asset) -> np.ndarray:
 
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("domain", ["sphere", "hemisphere"])
-def test_the_weights_of_skies_are_numpys(context: Any, asset: Asset, domain: str, turned: bool) -> None:
+def test_the_weights_of_environments_are_numpys(context: Any, asset: Asset, domain: str, turned: bool) -> None:
     asset.manifest["domain"] = domain
     if turned:
         asset.manifest["asset_from_world"] = TURN
-    lights: list[Light] = [sky(1), DirectionalLight((0.3, 0.5, 0.8), (0.2, 0.8, 0.3)), sky(2)]
+    lights: list[Light] = [environment(1), DirectionalLight((0.3, 0.5, 0.8), (0.2, 0.8, 0.3)), environment(2)]
     with Relighter(asset, context=context, environments="gpu") as relighter:
         relighter.draw(lights)
-        assert relighter._sky is not None
+        assert relighter._environment is not None
         with context:
-            found = relighter._sky.read()
+            found = relighter._environment.read()
     expected = projected_weights(asset, lights)
     assert found.shape == expected.shape
     assert (np.abs(found - expected) <= SUM * (sizes(asset) + np.abs(expected))).all()
@@ -60,11 +61,11 @@ def test_the_weights_of_skies_are_numpys(context: Any, asset: Asset, domain: str
 
 
 @pytest.mark.parametrize("multipass", [False, True])
-def test_a_picture_under_skies_of_the_gpu_is_numpys(context: Any, asset: Asset, multipass: bool) -> None:
-    lights: list[Light] = [sky(1), PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0)), DirectionalLight((0.3, 0.5, 0.8)), sky(2)]
+def test_a_picture_under_environments_of_the_gpu_is_numpys(context: Any, asset: Asset, multipass: bool) -> None:
+    lights: list[Light] = [environment(1), PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0)), DirectionalLight((0.3, 0.5, 0.8)), environment(2)]
     with Relighter(asset, context=context, environments="gpu") as relighter:
         found = relighter.relight(lights, multipass=multipass)
-        assert (relighter.relight([sky(1)]) != relighter.relight([sky(2)])).any()  # it may change from frame to frame
+        assert (relighter.relight([environment(1)]) != relighter.relight([environment(2)])).any()  # it may change from frame to frame
         dark = relighter.relight([EnvironmentLight(np.zeros((3, 4, 3), np.float32))])
         assert (dark == 0).all()
     expected = methods.relight(asset, lights)

@@ -13,7 +13,7 @@ import pytest
 from srbf.errors import ShaderError
 from srbf.gl import includes
 from srbf.gl.context import compile_program
-from srbf.gl.includes import ShaderSource, resolve, resolve_text, shader_root
+from srbf.gl.includes import ShaderSource, dependence_order, resolve, resolve_text, shader_root
 
 Tree = Callable[[dict[str, str]], Path]
 
@@ -79,6 +79,18 @@ def test_comments_are_not_directives(tree: Tree) -> None:
     text = '/* an example:\n#include "nowhere.glsl"\n*/ // #include "nowhere.glsl"\n// /*\n#include "b.glsl"\n'
     root = tree({"a.frag": text, "b.glsl": "B\n"})
     assert resolve("a.frag", root=root).files == ("a.frag", "b.glsl")
+
+
+def test_dependence_puts_each_file_once_after_what_it_includes(tree: Tree) -> None:
+    files = {"x/a.glsl": '#include "b.glsl"\n#include "c.glsl"\n', "x/b.glsl": '#include "c.glsl"\n', "c.glsl": "float c;\n"}
+    files |= {"d.glsl": '/*\n#include "none.glsl"\n*/\n'}
+    root = tree(files)
+    assert list(dependence_order(["x/a.glsl", "d.glsl", "c.glsl"], root)) == ["c.glsl", "x/b.glsl", "x/a.glsl", "d.glsl"]
+    assert dependence_order(["d.glsl"], root)["d.glsl"] == files["d.glsl"]
+    with pytest.raises(ShaderError, match=r'cannot find "none\.glsl"'):
+        dependence_order(["none.glsl"], root)
+    with pytest.raises(ShaderError, match=r"e\.glsl -> f\.glsl -> e\.glsl"):
+        dependence_order(["e.glsl"], tree({"e.glsl": '#include "f.glsl"', "f.glsl": '#include "e.glsl"'}))
 
 
 def test_version_comes_first_then_defines(tree: Tree) -> None:

@@ -20,7 +20,7 @@ from srbf.methods import projected_weights
 from srbf.methods.coefficient_maps import first_function
 
 SIDE = 48  # pixels of the picture
-PLACES = 4  # of lamps, three of them used
+PLACES = 4  # of point lights, three of them used
 LIGHTS: list[Light] = [
     DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)),
     PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7),
@@ -88,7 +88,7 @@ def draw(context: Any, asset: Asset, corners: np.ndarray = CORNERS) -> tuple[np.
     point_lights = [light for light in inside if isinstance(light, PointLight)]
     weights = projected_weights(asset, LIGHTS)
     stage = "lightmap.frag" if maps else f"{asset.method.replace('-', '_')}_lightmap.frag"
-    defines = {"SRBF_POINT_LIGHTS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.scalars})
+    defines = {"SRBF_POINT_LIGHTS": PLACES} | ({"SRBF_K": asset.k, "SRBF_PAIRS": 1} if maps else {"SRBF_COMPONENTS": asset.components})
     with context, ExitStack() as resources:
         textures = AssetTextures(context, asset, Limits.of(context), resources)
         program = compile_program(context, resolve("stages/lightmap.vert"), telling(resolve(f"stages/{stage}", defines=defines)))
@@ -134,7 +134,7 @@ def draw(context: Any, asset: Asset, corners: np.ndarray = CORNERS) -> tuple[np.
 
 
 def expected_at(asset: Asset, texels: np.ndarray, positions: np.ndarray) -> np.ndarray:
-    """Numpy's answer of texels (n, 2: row, column) to LIGHTS, standing at positions (n, 3) of the asset's frame: an asset of one row."""
+    """Numpy's response of texels (n, 2: row, column) to LIGHTS, standing at positions (n, 3) of the asset's frame: an asset of one row."""
     rows, columns = texels.T
     images = {"position": positions[None].astype(np.float32), "ambient": asset.images["ambient"][rows, columns][None]}
     tables = dict(asset.tables)

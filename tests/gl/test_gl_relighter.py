@@ -13,9 +13,9 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import projected_weights, receiver_weights
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
+from srbf.methods import projected_weights
+from srbf.methods.relighting_map import receiver_weights
 from srbf.relighting.relighter import Relighter, relight
 
 FLOAT = 1e-5  # the contract, of sum |c_i R_i| a texel (times color and attenuation)
@@ -200,7 +200,7 @@ def test_ambient_is_added_after_the_clamp(context: Any, make_asset: Callable[...
 
 
 def test_lights_add_up_before_the_clamp(context: Any, make_asset: Callable[..., Asset]) -> None:
-    """One light answered by -2, another by +3: together 1, not 3."""
+    """One light of response -2, another of +3: together 1, not 3."""
     coefficients = np.empty((7, 4, 5, 3), np.float32)
     asset = make_asset(7, height=4, width=5, coefficients=coefficients * 0)
     basis = asset.basis
@@ -231,11 +231,11 @@ def test_positions_stay_in_their_row_and_column(context: Any, make_asset: Callab
     with Relighter(asset, context=context) as relighter:
         lit = relighter.relight([near])
     assert np.unravel_index(lit[..., 0].argmax(), lit.shape[:2]) == (1, 8)
-    assert (np.abs(lit - methods.relight(asset, [near])) <= tolerance(asset, [near])).all()  # a receiver in the lamp included
+    assert (np.abs(lit - methods.relight(asset, [near])) <= tolerance(asset, [near])).all()  # a receiver in the light included
 
 
 def test_a_point_light_far_from_the_origin_keeps_its_digits(context: Any, make_asset: Callable[..., Asset]) -> None:
-    """Single precision would place this lamp to within 0.1 mm, 3e-4 of its distance."""
+    """Single precision would place this light to within 0.1 mm, 3e-4 of its distance."""
     asset = make_asset(25)
     offset = np.array([2000.0, -3000.0, 500.0])
     asset.images["position"] = (asset.images["position"] + offset).astype(np.float32)
@@ -298,7 +298,7 @@ def test_harmonics_relight_far_lights_and_refuse_point_lights(context: Any, make
 
 
 @pytest.mark.parametrize(
-    ("limit", "text"), [({"array_layers": 5}, "at most 5 maps .* found 7"), ({"texture_size": 8}, "at most 8 texels a side")]
+    ("limit", "text"), [({"array_layers": 5}, "at most 5 layers .* found 7"), ({"texture_size": 8}, "at most 8 texels a side")]
 )
 def test_an_asset_too_large_for_the_gpu_is_refused(
     context: Any, make_asset: Callable[..., Asset], monkeypatch: Any, limit: dict[str, int], text: str
@@ -316,7 +316,7 @@ def test_wrong_settings_are_refused(context: Any, make_asset: Callable[..., Asse
     with Relighter(asset, context=context) as relighter, pytest.raises(InputError, match="1 to 8 texture units"):
         relighter.relight([], multipass=True, units=9)
     asset.manifest["method"] = "hologram"
-    with pytest.raises(InputError, match="relighting-map.*found hologram"):
+    with pytest.raises(InputError, match="relighting-map.*found 'hologram'"):
         Relighter(asset, context=context)
 
 

@@ -14,10 +14,9 @@ from srbf.asset import Asset
 from srbf.basis.octahedral_table import lookup
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, moved
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
 from srbf.methods import linear_response, projected_weights
-from srbf.methods.coefficient_maps import first_function, planes_of
-from srbf.methods.receivers import light_vectors
+from srbf.methods.coefficient_maps import components_of, first_function
 from srbf.relighting.relighter import Relighter
 
 FLOAT = 1e-5  # the contract, of sum |a_j w_j| a texel (times color and attenuation)
@@ -43,7 +42,7 @@ LIGHTS: dict[str, list[Light]] = {
     "hundred": [DirectionalLight((x, 0.2, 0.9), (0.01, 0.02, 0.03)) for x in np.linspace(-1, 1, 100).tolist()],
     "point": [PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "spot": [SPOT],
-    "two lamps": [SPOT, PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
+    "two lights": [SPOT, PointLight((0.4, -0.2, 1.1), (1.0, 0.5, 2.0), a0=0.7)],
     "several": [
         DirectionalLight((0.3, -0.5, 0.4), (0.2, 0.8, 0.3)),
         PointLight((-0.4, 0.6, -0.9), (1.0, 0.5, 2.0), falloff="inverse-square"),
@@ -56,7 +55,7 @@ LIGHTS: dict[str, list[Light]] = {
 
 def magnitude(asset: Asset, lights: Sequence[Light], of: np.ndarray | None = None) -> np.ndarray:
     """Sum over lights of color times attenuation times |w_0| + sum |a_j w_j|, (H, W, 3): what tolerances are relative to."""
-    planes = np.abs(planes_of(asset.coefficients(), asset.scalars)) if of is None else of
+    planes = np.abs(components_of(asset.coefficients(), asset.components)) if of is None else of
     terms = np.concatenate([np.ones_like(planes[:1]), planes])  # (S + 1, H, W)
     function = first_function(asset, slice(None))[..., None] + np.arange(len(terms))  # (H, W, S + 1)
     total = np.einsum("fhw,hwfc->hwc", terms, np.abs(projected_weights(asset, lights))[function])
@@ -81,7 +80,7 @@ def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> n
     allowed = FLOAT * bound + FINAL * ambient
     if asset.encoding == "uint8":
         bias = np.broadcast_to(asset.bias[:, None, None], asset.stored.shape)
-        sizes = planes_of(np.abs(asset.coefficients() - bias) + np.abs(bias), asset.scalars)
+        sizes = components_of(np.abs(asset.coefficients() - bias) + np.abs(bias), asset.components)
         allowed += DECODING * magnitude(asset, lights, sizes)
     return allowed
 
@@ -93,10 +92,10 @@ Get = Callable[[int, int | None, str, str], tuple[Asset, Relighter]]
 def relighter_of(context: Any, make_planes: Callable[..., Asset]) -> Iterator[Get]:
     made: dict[tuple[int, int | None, str, str], tuple[Asset, Relighter]] = {}
 
-    def get(scalars: int, clusters: int | None, encoding: str, target: str) -> tuple[Asset, Relighter]:
-        key = (scalars, clusters, encoding, target)
+    def get(components: int, clusters: int | None, encoding: str, target: str) -> tuple[Asset, Relighter]:
+        key = (components, clusters, encoding, target)
         if key not in made:
-            asset = make_planes(scalars, clusters, encoding)
+            asset = make_planes(components, clusters, encoding)
             made[key] = asset, Relighter(asset, target=target, context=context)  # type: ignore[arg-type]
         return made[key]
 
@@ -108,9 +107,9 @@ def relighter_of(context: Any, make_planes: Callable[..., Asset]) -> Iterator[Ge
 @pytest.mark.parametrize("kind", LIGHTS)
 @pytest.mark.parametrize("encoding", ENCODINGS)
 @pytest.mark.parametrize("clusters", CLUSTERS)
-@pytest.mark.parametrize("scalars", SCALARS)
-def test_equals_numpy(relighter_of: Get, scalars: int, clusters: int | None, encoding: str, kind: str) -> None:
-    asset, relighter = relighter_of(scalars, clusters, encoding, "float")
+@pytest.mark.parametrize("components", SCALARS)
+def test_equals_numpy(relighter_of: Get, components: int, clusters: int | None, encoding: str, kind: str) -> None:
+    asset, relighter = relighter_of(components, clusters, encoding, "float")
     lights = LIGHTS[kind]
     expected = methods.relight(asset, lights)
     assert expected.max() > 0
@@ -163,7 +162,7 @@ def test_more_layers_than_uniforms_hold_take_several_passes(
         assert (np.abs(relighter.relight(lights) - methods.relight(asset, lights)) <= tolerance(asset, lights)).all()
 
 
-def test_three_hundred_scalars(context: Any, make_planes: Callable[..., Asset]) -> None:
+def test_three_hundred_components(context: Any, make_planes: Callable[..., Asset]) -> None:
     asset = make_planes(300, None, "half")
     with Relighter(asset, context=context) as relighter:
         for kind in ("several", "point"):
@@ -188,7 +187,7 @@ def test_direct_light_is_added_before_the_clamp_and_ambient_after(
 def test_every_texel_stays_in_its_row_and_column(context: Any, make_planes: Callable[..., Asset], clusters: int | None) -> None:
     asset = make_planes(9, clusters, height=6, width=11)
     size, wide = asset.manifest["w_table"]["size"], asset.manifest["w_table"]["columns"]
-    for mean in range(0, asset.clusters * (asset.scalars + 1), asset.scalars + 1):  # which every texel would show
+    for mean in range(0, asset.clusters * (asset.components + 1), asset.components + 1):  # which every texel would show
         asset.tables["light_coefficients"][mean] = 0
         top, left = mean // wide * size, mean % wide * size
         asset.tables["w_table"][top : top + size, left : left + size] = 0
@@ -227,7 +226,7 @@ def test_point_lights_need_positions(context: Any, make_planes: Callable[..., As
 
 @pytest.mark.parametrize(
     ("limit", "text"),
-    [({"array_layers": 2}, "at most 2 images of planes .* found 3"), ({"texture_size": 60}, "at most 60 texels a side")],
+    [({"array_layers": 2}, "at most 2 layers .* found 3"), ({"texture_size": 60}, "at most 60 texels a side")],
 )
 def test_planes_too_many_for_the_gpu_are_refused(
     context: Any, make_planes: Callable[..., Asset], monkeypatch: Any, limit: dict[str, int], text: str
@@ -245,7 +244,7 @@ def test_filtering_comes_after_reconstruction_where_clusters_meet(make_planes: C
     rng = np.random.default_rng(8)
     uv = (rng.integers(0, 256, (300, 2)) + 0.5) / 256  # exact in float32
     corners, shares = neighbors(uv, asset)
-    scalars = planes_of(asset.coefficients(), asset.scalars)
+    components = components_of(asset.coefficients(), asset.components)
     expected = np.einsum("nk,nkc->nc", shares, linear_response(asset, lights)[corners[..., 0], corners[..., 1]])
     size = np.einsum("nk,nkc->nc", shares, magnitude(asset, lights)[corners[..., 0], corners[..., 1]])
     uploads = {
@@ -256,14 +255,14 @@ def test_filtering_comes_after_reconstruction_where_clusters_meet(make_planes: C
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS];",
-        "defines": {"SRBF_COMPONENTS": asset.scalars},
+        "defines": {"SRBF_COMPONENTS": asset.components},
     }
     call = "srbfClusteredDirectionalFiltered(planes, clusters, a.xy, 0, weights, scale, bias)"
     places = np.pad(uv, ((0, 0), (0, 2))).astype(np.float32)
     found = evaluate("methods/clustered_eigen_map.glsl", f"vec4({call}, 0.0)", places, **uploads)[:, :3]
     assert (np.abs(found - expected) <= FLOAT * size).all()
 
-    mixed = np.einsum("nk,jnk->jn", shares, scalars[:, corners[..., 0], corners[..., 1]])
+    mixed = np.einsum("nk,jnk->jn", shares, components[:, corners[..., 0], corners[..., 1]])
     texel = np.minimum((uv * [asset.width, asset.height]).astype(int), [asset.width - 1, asset.height - 1])
     own = asset.tables["cluster_index"][texel[:, 1], texel[:, 0]]
     filtered_first = weights[own, 0] + np.einsum("jn,njc->nc", mixed, weights[own, 1:])

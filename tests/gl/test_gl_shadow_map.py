@@ -24,8 +24,10 @@ EDGES = 0.05  # rms where 3 x 3 texels of a 2048-texel map are softer than a ray
 @pytest.fixture(scope="module")
 def scene() -> Any:
     pane = quad([0.2, -0.9, 0.3], [0.9, -0.9, 0.5], [0.9, 0.9, 0.5], [0.2, 0.9, 0.3])
-    tint = np.linspace(0.2, 1.2, 24).reshape(8, 3)
-    return build_plane(ball(0.4, [-0.4, 0, 0.6]), panes=(pane, pane + np.float32([0, 0, 0.2])), tint=tint, size=64, footprint=1.0)
+    transmittance = np.linspace(0.2, 1.2, 24).reshape(8, 3)
+    return build_plane(
+        ball(0.4, [-0.4, 0, 0.6]), panes=(pane, pane + np.float32([0, 0, 0.2])), transmittance=transmittance, size=64, footprint=1.0
+    )
 
 
 @pytest.mark.parametrize("number", range(4))
@@ -38,7 +40,7 @@ def test_it_equals_rays_away_from_edges(context: Any, scene: Any, number: int) -
     spread = ndimage.maximum_filter(rays, (5, 5, 1)) - ndimage.minimum_filter(rays, (5, 5, 1))
     inside = spread.max(axis=2) < 0.02
     assert inside.mean() > 0.5 and rays[inside].min() < rays[inside].max()
-    np.testing.assert_allclose(mapped[inside], rays[inside], atol=0.01)  # half floats of the tints
+    np.testing.assert_allclose(mapped[inside], rays[inside], atol=0.01)  # half floats of the transmittances
     assert np.sqrt(((mapped - rays) ** 2).mean()) < EDGES
 
 
@@ -62,7 +64,7 @@ def test_a_wide_sun_softens_it(context: Any) -> None:
 
 def test_point_lights_are_refused_and_environments_pass(context: Any) -> None:
     with ShadowMapper(build_plane(), context=context) as mapper:
-        with pytest.raises(InputError, match="--direct ray"):
+        with pytest.raises(InputError, match="direct='ray'"):
             mapper.response([PointLight((0.0, 0.0, 1.0))])
         assert (mapper.response([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
 

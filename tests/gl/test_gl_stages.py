@@ -20,7 +20,7 @@ FILES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*") if 
 # 384 scalars are 96 layers, 192 of the 224 vec4 that ES 3.00 promises; more take passes of some layers
 PLANES: list[dict[str, object]] = [{"SRBF_COMPONENTS": s} for s in (1, 9, 384)] + [{"SRBF_COMPONENTS": 1024, "SRBF_LAYERS": 64}]
 PROJECTED: list[dict[str, object]] = [{"SRBF_COMPONENTS": s} for s in (1, 9, 288)]  # three vec4 a layer
-# 4 vec4 a map, 2 a layer, 4 a lamp, within the same 224
+# 4 vec4 per map, 2 per layer, 4 per point light, within the same 224
 POINT_LIGHTS: list[dict[str, object]] = [{"SRBF_POINT_LIGHTS": 1}, {"SRBF_POINT_LIGHTS": 16}, {"SRBF_POINT_LIGHTS": 16, "SRBF_DEPTH": 1}]
 SAMPLED: dict[str, object] = {"SRBF_PAIRS": 1, "SRBF_SAMPLED": 1}
 LIT_MAPS = [{"SRBF_K": k} | point_lights for k in (1, 25, 32) for point_lights in POINT_LIGHTS] + [
@@ -54,8 +54,8 @@ def test_every_method_has_the_same_stages() -> None:
     kinds = ["accumulate", "directional", "projected", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
     shadows = ["direct.frag", "direct_on_mesh.frag", "shadow.vert", "shadow_height.frag", "shadow_transmittance.frag"]
-    skies = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
-    assert sorted([*methods, *shadows, *skies, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    environments = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
+    assert sorted([*methods, *shadows, *environments, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])
@@ -146,7 +146,9 @@ def test_the_readme_says_what_every_stage_and_define_takes() -> None:
             if not name.startswith("environment_"):
                 assert f"`{uniform}`" in after or f"`{uniform}[" in after, f"{name}: {uniform}"
     for file in FILES:
-        for define in re.findall(r"\bSRBF_(?:K|SCALARS|LAYERS|LAMPS|UNITS|PLAIN|PAIRS|SAMPLED|FORMULA|DEPTH)\b", (ROOT / file).read_text()):
+        for define in re.findall(
+            r"\bSRBF_(?:K|COMPONENTS|LAYERS|POINT_LIGHTS|UNITS|PLAIN|PAIRS|SAMPLED|FORMULA|DEPTH)\b", (ROOT / file).read_text()
+        ):
             assert f"| `{define}` |" in after
 
 

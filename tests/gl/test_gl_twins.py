@@ -20,11 +20,11 @@ from srbf.basis import octahedral_table
 from srbf.basis.gaussian import lookup, r_table
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import padded
-from srbf.lights import DirectionalLight, PointLight, attenuation, spot_cone
+from srbf.lights import DirectionalLight, PointLight, attenuation, light_vectors, spot_cone
 from srbf.methods import coefficient_maps as coefficient_maps
+from srbf.methods import linear_response, projected_weights, relight
 from srbf.methods.coefficient_maps import first_function
-from srbf.methods.receivers import light_vectors
-from srbf.methods.relighting_map import linear_response, receiver_weights, relight
+from srbf.methods.relighting_map import receiver_weights
 from srbf.sphere import normalize, octahedral_encode
 from srbf.visibility import shadow
 
@@ -300,7 +300,7 @@ def _(evaluate: Evaluate, make_planes: Callable[..., Asset]) -> None:
     expression = "vec4(srbfClusterIndex(clusters, ivec2(a.x, 0)))"
     images = {"clusters": (bytes_ / np.float32(255))[None, :, None]}
     found = evaluate("combine/cluster_index.glsl", expression, vec4(bytes_), images=images)[:, 0]
-    assert (found * (asset.scalars + 1) == first_function(asset, slice(None))[0]).all()
+    assert (found * (asset.components + 1) == first_function(asset, slice(None))[0]).all()
 
 
 SUNS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0.3, 0.1, 0.4))]
@@ -308,7 +308,7 @@ SUNS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.5, 0.2)), DirectionalLight((-0
 
 def _plane_uploads(asset: Asset) -> dict[str, Any]:
     """Everything that the plane functions read, for one row of M receivers, decoded from floats that are stored / 255."""
-    weights = coefficient_maps.projected_weights(asset, SUNS).reshape(asset.clusters, -1, 3)
+    weights = projected_weights(asset, SUNS).reshape(asset.clusters, -1, 3)
     return {
         "images": {
             "planes": asset.stored.astype(np.float32) / 255,
@@ -317,7 +317,7 @@ def _plane_uploads(asset: Asset) -> dict[str, Any]:
             "clusters": asset.tables.get("cluster_index", np.zeros((1, M), np.uint8))[..., None] / np.float32(255),
         },
         "arrays": {"scale": asset.scale, "bias": asset.bias},
-        "defines": {"SRBF_COMPONENTS": asset.scalars},
+        "defines": {"SRBF_COMPONENTS": asset.components},
         "declarations": "uniform vec4 scale[SRBF_LAYERS]; uniform vec4 bias[SRBF_LAYERS];",
     }
 
@@ -326,12 +326,12 @@ def _equals_planes(evaluate: Evaluate, file: str, call: str, asset: Asset, light
     """`call` against linear_response, within the contract's share of |w_0| + sum (|stored scale| + |bias|) |w_j|."""
     found = evaluate(file, f"vec4({call}, 0.0)", *rows, **_plane_uploads(asset))[:, :3]
     lights: list[Any] = SUNS if light is None else [light]
-    bias = coefficient_maps.planes_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.scalars)[:, 0]
-    planes = coefficient_maps.planes_of(asset.coefficients(), asset.scalars)[:, 0]
+    bias = coefficient_maps.components_of(np.broadcast_to(np.abs(asset.bias[:, None, None]), asset.stored.shape), asset.components)[:, 0]
+    planes = coefficient_maps.components_of(asset.coefficients(), asset.components)[:, 0]
     terms = np.concatenate([np.ones((1, M)), np.abs(planes) + 2 * bias])  # (S + 1, M)
     function = first_function(asset, slice(None))[0][:, None] + np.arange(len(terms))  # (M, S + 1)
     if light is None:
-        weights = coefficient_maps.projected_weights(asset, lights)[function]
+        weights = projected_weights(asset, lights)[function]
     else:
         positions = asset.images["position"][0]
         unit, _ = light_vectors(light, positions)
@@ -340,7 +340,7 @@ def _equals_planes(evaluate: Evaluate, file: str, call: str, asset: Asset, light
         places = np.broadcast_to(unit[:, None], (*function.shape, 3))
         weights = octahedral_table.lookup(asset.tables["w_table"], size, columns, function, places) * strength[:, None, None] * light.color
     bound = np.einsum("fn,nfc->nc", terms, np.abs(weights))
-    assert (np.abs(found - coefficient_maps.linear_response(asset, lights)[0]) <= SUM * bound).all()
+    assert (np.abs(found - linear_response(asset, lights)[0]) <= SUM * bound).all()
     assert (bound > 0).any()
 
 

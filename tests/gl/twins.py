@@ -16,7 +16,7 @@ UNIT = 4 * EPS  # a few roundings of numbers near 1
 SUM = 1e-5  # the contract, of sum |c_i R_i|
 
 N = 97
-M = 64  # texels a row of planes: their centers are exact in float32
+M = 64  # texels per row of planes: their centers are exact in float32
 K = 5
 SPOT = SpotLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, direction=(0.1, 0.2, -1.0), inner=0.3, outer=0.7, falloff="inverse-square")
 POINT = PointLight((0.3, 0.2, 0.9), (0.5, 1.0, 2.0), a0=0.8, radius=0.7)

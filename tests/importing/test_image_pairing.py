@@ -88,13 +88,13 @@ def test_a_folder_of_exports(tmp_path: Path) -> None:
 def test_images_beside_the_lists_folder_need_leave(tmp_path: Path) -> None:
     image = png(tmp_path / "jpeg-exports" / "a.png")
     light_list = list_of(tmp_path / "lists", "../jpeg-exports/a.png")
-    with pytest.raises(ImageError, match="followed only below --images FOLDER; add --images .*jpeg-exports"):
+    with pytest.raises(ImageError, match="followed only below `images`; add `images=.*jpeg-exports"):
         found(light_list)
     for leave in (tmp_path / "jpeg-exports", tmp_path):
         assert found(light_list, leave) == ([image], [])
     assert found(list_of(tmp_path / "lists", "a.png"), tmp_path / "jpeg-exports") == ([image], [])
     assert found(list_of(tmp_path / "lists", str(image)), tmp_path / "jpeg-exports") == ([image], [])
-    with pytest.raises(ImageError, match="--images"):
+    with pytest.raises(ImageError, match="`images`"):
         found(light_list, tmp_path / "none")
     with pytest.raises(ImageError, match="outside"):
         found(list_of(tmp_path / "lists", str(image)))

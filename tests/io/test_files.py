@@ -104,7 +104,7 @@ def test_force_never_replaces_a_folder_that_is_not_ours(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("years of work")
     with pytest.raises(OutputExistsError, match=r"asset\.json"), files.atomic_folder(tmp_path, True, "asset.json"):
         pass
-    with pytest.raises(OutputExistsError, match="--force"), files.atomic_folder(tmp_path, False, "asset.json"):
+    with pytest.raises(OutputExistsError, match="force=True"), files.atomic_folder(tmp_path, False, "asset.json"):
         pass
     assert (tmp_path / "thesis.txt").read_text() == "years of work"
 

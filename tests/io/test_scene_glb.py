@@ -43,11 +43,11 @@ def test_transmission_is_a_tint_and_extras_win() -> None:
         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.5}},
     }
     found = read_triangles(glb(meshes=meshes, materials=[glass]))
-    np.testing.assert_allclose(found.tints[found.material[0]], np.tile([0.25, 0.125, 0.5], (KNOTS, 1)))
+    np.testing.assert_allclose(found.transmittance[found.material[0]], np.tile([0.25, 0.125, 0.5], (KNOTS, 1)))
     assert found.filters.all() and not found.occluders.any()
     curve = np.linspace(0, 2, 3 * KNOTS).reshape(KNOTS, 3)
     found = read_triangles(glb(meshes=meshes, materials=[{**glass, "extras": {"tint_by_cosine": curve.tolist()}}]))
-    np.testing.assert_allclose(found.tints[found.material[0]], curve, rtol=1e-6)
+    np.testing.assert_allclose(found.transmittance[found.material[0]], curve, rtol=1e-6)
 
 
 def test_what_casts_no_shadow_does_not_occlude() -> None:

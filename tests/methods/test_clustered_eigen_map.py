@@ -8,7 +8,8 @@ import pytest
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap, directional_responses
+from srbf.methods import responses
+from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 
 pytest.importorskip("sklearn")
@@ -17,32 +18,32 @@ EXACT = 1e-3  # relative: float32 planes and axes, values in a range of their ow
 HEIGHT, WIDTH = 18, 20
 
 
-def planted(clusters: int, scalars: int, seed: int = 0):
-    """(answer, labels): every texel in one of `clusters`, each with a mean and `scalars` RGB functions of its own."""
+def planted(clusters: int, components: int, seed: int = 0):
+    """(response, labels): every texel in one of `clusters`, each with a mean and `components` RGB functions of its own."""
     rng = np.random.default_rng(seed)
     labels = rng.integers(clusters, size=(HEIGHT, WIDTH))
-    planes = rng.normal(size=(scalars, HEIGHT, WIDTH))
+    planes = rng.normal(size=(components, HEIGHT, WIDTH))
 
     def response(direction: np.ndarray) -> np.ndarray:
-        means, functions = rng.normal(size=(clusters, 3)) * 2, rng.normal(size=(clusters, scalars, 3))
+        means, functions = rng.normal(size=(clusters, 3)) * 2, rng.normal(size=(clusters, components, 3))
         return means[labels] + np.einsum("jhw,hwjc->hwc", planes, functions[labels])
 
     return response, labels
 
 
-@pytest.mark.parametrize(("clusters", "scalars"), [(1, 4), (4, 2), (5, 1)])
-def test_planted_clusters_are_reproduced(make_capture, clusters: int, scalars: int) -> None:
-    response, labels = planted(clusters, scalars)
+@pytest.mark.parametrize(("clusters", "components"), [(1, 4), (4, 2), (5, 1)])
+def test_planted_clusters_are_reproduced(make_capture, clusters: int, components: int) -> None:
+    response, labels = planted(clusters, components)
     capture: Capture = make_capture(response, lights=40, holdout=0)
-    asset = ClusteredEigenMap(clusters, scalars, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
+    asset = ClusteredEigenMap(clusters, components, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
     expected = np.stack([capture.image(i) for i in capture.indices("train")])
-    got = directional_responses(asset, capture.directions())
+    got = responses(asset, capture.directions())
     np.testing.assert_allclose(got, expected, atol=EXACT * np.abs(expected).max())
     index = asset.tables["cluster_index"]
     assert len(set(zip(labels.ravel().tolist(), index.ravel().tolist(), strict=True))) == clusters
     if clusters > 1:  # which as many scalars for all texels do not
-        shared = EigenMap(scalars, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
-        assert np.abs(directional_responses(shared, capture.directions()) - expected).max() > 0.1 * np.abs(expected).max()
+        shared = EigenMap(components, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
+        assert np.abs(responses(shared, capture.directions()) - expected).max() > 0.1 * np.abs(expected).max()
 
 
 def test_one_cluster_is_an_eigen_map(make_capture) -> None:
@@ -50,10 +51,10 @@ def test_one_cluster_is_an_eigen_map(make_capture) -> None:
     waves = rng.normal(size=(HEIGHT, WIDTH, 3, 3))
     capture = make_capture(lambda d: np.sin(waves @ d), lights=60)
     directions = capture.directions(capture.indices("holdout"))
-    settings = {"scalars": 5, "spread": 0.5, "ridge": 0.01, "encoding": "float"}
-    expected = directional_responses(EigenMap(**settings).encode(capture), directions)
+    settings = {"components": 5, "spread": 0.5, "ridge": 0.01, "encoding": "float"}
+    expected = responses(EigenMap(**settings).encode(capture), directions)
     # The center of a cluster's range and the mean of the sample differ, their sums do not; axes come of few steps of iteration.
-    got = directional_responses(ClusteredEigenMap(clusters=1, **settings).encode(capture), directions)
+    got = responses(ClusteredEigenMap(clusters=1, **settings).encode(capture), directions)
     assert np.sqrt(((got - expected) ** 2).mean()) < 0.01 * np.sqrt((expected**2).mean())
 
 
@@ -71,11 +72,11 @@ def test_every_scalar_spans_its_clusters_range(make_capture) -> None:
 
 def test_bytes_cost_little(make_capture) -> None:
     response, _ = planted(4, 3, seed=5)
-    capture = make_capture(response, lights=60, holdout=0).kept()
+    capture = make_capture(response, lights=60, holdout=0).load()
     settings = {"spread": 0.3, "ridge": 1e-3}
     images = np.stack([capture.image(i) for i in capture.indices("train")])
     assets = [ClusteredEigenMap(4, 3, encoding=encoding, **settings).encode(capture) for encoding in ("float", "uint8")]
-    floats, coded = (directional_responses(asset, capture.directions()) for asset in assets)
+    floats, coded = (responses(asset, capture.directions()) for asset in assets)
     # A step of 2 / 255 in each of three scalars whose functions are about as large as the pictures.
     assert np.sqrt(((coded - floats) ** 2).mean()) < 0.01 * images.std()
 
@@ -88,12 +89,12 @@ def test_more_clusters_serve_shadows(make_capture) -> None:
     labels, reach = rng.integers(12, size=(HEIGHT, WIDTH)), rng.uniform(0, 0.3, (HEIGHT, WIDTH))
     capture = make_capture(
         lambda d: np.where((walls @ d[:2])[labels] > reach, 0, d[2])[..., None] * [1, 0.8, 0.6], lights=80, holdout=20
-    ).kept()
+    ).load()
     one, six = (evaluate(ClusteredEigenMap(c, 2).encode(capture), capture)["holdout"]["psnr"] for c in (1, 6))
     assert six > one + 3
 
 
-@pytest.mark.parametrize("settings", [{"clusters": 0}, {"clusters": 257}, {"scalars": 0}, {"ridge": 0.0}, {"spread": -1.0}])
+@pytest.mark.parametrize("settings", [{"clusters": 0}, {"clusters": 257}, {"components": 0}, {"ridge": 0.0}, {"spread": -1.0}])
 def test_settings_that_no_clustered_eigen_map_has(settings: dict) -> None:
     with pytest.raises(InputError, match=next(iter(settings))):
         ClusteredEigenMap(**settings)
@@ -104,14 +105,14 @@ def test_more_clusters_than_texels(make_capture) -> None:
     coverage[3, 4:9] = 1
     response, _ = planted(3, 2)
     capture = make_capture(response, lights=30, coverage=coverage)
-    asset = ClusteredEigenMap(clusters=16, scalars=3).encode(capture)
+    asset = ClusteredEigenMap(clusters=16, components=3).encode(capture)
     assert asset.tables["cluster_index"].max() < asset.clusters <= 16
-    assert np.isfinite(directional_responses(asset, capture.directions())).all()
+    assert np.isfinite(responses(asset, capture.directions())).all()
 
 
 @pytest.mark.slow
 def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
-    """Every sixteen rows answer in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
+    """Every sixteen rows respond in a way of their own, as near things in a picture do: none may be left to its neighbors' clusters."""
     height, width, band = 512, 256, 16
     facing = np.random.default_rng(5).normal(size=(height // band, 3))
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
@@ -125,7 +126,7 @@ def test_rows_of_a_large_image_are_served_alike(make_capture) -> None:
     asset = ClusteredEigenMap(2 * height // band, 2, spread=0.3, ridge=1e-9).encode(capture)
     error = np.zeros(height)
     for i in capture.indices("train"):
-        relit = directional_responses(asset, capture.directions([i]))[0]
+        relit = responses(asset, capture.directions([i]))[0]
         error += ((relit - capture.image(i)) ** 2).mean(axis=(1, 2))
     by_band = np.sqrt(error.reshape(-1, band).mean(axis=1) / 24)
     assert by_band.max() < 0.05 * np.sqrt(np.mean([(capture.image(i) ** 2).mean() for i in capture.indices("train")]))

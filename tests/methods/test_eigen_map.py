@@ -13,7 +13,8 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, PointLight
-from srbf.methods.eigen_map import EigenMap, directional_responses, relight
+from srbf.methods import relight, responses
+from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import normalize, random_directions
 
@@ -52,33 +53,33 @@ def softly_shadowed(height: int, width: int):
 
 @pytest.mark.parametrize("rank", [1, 3, 6])
 @pytest.mark.parametrize("weighting", ["plain", "relative"])
-def test_transport_of_rank_s_is_reproduced_by_s_scalars(make_capture, rank: int, weighting: str) -> None:
+def test_transport_of_rank_s_is_reproduced_by_s_components(make_capture, rank: int, weighting: str) -> None:
     capture: Capture = make_capture(planted(rank), lights=40, holdout=0)
-    asset = EigenMap(scalars=rank, spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
+    asset = EigenMap(components=rank, spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
     expected = np.stack([capture.image(i) for i in capture.indices("train")])
-    got = directional_responses(asset, capture.directions())
+    got = responses(asset, capture.directions())
     np.testing.assert_allclose(got, expected, atol=EXACT * np.abs(expected).max())
     assert asset.manifest["source"]["fit"]["energy_kept"] == pytest.approx(1, abs=1e-4)
-    fewer = EigenMap(scalars=max(1, rank - 1), spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
+    fewer = EigenMap(components=max(1, rank - 1), spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
     if rank > 1:  # and by no fewer
-        assert np.abs(directional_responses(fewer, capture.directions()) - expected).max() > 0.05 * np.abs(expected).max()
+        assert np.abs(responses(fewer, capture.directions()) - expected).max() > 0.05 * np.abs(expected).max()
 
 
 def test_the_error_left_is_that_of_the_truncated_svd(make_capture) -> None:
     rng = np.random.default_rng(1)
     planes = rng.normal(size=(8, HEIGHT, WIDTH)) * 0.5 ** np.arange(8)[:, None, None]
     capture = make_capture(lambda d: np.einsum("jhw,jc->hwc", planes, rng.normal(size=(8, 3))), lights=40, holdout=0)
-    asset = EigenMap(scalars=4, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
+    asset = EigenMap(components=4, spread=0.3, ridge=1e-9, encoding="float").encode(capture)
     images = np.stack([capture.image(i) for i in range(40)]).astype(np.float64)
     rows = images.reshape(40, -1, 3).transpose(1, 0, 2).reshape(HEIGHT * WIDTH, -1)
     values = np.linalg.svd(rows - rows.mean(axis=0), compute_uv=False)
-    error = directional_responses(asset, capture.directions()) - images
-    # Lights of a Hammersley set do not all weigh alike, so the error is a little above the least there is.
+    error = responses(asset, capture.directions()) - images
+    # Lights of a Hammersley set do not all have the same weight, so the error is a little above the least there is.
     assert 1 - 1e-4 <= (error**2).sum() / (values[4:] ** 2).sum() < 1.1
 
 
 def test_planes_four_to_an_image_and_zero_past_the_last(make_capture) -> None:
-    asset = EigenMap(scalars=6, encoding="uint8").encode(make_capture(planted(7), lights=40))
+    asset = EigenMap(components=6, encoding="uint8").encode(make_capture(planted(7), lights=40))
     assert asset.stored.shape == (2, HEIGHT, WIDTH, 4) and asset.stored.dtype == np.uint8
     assert not asset.coefficients()[1, :, :, 2:].any()
     assert asset.coefficients()[1, :, :, :2].any() and len(asset.light_functions.spreads) == 7
@@ -91,7 +92,7 @@ SMOOTH: dict[str, Capture] = {}
 def smooth(make_capture) -> Capture:
     """300 lights on the hemisphere, kept in memory for all tests that read them."""
     if not SMOOTH:
-        SMOOTH["300"] = make_capture(softly_shadowed(16, 20), lights=300, holdout=30).kept()
+        SMOOTH["300"] = make_capture(softly_shadowed(16, 20), lights=300, holdout=30).load()
     return SMOOTH["300"]
 
 
@@ -101,15 +102,15 @@ def unseen(method: EigenMap | RelightingMap, capture: Capture) -> float:
 
 
 @pytest.mark.slow
-def test_unseen_lights_gain_from_scalars_and_smooth_scenes_far_more_than_from_relighting_maps(smooth: Capture) -> None:
-    eigen = unseen(EigenMap(scalars=28), smooth)
-    assert eigen > 2 + unseen(EigenMap(scalars=10), smooth)
+def test_unseen_lights_gain_from_components_and_smooth_scenes_far_more_than_from_relighting_maps(smooth: Capture) -> None:
+    eigen = unseen(EigenMap(components=28), smooth)
+    assert eigen > 2 + unseen(EigenMap(components=10), smooth)
     assert eigen >= 8 + unseen(RelightingMap(k=25, spread="mean", ridge=0, centers="hammersley"), smooth)
 
 
 @pytest.mark.slow
 def test_bytes_cost_little(smooth: Capture) -> None:
-    settings = {"scalars": 28, "spread": 0.25, "ridge": 1e-3}
+    settings = {"components": 28, "spread": 0.25, "ridge": 1e-3}
     floats, coded = (unseen(EigenMap(**settings, encoding=encoding), smooth) for encoding in ("float", "uint8"))
     assert floats - coded <= 0.3
 
@@ -121,9 +122,9 @@ def test_relative_weighting_serves_the_dark(make_capture) -> None:
     capture = make_capture(lambda d: np.where(lit[:, None], bright(d), 0.02 * dark(d)), lights=40, holdout=0)
     errors = []
     for weighting in ("plain", "relative"):
-        asset = EigenMap(scalars=6, spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
+        asset = EigenMap(components=6, spread=0.3, ridge=1e-9, weighting=weighting, encoding="float").encode(capture)
         images = np.stack([capture.image(i) for i in range(40)])
-        errors.append(np.square(directional_responses(asset, capture.directions()) - images).mean(axis=(0, 1, 3)))
+        errors.append(np.square(responses(asset, capture.directions()) - images).mean(axis=(0, 1, 3)))
     plain, relative = errors
     assert relative[~lit].mean() < plain[~lit].mean() / 3 and plain[lit].mean() < relative[lit].mean() / 3
 
@@ -132,12 +133,12 @@ def test_relative_weighting_serves_the_dark(make_capture) -> None:
 def plane(make_capture, plane_positions) -> Asset:
     rng = np.random.default_rng(4)
     waves = rng.normal(size=(10, 14, 3, 3))
-    return EigenMap(scalars=8).encode(make_capture(lambda d: 1.5 + np.sin(waves @ d), lights=150, position=plane_positions))
+    return EigenMap(components=8).encode(make_capture(lambda d: 1.5 + np.sin(waves @ d), lights=150, position=plane_positions))
 
 
 @pytest.mark.slow
 def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
-    # Directional lights weigh by the functions, point lights by their table: they meet but for the table's error.
+    # Directional lights weigh by the functions, point lights by their table: they agree up to the table's error.
     directions = random_directions(12, "hemisphere", np.random.default_rng(5))
     directions[:, 2] = np.maximum(directions[:, 2], 0.3)
     directions = normalize(directions)
@@ -153,8 +154,8 @@ def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"scalars": 0}, "scalars"),
-        ({"scalars": 2000}, "scalars"),
+        ({"components": 0}, "components"),
+        ({"components": 2000}, "components"),
         ({"ridge": 0}, "ridge"),
         ({"spread": float("nan")}, "spread"),
     ],
@@ -164,16 +165,16 @@ def test_settings_that_no_eigen_map_has(settings: dict, words: str) -> None:
         EigenMap(**settings)
 
 
-def test_more_scalars_than_numbers(make_capture) -> None:
+def test_more_components_than_numbers(make_capture) -> None:
     capture = make_capture(planted(2), lights=4)
-    with pytest.raises(InputError, match="at most 12 scalars for 4 lights, found 13"):
-        EigenMap(scalars=13).encode(capture)
-    assert EigenMap(scalars=12).encode(capture).scalars == 12
+    with pytest.raises(InputError, match="at most 12 components for 4 lights, found 13"):
+        EigenMap(components=13).encode(capture)
+    assert EigenMap(components=12).encode(capture).components == 12
 
 
 @pytest.mark.slow
 def test_validation_lights_steer_and_holdout_does_not(make_capture) -> None:
-    capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).kept()
+    capture = make_capture(softly_shadowed(12, 16), lights=80, validation=20, holdout=10).load()
     assert EigenMap(8).encode(capture).manifest["source"]["fit"]["chosen_by"] == "validation"
     without = capture.with_roles([None if light.role == "holdout" else light.role for light in capture.lights])
     blind = capture.with_roles([None if light.role == "validation" else light.role for light in capture.lights])
@@ -184,9 +185,9 @@ def test_validation_lights_steer_and_holdout_does_not(make_capture) -> None:
 
 def test_given_spread_and_ridge_are_kept(make_capture) -> None:
     capture = make_capture(planted(2), lights=30)
-    asset = EigenMap(scalars=2, spread=0.7, ridge=0.5).encode(capture)
+    asset = EigenMap(components=2, spread=0.7, ridge=0.5).encode(capture)
     assert set(asset.manifest["light_basis"]["spreads"]) == {0.7}
-    heavier = replace(EigenMap(scalars=2, spread=0.7), ridge=50.0).encode(capture)
+    heavier = replace(EigenMap(components=2, spread=0.7), ridge=50.0).encode(capture)
     assert (
         np.abs(heavier.tables["light_coefficients"]).sum(axis=(1, 2)) < np.abs(asset.tables["light_coefficients"]).sum(axis=(1, 2))
     ).all()

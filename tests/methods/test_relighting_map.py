@@ -1,4 +1,4 @@
-"""The relighting map: theorems of the fit and of relighting, on captures with known answers."""
+"""The relighting map: theorems of the fit and of relighting, on captures of known responses."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from srbf.encode.quantization import quantize
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
-from srbf.methods.receivers import outside_domain
-from srbf.methods.relighting_map import RelightingMap, linear_response, projected_weights, relight
+from srbf.methods import linear_response, outside_domain, projected_weights, relight
+from srbf.methods.relighting_map import RelightingMap
 from srbf.sphere import point_set
 
 FLOAT32 = 3e-6  # relative rounding of a sum of a few dozen float32 products
@@ -88,14 +88,14 @@ def test_lambert_under_a_spot(plane: Asset, plane_positions: np.ndarray) -> None
     assert not got[angle > 0.6].any()
 
 
-def test_lambert_under_a_constant_sky(plane: Asset) -> None:
-    # The irradiance of a uniform sky of radiance 1 is pi.
-    sky = EnvironmentLight(np.ones((64, 128, 3), np.float32), color=(1, 2, 0))
-    np.testing.assert_allclose(relight(plane, [sky])[0, 0], [np.pi, 2 * np.pi, 0], rtol=FIT)
+def test_lambert_under_a_constant_environment(plane: Asset) -> None:
+    # The irradiance of a uniform environment of radiance 1 is pi.
+    environment = EnvironmentLight(np.ones((64, 128, 3), np.float32), color=(1, 2, 0))
+    np.testing.assert_allclose(relight(plane, [environment])[0, 0], [np.pi, 2 * np.pi, 0], rtol=FIT)
 
 
 def test_environment_weight_is_the_integral_of_r(plane: Asset) -> None:
-    # A constant sky's weight of center i is the integral of R over the hemisphere; compare with a fine quadrature of its own.
+    # A constant environment's weight of center i is the integral of R over the hemisphere; compare with a fine quadrature of its own.
     z = (np.arange(400) + 0.5) / 400
     azimuth = 2 * np.pi * (np.arange(200) + 0.5) / 200
     r = np.sqrt(1 - z**2)
@@ -105,14 +105,14 @@ def test_environment_weight_is_the_integral_of_r(plane: Asset) -> None:
     np.testing.assert_allclose(got, np.repeat(exact[:, None], 3, axis=1), rtol=2e-3)
 
 
-def test_a_single_texel_sky_is_a_directional_light(plane: Asset) -> None:
-    sky = np.zeros((180, 360, 3), np.float32)
-    sky[60, 100] = [3, 2, 1]
+def test_a_single_texel_environment_is_a_directional_light(plane: Asset) -> None:
+    environment = np.zeros((180, 360, 3), np.float32)
+    environment[60, 100] = [3, 2, 1]
     elevation, azimuth = np.radians(90 - 60.5), np.radians(180 - 100.5)
     direction = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
     solid_angle = 2 * np.pi / 360 * (np.sin(np.radians(30)) - np.sin(np.radians(29)))
     sun = DirectionalLight(direction, tuple(solid_angle * c for c in (3, 2, 1)))
-    np.testing.assert_allclose(relight(plane, [EnvironmentLight(sky)]), relight(plane, [sun]), rtol=1e-4)
+    np.testing.assert_allclose(relight(plane, [EnvironmentLight(environment)]), relight(plane, [sun]), rtol=1e-4)
 
 
 def test_far_point_light_tends_to_the_directional_one(plane: Asset) -> None:
@@ -166,7 +166,7 @@ def test_the_table_is_the_gaussian(plane: Asset) -> None:
 
 def test_too_few_lights(make_capture) -> None:
     capture = make_capture(lambert((3, 3)), lights=10)
-    with pytest.raises(InputError, match="10 lights for -k 25"):
+    with pytest.raises(InputError, match="10 lights for `k=25`"):
         RelightingMap(k=25, ridge=0).encode(capture)
     assert RelightingMap(k=25).encode(capture).k == 25
 

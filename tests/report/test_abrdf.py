@@ -13,7 +13,7 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods import directional_responses
+from srbf.methods import responses as asset_responses
 from srbf.methods.relighting_map import RelightingMap
 from srbf.report.abrdf import (
     block_means,
@@ -44,7 +44,7 @@ def normals() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def lambert(tmp_path_factory: pytest.TempPathFactory) -> Capture:
-    """Receivers that answer max(0, n . L), without shadows."""
+    """Receivers with the response max(0, n . L), without shadows."""
     folder: Path = tmp_path_factory.mktemp("lambert")
     (folder / "lights").mkdir()
     lights = []
@@ -163,7 +163,7 @@ def test_fitted_tiles_are_what_relighting_gives(lambert: Capture) -> None:
     chosen = [0, 20, HEIGHT * WIDTH - 1]
     tiles = fitted_tiles(asset, single_receivers(chosen, HEIGHT * WIDTH), directions)
     inside = np.isfinite(directions[..., 0])
-    relit = directional_responses(asset, directions[inside]).reshape(inside.sum(), -1, 3)[:, chosen]
+    relit = asset_responses(asset, directions[inside]).reshape(inside.sum(), -1, 3)[:, chosen]
     magnitude = np.abs(asset.coefficients()).sum(axis=0).max()  # bounds sum |c R|, since R <= 1
     assert np.abs(tiles[:, inside] - relit.transpose(1, 0, 2)).max() < SINGLE * magnitude
     assert np.isnan(tiles[:, ~inside]).all()

@@ -32,7 +32,7 @@ POINT_LIGHTS = {"point_light.png", "point_strip.png", "spot_strip.png"}
 MakeCapture = Callable[..., Capture]
 PAGES = {"report.md", "index.html"}
 BYTE = 1 / 255
-COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(scalars=4))
+COMPARED = (RelightingMap(k=4, spread=0.9, ridge=0.01), EigenMap(components=4))
 MAX_ANIMATION_BYTES = 2 << 20
 
 
@@ -114,8 +114,8 @@ def test_the_page_holds_all_its_figures_and_the_markdown_names_its_files(report:
             "psnr pooled",
             "holdout",
             "relative residual",
-            "bytes a texel",
-            "occluder beyond the lamp",
+            "bytes per texel",
+            "occluder beyond the light",
         ):
             assert fact in text
 

@@ -1,4 +1,4 @@
-"""The viewer's page built as it ships, and one headless Chromium that is told what to do with it."""
+"""The viewer's page as shipped, and one headless Chromium to drive it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Browser:
         self._process.stdin.write(json.dumps({"do": what, **job}) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
-        assert line, "expected an answer of the browser, found it gone"
+        assert line, "expected a response of the browser, found it gone"
         response = json.loads(line)
         assert "error" not in response, response
         bad = [said for said in response["said"] if said.startswith("error")]

@@ -21,7 +21,7 @@ from srbf.methods import relight
 from srbf.relighting.direct_light import Added
 
 SIDE, ZOOM = 24, 16
-TINT = np.linspace(0.2, 1.2, 24).reshape(8, 3)
+TRANSMITTANCE = np.linspace(0.2, 1.2, 24).reshape(8, 3)
 MOST_APART, MEAN_APART = (
     24.0,
     0.4,
@@ -30,7 +30,7 @@ MOST_APART, MEAN_APART = (
 
 @pytest.fixture(params=["irradiance", "radiance"])
 def split(request: pytest.FixtureRequest, make_asset: Callable[..., Asset]) -> Asset:
-    """Indirect maps of a plane below a ball and two tinted panes."""
+    """Indirect maps of a plane below a ball and two translucent panes."""
     quantity = request.param
     pane = quad([0.2, -0.9, 0.3], [0.9, -0.9, 0.5], [0.9, 0.9, 0.5], [0.2, 0.9, 0.3])
     occluder = ball(0.35, [-0.4, 0.1, 0.6], 24)
@@ -38,7 +38,9 @@ def split(request: pytest.FixtureRequest, make_asset: Callable[..., Asset]) -> A
     plain = {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}, "doubleSided": True}
     ground = quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])
     scene = scene_glb(
-        ("Ground", ground, plain), ("Ball", occluder, plain), ("Pane", pane, {**plain, "extras": {"tint_by_cosine": TINT.tolist()}})
+        ("Ground", ground, plain),
+        ("Ball", occluder, plain),
+        ("Pane", pane, {**plain, "extras": {"tint_by_cosine": TRANSMITTANCE.tolist()}}),
     )
     made = make_asset(k=4, height=SIDE, width=SIDE, encoding="half", position=False)
     stored = (made.stored.astype(np.float32) * 0.1).astype(np.float16)  # signed: what leaves the clamp depends on the direct light
@@ -71,9 +73,11 @@ def test_point_lights_say_that_their_direct_light_is_missing(
 ) -> None:
     split.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
-    assert "indirect light alone" not in chromium("run", script="document.getElementById('status').textContent")
+    assert "indirect light only" not in chromium("run", script="document.getElementById('status').textContent")
     chromium("choose", selector=".chip.add", value="point")
-    assert "lamps and skies: indirect light alone" in chromium("run", script="document.getElementById('status').textContent")
+    assert "point, spot and environment lights: indirect light only" in chromium(
+        "run", script="document.getElementById('status').textContent"
+    )
 
 
 def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[[Path], str], tmp_path: Path) -> None:

@@ -56,11 +56,13 @@ def url(asset: Asset, tmp_path: Path, serve: Callable[..., str]) -> str:
     return serve(tmp_path / "asset")
 
 
-def test_a_sun_dragged_over_the_sky_relights(chromium: Any, asset: Asset, url: str) -> None:
+def test_a_directional_light_dragged_over_the_disc_relights(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url + PICTURE + "}", width=WIDTH, height=HEIGHT)
     before = chromium.state()["lights"][0]["direction"]
     assert shows(chromium, asset, [DirectionalLight(tuple(before))])
-    x, y, w, h = chromium("run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('sky').getBoundingClientRect())")
+    x, y, w, h = chromium(
+        "run", script="(b => [b.x, b.y, b.width, b.height])(document.getElementById('directions').getBoundingClientRect())"
+    )
     middle = [x + w / 2, y + h / 2]
     chromium("drag", path=[[middle[0] - 40, middle[1] + 30], [middle[0] + 10, middle[1] - 20], [middle[0] + 55, middle[1] - 5]])
     light = chromium.state()["lights"][0]["direction"]
@@ -76,27 +78,27 @@ def test_point_lights_and_suns_together_are_numpys(
     chromium: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path, kind: str
 ) -> None:
     """Typed into the panel; each light's color and falloff its own."""
-    made = make_asset(k=6) if kind == "relighting-map" else make_planes(scalars=5, clusters=4 if kind.startswith("c") else None)
+    made = make_asset(k=6) if kind == "relighting-map" else make_planes(components=5, clusters=4 if kind.startswith("c") else None)
     asset = complete(on_a_plane(made))
     asset.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset") + PICTURE + ",'exposure':-1}", width=WIDTH, height=HEIGHT)
     chromium("number", name="Intensity", value=0.4)
     chromium("choose", selector=".chip.add", value="point")
     for name, value in {
-        "Point light x (m)": 0.3,
-        "Point light y (m)": -0.4,
-        "Point light z (m)": 0.9,
+        "Position x (m)": 0.3,
+        "Position y (m)": -0.4,
+        "Position z (m)": 0.9,
         "a₀ (m)": 0.8,
         "Intensity": 0.7,
     }.items():
         chromium("number", name=name, value=value)
     chromium("choose", selector=".chip.add", value="spot")
     for name, value in {
-        "Point light x (m)": -0.5,
-        "Point light z (m)": 1.25,
+        "Position x (m)": -0.5,
+        "Position z (m)": 1.25,
         "Aim x (m)": 0.5,
-        "Full within (°)": 12,
-        "None past (°)": 35,
+        "Inner half-angle (°)": 12,
+        "Outer half-angle (°)": 35,
     }.items():
         chromium("number", name=name, value=value)
     (lights,) = lights_of(chromium, tmp_path)
@@ -108,7 +110,7 @@ def test_point_lights_and_suns_together_are_numpys(
 def test_an_address_brings_everything_back(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url + PICTURE + ",'tone':'agx','exposure':0.5}", width=WIDTH, height=HEIGHT)
     chromium("choose", selector=".chip.add", value="point")
-    chromium("number", name="Point light x (m)", value=0.31)
+    chromium("number", name="Position x (m)", value=0.31)
     chromium("press", keys=["1", "ArrowLeft", "Shift+ArrowUp"])
     there, seen = chromium("address"), chromium.texels(asset.width, asset.height, ZOOM)
     kept = chromium.state()
@@ -127,6 +129,7 @@ def test_an_address_of_nonsense_is_said_in_one_line(chromium: Any, asset: Asset,
         "#{'tone':'loud'}": "another tone",
         "#{'lights':[{'kind':'point'}]}": "of on",
     }.items():
+        chromium("address")  # once the page has written its own
         went = "addEventListener('hashchange', () => done(), {once: true})"
         waited = f"new Promise((done) => {{ {went}; location.hash = {json.dumps(hash_)}; }})"
         chromium("run", script=waited)
@@ -178,7 +181,7 @@ def test_a_saved_path_is_a_round(chromium: Any, asset: Asset, url: str, tmp_path
 
 
 def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url: str, tmp_path: Path) -> None:
-    """In the plane of the sun's azimuth, 75 degrees to either side, from where the sun stands."""
+    """In the plane of the sun's azimuth, 75 degrees to either side, from the sun's own direction."""
     chromium("open", url=url + "#{'path':'swing','seconds':3}", width=WIDTH, height=HEIGHT)
     directions = np.array([light.direction for (light,) in lights_of(chromium, tmp_path, "Path (FRAMES.json)")])  # type: ignore[union-attr]
     start = np.array([-0.45, -0.5, 0.74]) / np.linalg.norm([-0.45, -0.5, 0.74])
@@ -190,32 +193,38 @@ def test_a_swing_goes_over_the_zenith_and_back(chromium: Any, asset: Asset, url:
 
 @pytest.mark.parametrize("suffix", ["exr", "png", "hdr"])
 def test_an_environment_dropped_on_the_page_lights_it(chromium: Any, asset: Asset, url: str, tmp_path: Path, suffix: str) -> None:
-    sky = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)
-    path = tmp_path / f"sky.{suffix}"
+    environment = np.random.default_rng(4).random((8, 16, 3)).astype(np.float32)
+    path = tmp_path / f"environment.{suffix}"
     if suffix == "hdr":
-        write_radiance(path, sky)
+        write_radiance(path, environment)
     else:
-        write_image(path, np.round(sky * 255).astype(np.uint8) if suffix == "png" else sky, "uint8" if suffix == "png" else "float")
+        write_image(
+            path, np.round(environment * 255).astype(np.uint8) if suffix == "png" else environment, "uint8" if suffix == "png" else "float"
+        )
     chromium("open", url=url + PICTURE + ",'exposure':-2}", width=WIDTH, height=HEIGHT)
     chromium("drop", name=path.name, bytes=base64.b64encode(path.read_bytes()).decode())
-    assert [light["on"] for light in chromium.state()["lights"]] == [False, True], "the first sky takes the sun's place"
+    assert [light["on"] for light in chromium.state()["lights"]] == [False, True], "the first environment map turns the sun off"
     assert shows(chromium, asset, [EnvironmentLight(read_image(path, 3))], exposure=-2)
     (lights,) = lights_of(chromium, tmp_path)  # beside the picture
     assert shows(chromium, asset, lights, exposure=-2)
 
 
-def write_radiance(path: Path, sky: np.ndarray) -> None:
+def write_radiance(path: Path, environment: np.ndarray) -> None:
     """Flat RGBE pixels [Ward1991]: mantissas that share an exponent."""
-    exponent = np.ceil(np.log2(sky.max(axis=2)))
-    mantissa = np.clip(np.floor(sky / 2.0 ** exponent[..., None] * 256), 0, 255)
+    exponent = np.ceil(np.log2(environment.max(axis=2)))
+    mantissa = np.clip(np.floor(environment / 2.0 ** exponent[..., None] * 256), 0, 255)
     pixels = np.concatenate([mantissa, exponent[..., None] + 128], axis=2).astype(np.uint8)
-    height, width = sky.shape[:2]
+    height, width = environment.shape[:2]
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n" + f"-Y {height} +X {width}\n".encode() + pixels.tobytes())
 
 
 def test_files_that_are_no_environment_are_refused_in_one_line(chromium: Any, asset: Asset, url: str) -> None:
     chromium("open", url=url, width=WIDTH, height=HEIGHT)
-    for name, expected in {"sky.gif": "as .exr, .hdr or .png", "sky.exr": "cannot read sky.exr", "sky.hdr": "cannot read sky.hdr"}.items():
+    for name, expected in {
+        "environment.gif": "as .exr, .hdr or .png",
+        "environment.exr": "cannot read environment.exr",
+        "environment.hdr": "cannot read environment.hdr",
+    }.items():
         chromium("drop", name=name, bytes=base64.b64encode(b"not a picture").decode())
         assert expected in chromium("run", script="document.getElementById('toast').textContent")
     assert chromium("run", script="document.querySelectorAll('#chips .chip').length") == 2, "the sun, and the list to add others from"

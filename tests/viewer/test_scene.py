@@ -1,4 +1,4 @@
-"""Lamps hung in the scene, meshes under the orbit camera, and the capture beside what is relit."""
+"""Point lights in the scene, meshes under the orbit camera, and the capture beside what is relit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TURN = np.radians(38) / 2  # half the orbit camera's field of view, upwards
 def test_a_point_light_is_pulled_up_by_its_handle(
     chromium: Any, make_asset: Callable[..., Asset], serve: Callable[..., str], tmp_path: Path
 ) -> None:
-    """In a view: the handles stand where the fitted camera sees the lamp."""
+    """In a view: the handles are where the fitted camera sees the point light."""
     asset = seen_room(make_asset(k=4, height=18, width=28))
     asset.save(tmp_path / "asset")
     point_light = [0.2, 0.5, 0.9]
@@ -75,7 +75,7 @@ def orbit_pixel(place: np.ndarray, eye: np.ndarray, target: np.ndarray) -> np.nd
 
 
 def test_a_lightmap_is_shown_on_its_mesh(chromium: Any, lightmap: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
-    """Pixel by pixel through the camera that the address names; then the camera is turned, and a lamp put above what is clicked."""
+    """Pixel by pixel through the camera that the address names; then the camera is turned, and a point light put above what is clicked."""
     lightmap.save(tmp_path / "asset")
     eye, target = np.array([0.8, -3.6, 3.8]), np.array([0.1, 0.0, 0.2])
     where = f"#{{'eye':[{eye.tolist()},{target.tolist()}],'selected':-1,'exposure':-1.5}}"

@@ -32,13 +32,13 @@ SUN = [DirectionalLight((-0.45, -0.5, 0.74))]
 
 @pytest.fixture
 def fitted(make_capture: Callable[..., Capture], plane_positions: np.ndarray, tmp_path: Path) -> tuple[Capture, list[Path]]:
-    """A plane whose texels see the light from different sides, as six maps and as five planes."""
+    """A plane whose texels see the light from different sides, as six maps and as five components."""
     axes = np.random.default_rng(3).normal(size=(10, 14, 3, 3))
     axes /= np.linalg.norm(axes, axis=3, keepdims=True)
     capture = make_capture(lambda direction: np.maximum(axes @ direction, 0) ** 2, lights=60, holdout=6, position=plane_positions)
     folders = [tmp_path / "maps", tmp_path / "planes"]
     RelightingMap(k=6, spread="mean", ridge=1e-3).encode(capture).save(folders[0])
-    EigenMap(scalars=5).encode(capture).save(folders[1])
+    EigenMap(components=5).encode(capture).save(folders[1])
     return capture, folders
 
 
@@ -58,7 +58,7 @@ def test_the_page_switches_between_them(chromium: Any, fitted: tuple[Capture, li
     expected = shown_as(relight(planes, SUN))
     assert (np.abs(expected - shown_as(relight(maps, SUN))) > 2 * STEP).any()
     assert (np.abs(chromium.texels(14, 10, ZOOM) - expected) <= STEP).all()
-    assert "eigen map · 5 planes" in chromium("run", script="document.getElementById('title').textContent")
+    assert "eigen map · 5 components" in chromium("run", script="document.getElementById('title').textContent")
     there = chromium("address")
     chromium("open", url=there, width=WIDTH, height=HEIGHT)
     assert (np.abs(chromium.texels(14, 10, ZOOM) - expected) <= STEP).all(), "the address opens the second"
@@ -67,7 +67,7 @@ def test_the_page_switches_between_them(chromium: Any, fitted: tuple[Capture, li
 
 
 def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]) -> None:
-    """As numbers, and as colors on the sky: the worst light's dot is redder than the best one's."""
+    """As numbers, and as colors on the disc: the worst light's dot is redder than the best one's."""
     capture, folders = fitted
     url = serve(folders, capture.folder)
     for i, folder in enumerate(folders):
@@ -82,18 +82,18 @@ def test_every_light_s_error_is_the_evaluation_s(chromium: Any, fitted: tuple[Ca
     for name, index in {"best": int(np.argmax(told["psnr"])), "worst": int(np.argmin(told["psnr"]))}.items():
         x, y, z = capture.directions()[index]
         script = f"""(() => {{
-            const sky = document.getElementById('sky'), ratio = sky.width / sky.clientWidth;
-            const radius = Math.min(sky.clientWidth, sky.clientHeight) / 2 - 12;
+            const disc = document.getElementById('directions'), ratio = disc.width / disc.clientWidth;
+            const radius = Math.min(disc.clientWidth, disc.clientHeight) / 2 - 12;
             const r = radius * Math.sin(Math.acos({z}) / 2) / Math.sin(54 * Math.PI / 180);
-            const flat = Math.hypot({x}, {y}) || 1, at = [sky.clientWidth / 2 + r * {x} / flat, sky.clientHeight / 2 - r * {y} / flat];
-            return [...sky.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data];
+            const flat = Math.hypot({x}, {y}) || 1, at = [disc.clientWidth / 2 + r * {x} / flat, disc.clientHeight / 2 - r * {y} / flat];
+            return [...disc.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data];
         }})()"""
         colors[name] = chromium("run", script=script)
     assert colors["worst"][0] > colors["worst"][2] + 60
     assert colors["best"][2] > colors["best"][0] + 60
 
 
-def test_a_spectrum_is_the_singular_values_of_the_answers(
+def test_a_spectrum_is_the_singular_values_of_the_responses(
     chromium: Any, fitted: tuple[Capture, list[Path]], serve: Callable[..., str]
 ) -> None:
     capture, folders = fitted
@@ -103,12 +103,12 @@ def test_a_spectrum_is_the_singular_values_of_the_answers(
     values = np.linalg.svd(responses - responses.mean(axis=0), compute_uv=False) / np.sqrt(responses.size)
     np.testing.assert_allclose(told["capture"][:20], values[:20], rtol=2e-3)
     assert told["scalars"] == 5
-    assert len(told["asset"]) == 5, "five planes answer in five dimensions"
+    assert len(told["asset"]) == 5, "five components span five dimensions"
     assert len(ask(f"{url}spectrum-0.json")["asset"]) > 15, "six maps of three channels in eighteen at most"
     assert ask(f"{url}spectrum-0.json")["scalars"] == 18
     chromium("open", url=url + PICTURE + ",'spectrum':true}", width=WIDTH, height=HEIGHT)
     drawn = json.loads(chromium("run", script="document.getElementById('spectrum').dataset.drawn"))
-    assert drawn == {"asset": len(ask(f"{url}spectrum-0.json")["asset"]), "capture": len(told["capture"]), "scalars": 18}
+    assert drawn == {"asset": len(ask(f"{url}spectrum-0.json")["asset"]), "capture": len(told["capture"]), "components": 18}
 
 
 def test_assets_of_other_captures_are_refused(make_asset: Callable[..., Asset], built: Path, tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_the_command_wants_an_asset_and_at_most_one_capture(fitted: tuple[Captur
     capture, folders = fitted
     named = {"capture": str(capture.folder), "asset": str(folders[0])}
     done = CliRunner().invoke(app, ["view", *(named[name] for name in given), "--no-browser"])
-    assert done.exit_code == (2 if not given else 1)
+    assert done.exit_code == 2 and len(done.stderr.strip().splitlines()) == 1
 
 
 def test_an_asset_that_cannot_be_read_is_said_and_the_other_stays(

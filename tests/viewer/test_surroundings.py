@@ -1,4 +1,4 @@
-"""A lightmap in its scene: its own colors on the receiver, other things about it, and glass that shows what is behind it, tinted."""
+"""A lightmap in its scene: its own colors on the receiver, its surroundings, and colored glass that shows what is behind it."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_a_lightmap_lies_in_its_scene_and_glass_shows_what_is_behind(chromium: A
     np.testing.assert_allclose(glazed, shown_as(radiance * GLASS, EXPOSURE), atol=4)
     assert (np.abs(glazed - bare) > 20).any()
     post = at(picture, [-1.95, 0.0, z])
-    assert post[0] > 1.5 * post[1] > 0, "its own red, by three.js's sun, under a reflection of the sky"
+    assert post[0] > 1.5 * post[1] > 0, "its own red, by three.js's sun, under a reflection of the daylight"
     chromium("press", keys=["t"])
     alone = saved(chromium, tmp_path)
     assert chromium.state()["view"] == "mesh"

@@ -1,4 +1,4 @@
-"""Direct light by rays against closed forms: cosines, shadow edges, penumbrae, tints, lamps."""
+"""Direct light by rays against closed forms: cosines, shadow edges, penumbrae, transmittance, point lights."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from srbf.errors import InputError
 from srbf.io.scene_glb import KNOTS
 from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight
 from srbf.sphere import normalize
-from srbf.visibility.rays import LIFT, SAMPLES, RayTracer
+from srbf.visibility.rays import RAY_OFFSET, SAMPLES, RayTracer
 from srbf.visibility.receivers import Receivers
 
 ROUNDING = 1e-6
@@ -23,7 +23,7 @@ def columns(size: int = 40) -> np.ndarray:
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0.6, 0, 0.8), (-0.3, 0.5, 0.2)])
-def test_an_open_plane_answers_with_its_cosine(plane, direction) -> None:
+def test_an_open_plane_responds_with_its_cosine(plane, direction) -> None:
     unit = normalize(np.array(direction, float))
     light = DirectionalLight(tuple(unit), (1.0, 2.0, 0.5))
     np.testing.assert_allclose(
@@ -74,11 +74,11 @@ def test_panes_multiply_by_their_tint(plane, pane) -> None:
 
 def test_a_tint_follows_the_angle(plane, pane) -> None:
     cosines = np.linspace(0, 1, KNOTS)
-    tint = np.stack([cosines, cosines**2, 1.5 * cosines], axis=1)
+    transmittance = np.stack([cosines, cosines**2, 1.5 * cosines], axis=1)
     for sine in (0.0, 0.28, 0.6):
         cosine = np.sqrt(1 - sine * sine)
-        found = RayTracer(plane(panes=(pane,), tint=tint)).response([DirectionalLight((-sine, 0.0, cosine))])[:, 0]
-        expected = [np.interp(cosine, cosines, tint[:, c]) * cosine for c in range(3)]
+        found = RayTracer(plane(panes=(pane,), transmittance=transmittance)).response([DirectionalLight((-sine, 0.0, cosine))])[:, 0]
+        expected = [np.interp(cosine, cosines, transmittance[:, c]) * cosine for c in range(3)]
         np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), rtol=1e-4)
 
 
@@ -136,7 +136,7 @@ def test_a_smooth_ball_has_no_terminator_blocks(smooth_ball) -> None:
 
 def test_the_lift_is_small_against_a_texel(plane) -> None:
     """A box that stands on the plane shades right up to its foot."""
-    assert LIFT < 1e-4
+    assert RAY_OFFSET < 1e-4
     wall = np.array([[[0, -9, 0], [0, 9, 0], [0, 9, 2]], [[0, -9, 0], [0, 9, 2], [0, -9, 2]]], np.float32)
     found = RayTracer(plane(wall, footprint=1e-3)).response([DirectionalLight((-0.8, 0.0, 0.6))])[..., 0]
     np.testing.assert_allclose(found[:, 0:20], 0.6, rtol=1e-5)

@@ -57,7 +57,7 @@ def test_far_from_the_origin_it_is_the_same() -> None:
     mapped = lightmap(sphere, 24, 12, 48, smooth=False)
     shift = np.float32([500, -300, 40])
     triangles = mapped.receivers.triangles
-    moved = Triangles(triangles.corners + shift, triangles.normals, triangles.material, triangles.casts, triangles.tints)
+    moved = Triangles(triangles.corners + shift, triangles.normals, triangles.material, triangles.casts, triangles.transmittance)
     images = {**mapped.receivers.images, "position": mapped.receivers.images["position"] + shift}
     found = RayTracer(replace(mapped.receivers, triangles=moved, images=images)).directional(SUNS)
     for sun, image in zip(SUNS, found, strict=True):

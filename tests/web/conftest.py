@@ -32,7 +32,7 @@ def pages(npm: Callable[..., str]) -> Path:
 
 
 class Browser:
-    """Chromium with the test page open; answers jobs one at a time."""
+    """Chromium with the test page open; runs one job at a time."""
 
     def __init__(self, process: subprocess.Popen[str], assets: Path) -> None:
         self._process, self._assets, self._saved = process, assets, 0
@@ -60,7 +60,7 @@ class Browser:
         self._process.stdin.write(json.dumps(job) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
-        assert line, "expected an answer of the browser, found it gone"
+        assert line, "expected a response of the browser, found it gone"
         return json.loads(line)
 
     def picture(self, run: str, **job: Any) -> np.ndarray:

@@ -28,11 +28,11 @@ def test_a_pbr_material_shows_albedo_times_irradiance_over_pi(
 
 
 def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, make_planes: Callable[..., Asset]) -> None:
-    asset = complete(make_planes(scalars=6, encoding="uint8"), quantity="radiance", source={"receiver": {"kind": "view"}})
+    asset = complete(make_planes(components=6, encoding="uint8"), quantity="radiance", receiver={"kind": "view"})
     asset.images["coverage"][:] = 1
     job = {"lights": LIGHTS["several"], "color": ALBEDO, "half": HALF_EXTENT}
     shown = browser.picture("babylon-material", asset=browser.serve(asset), **job)
     expected = np.minimum(relight(asset, LIGHTS["several"]), BRIGHTEST)
     assert (np.abs(shown - expected) <= tolerance(asset, LIGHTS["several"])).all()
-    clustered = browser.serve(complete(make_planes(scalars=5, clusters=7)))
-    assert "found a clustered eigen map" in browser.response("babylon-material", asset=clustered, **job)["error"]
+    clustered = browser.serve(complete(make_planes(components=5, clusters=7)))
+    assert "found clustered-eigen-map" in browser.response("babylon-material", asset=clustered, **job)["error"]

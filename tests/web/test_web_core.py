@@ -32,8 +32,8 @@ def moving() -> np.ndarray:
 def test_weights_and_point_lights_are_numpys(browser: Any, make_asset: Callable, make_planes: Callable, method: str, still: bool) -> None:
     made = {
         "relighting-map": lambda: make_asset(k=25),
-        "eigen-map": lambda: make_planes(scalars=9),
-        "clustered-eigen-map": lambda: make_planes(scalars=5, clusters=7),
+        "eigen-map": lambda: make_planes(components=9),
+        "clustered-eigen-map": lambda: make_planes(components=5, clusters=7),
     }
     asset = complete(made[method](), asset_from_world=(np.eye(4) if still else moving()).tolist())
     url = browser.serve(asset)
@@ -55,7 +55,7 @@ def test_weights_and_point_lights_are_numpys(browser: Any, make_asset: Callable,
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
 def test_layers_are_decoded_to_the_bit(browser: Any, make_asset: Callable, make_planes: Callable, encoding: str) -> None:
-    for asset in (make_asset(k=3, encoding=encoding), make_planes(scalars=6, encoding=encoding)):
+    for asset in (make_asset(k=3, encoding=encoding), make_planes(components=6, encoding=encoding)):
         said = browser.response("layers", asset=browser.serve(complete(asset)))
         found = np.array(said["levels"][0]).reshape(len(asset.stored), asset.height, asset.width, 4)[..., : asset.stored.shape[3]]
         stored = asset.stored.view(np.uint16) if encoding == "half" else asset.stored
@@ -64,7 +64,7 @@ def test_layers_are_decoded_to_the_bit(browser: Any, make_asset: Callable, make_
 
 def test_every_byte_is_kept_whatever_alpha_says(browser: Any, make_planes: Callable) -> None:
     """No color management, no multiplication by alpha: all 256 values beside alphas of 0, 1 and 255."""
-    asset = complete(make_planes(scalars=4, encoding="uint8", height=16, width=48))
+    asset = complete(make_planes(components=4, encoding="uint8", height=16, width=48))
     values = np.arange(256, dtype=np.uint8).reshape(16, 16)
     for i, alpha in enumerate((0, 1, 255)):
         part = asset.stored[0, :, 16 * i : 16 * (i + 1)]

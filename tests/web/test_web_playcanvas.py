@@ -25,10 +25,10 @@ def test_a_material_shows_albedo_times_irradiance_over_pi(browser: Any, make_ass
 
 
 def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, make_planes: Callable[..., Asset]) -> None:
-    asset = complete(make_planes(scalars=6, encoding="uint8"), quantity="radiance", source={"receiver": {"kind": "view"}})
+    asset = complete(make_planes(components=6, encoding="uint8"), quantity="radiance", receiver={"kind": "view"})
     asset.images["coverage"][:] = 1
     job = {"lights": LIGHTS["several"], "color": ALBEDO, "half": HALF_EXTENT}
     shown = browser.picture("playcanvas-material", asset=browser.serve(asset), **job)
     assert (np.abs(shown - relight(asset, LIGHTS["several"])) <= tolerance(asset, LIGHTS["several"])).all()
-    clustered = browser.serve(complete(make_planes(scalars=5, clusters=7)))
-    assert "found a clustered eigen map" in browser.response("playcanvas-material", asset=clustered, **job)["error"]
+    clustered = browser.serve(complete(make_planes(components=5, clusters=7)))
+    assert "found clustered-eigen-map" in browser.response("playcanvas-material", asset=clustered, **job)["error"]

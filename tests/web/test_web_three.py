@@ -27,8 +27,8 @@ def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable
     for encoding in ENCODINGS:
         for asset in (
             make_asset(k=7, encoding=encoding, ambient=True),
-            make_planes(scalars=9, encoding=encoding, ambient=True),
-            make_planes(scalars=5, clusters=7, encoding=encoding),
+            make_planes(components=9, encoding=encoding, ambient=True),
+            make_planes(components=5, clusters=7, encoding=encoding),
         ):
             ready = complete(on_a_plane(asset))
             out[ready.method, encoding] = ready, browser.serve(ready)
@@ -97,7 +97,7 @@ def test_radiance_replaces_the_outgoing_light(browser: Any, make_asset: Callable
 
 @pytest.mark.parametrize("source", ["maps", "lightmap"])
 def test_lights_may_come_and_go_and_nothing_is_left_behind(browser: Any, served: dict, source: str) -> None:
-    """From frame to frame, lamps in any number; every texture and program is gone after dispose."""
+    """From frame to frame, any number of point lights; every texture and program is gone after dispose."""
     asset, url = served["eigen-map", "half"]
     job = {"material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": source, "lights": LIGHTS["several"]}
     sets = [LIGHTS["point"], LIGHTS["several"], [], LIGHTS["directional"], LIGHTS["point"] + LIGHTS["spot"]]
@@ -112,7 +112,7 @@ def test_lights_may_come_and_go_and_nothing_is_left_behind(browser: Any, served:
 
 @pytest.mark.parametrize("kind", FOLLOWED)
 def test_three_s_own_lights_are_followed(browser: Any, served: dict, kind: str) -> None:
-    """In three's units and its y-up world; the light replaces three's own diffuse light of the same lamps."""
+    """In three's units and its y-up world; the light replaces three's own diffuse light of the same lights."""
     asset, url = served["relighting-map", "half"]
     followed, lights = FOLLOWED[kind]
     job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": followed}
@@ -156,7 +156,7 @@ def test_linear_filtering_is_bilinear(browser: Any, served: dict) -> None:
 
 
 def test_a_mesh_far_away_shows_the_file_s_own_mip_level(browser: Any, make_asset: Callable[..., Asset]) -> None:
-    """At two texels a pixel, level 1 of BC7 layers as the export filtered them."""
+    """At two texels per pixel, level 1 of BC7 layers as the export filtered them."""
     asset = complete(on_a_plane(make_asset(k=4, encoding="half", height=16, width=24)))
     asset.images["coverage"][:] = 1
     url = browser.place(lambda folder: export(asset, "dds", folder, Settings(levels=2)))
@@ -194,7 +194,7 @@ def test_a_gltf_export_loads_and_is_lit_by_the_asset_that_it_names(browser: Any,
         ({"type": "PointLight", "distance": 3}, "expected a light of distance 0"),
     ],
 )
-def test_lights_that_no_asset_answers_are_refused(browser: Any, served: dict, light: dict, message: str) -> None:
+def test_lights_that_no_asset_supports_are_refused(browser: Any, served: dict, light: dict, message: str) -> None:
     _, url = served["relighting-map", "half"]
     light = {"color": (1, 1, 1), "intensity": 1, "position": (0, 1, 0), **light}
     job = {"asset": url, "material": "MeshLambertMaterial", "color": ALBEDO, "half": HALF_EXTENT, "source": "maps", "follow": [light]}
@@ -222,7 +222,7 @@ def test_texture_arrays_are_relit_as_they_are_read_by_numpy(
     """The GPU's decoder of blocks against OpenImageIO's: BC7 is exact, BC1's mixed colors may round to another byte."""
     made = [make_asset(k=4, encoding="half", height=12, width=20)]
     if form == "bc7":
-        made += [make_planes(scalars=5, clusters=7, encoding="half", height=12, width=20)]
+        made += [make_planes(components=5, clusters=7, encoding="half", height=12, width=20)]
     for asset in map(complete, made):
         url = browser.place(lambda folder, asset=asset: export(asset, target, folder, Settings(encoding=form)))
         exported = Asset.open(browser.folder(url))

@@ -21,7 +21,11 @@ ALBEDO = (0.8, 0.5, 0.3)
 @pytest.fixture(scope="module")
 def served(browser: Any, make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) -> dict[str, tuple[Asset, str]]:
     """(asset, URL) by method."""
-    made = [make_asset(k=7, encoding="half", ambient=True), make_planes(scalars=9, encoding="uint8"), make_planes(scalars=5, clusters=7)]
+    made = [
+        make_asset(k=7, encoding="half", ambient=True),
+        make_planes(components=9, encoding="uint8"),
+        make_planes(components=5, clusters=7),
+    ]
     ready = [complete(on_a_plane(asset)) for asset in made]
     return {asset.method: (asset, browser.serve(asset)) for asset in ready}
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from srbf import methods
-from srbf.asset import LAYERS, Asset, layer_entries
+from srbf.asset import Asset, layer_entries
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 
 FLOAT = 1e-4  # of the sum of the magnitudes of all terms; a few 1e-6 are usual
@@ -72,7 +72,7 @@ def complete(asset: Asset, **manifest: Any) -> Asset:
     keys: dict[str, Any] = {"format": "srbf-asset", "version": 1, "quantity": "irradiance", "transport": "combined"}
     keys |= {"row_origin": "top", "axes": "z-up-right-handed", "asset_from_world": np.eye(4).tolist()}
     keys |= {name: f"{name}.exr" for name in asset.images}
-    keys[LAYERS[own["method"]]] = layer_entries("map" if relighting else "plane", asset.encoding, asset.scale, asset.bias)
+    keys[asset.layers_key] = layer_entries("map" if relighting else "plane", asset.encoding, asset.scale, asset.bias)
     if relighting:
         keys["r_table"] = {"file": "r_table.exr", "size": len(asset.table)}
     else:
@@ -88,7 +88,7 @@ def tolerance(asset: Asset, lights: Sequence[Light], target: str = "float") -> n
     values = asset.coefficients()
     bare = replace(
         asset,
-        manifest={**asset.manifest, LAYERS[asset.method]: [{**entry, "encoding": "float"} for entry in asset.layers]},
+        manifest={**asset.manifest, asset.layers_key: [{**entry, "encoding": "float"} for entry in asset.layers]},
         scale=np.ones_like(asset.scale),
         bias=np.zeros_like(asset.bias),
     )

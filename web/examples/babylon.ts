@@ -1,4 +1,4 @@
-/** A lightmap asset of a square plate, 2 m wide, in Babylon.js: `?asset=FOLDER`. The lamp goes round above it. */
+/** A lightmap asset of a square plate, 2 m wide, in Babylon.js: `?asset=FOLDER`. A point light orbits above it. */
 import { ArcRotateCamera } from "@babylonjs/core/Cameras/arcRotateCamera.js";
 import { Engine } from "@babylonjs/core/Engines/engine.js";
 import { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";

@@ -1,6 +1,6 @@
 /**
  * An asset in three.js. In the page's address: `asset`, the folder with asset.json. For a lightmap also `mesh`, a .glb of the scene, `object`, the name
- * of the mesh that the asset lights, and `channel`, its lightmap's UV set. `lamp`: where the lamp stands at first, x,y,z in three's world.
+ * of the mesh that the asset lights, and `channel`, its lightmap's UV set. `pointLight`: first position of the point light, x,y,z in three's world.
  */
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
@@ -28,7 +28,7 @@ async function lightmap(): Promise<THREE.Camera> {
   return gltf.cameras[0];
 }
 
-/** A fixed view as a picture: its radiance replaces what the material shows, its receivers stand in the position map. */
+/** A fixed view as a picture: its radiance replaces the material's light, its receivers' positions come from the position map. */
 function view(): THREE.Camera {
   const { width, height } = map.asset.manifest;
   const material = map.apply(new THREE.MeshBasicMaterial(), { channel: 0, uvOrigin: "bottom" });

@@ -1,4 +1,4 @@
-/** A lightmap asset of a square plate, 2 m wide, in PlayCanvas: `?asset=FOLDER`. The lamp goes round above it. */
+/** A lightmap asset of a square plate, 2 m wide, in PlayCanvas: `?asset=FOLDER`. A point light orbits above it. */
 import * as pc from "playcanvas";
 import { pointLight } from "srbf";
 import { SrbfRelightingMap } from "srbf/playcanvas";

@@ -1,18 +1,19 @@
 /** An equirectangular map as many directional lights: `srbf.lights.environment_samples`. */
+import type { DistantLight } from "./asset_frame";
 import type { EnvironmentLight } from "./lights";
-import { determinant, type Matrix4, type Triple, turned } from "./matrix";
+import { determinant, type Matrix4, turned } from "./matrix";
 
-const UPRIGHT = 1e-8; // how far the turned zenith's row may be from (0, 0, 1), as numpy.allclose has it
+const UPRIGHT = 1e-8; // how far the rotated zenith may be from (0, 0, 1), as in numpy.allclose
 
 /**
- * Unit direction of every texel in the asset's frame, and its radiance times solid angle (sr). On the hemisphere only what is above the (turned)
- * horizon counts; unturned, a row that straddles it is cut there.
+ * Unit direction of every texel in the asset's frame, and its radiance times solid angle (sr). On the hemisphere only what is above the asset's
+ * horizon counts; where the map is upright, a row that straddles the horizon is cut there.
  */
 export function* environmentSamples(
   light: EnvironmentLight,
   domain: "sphere" | "hemisphere",
   assetFromWorld: Matrix4,
-): Generator<readonly [Triple, Triple]> {
+): Generator<DistantLight> {
   const { width, height, pixels, color } = light;
   const scale = Math.cbrt(determinant(assetFromWorld));
   const rotation = assetFromWorld.map((row) => row.map((value) => value / scale));

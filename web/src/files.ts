@@ -12,7 +12,7 @@ export class AssetFiles {
     private readonly verify: boolean,
   ) {}
 
-  /** The bytes of a file. @throws SrbfError where it is missing or, when asked to verify, not what was written. */
+  /** The bytes of a file. @throws SrbfError where it is missing or, with `verify`, not as it was written. */
   async bytes(name: string): Promise<ArrayBuffer> {
     const url = this.folder + insidePath(name);
     const buffer = await (await fetched(this.fetcher, url)).arrayBuffer();
@@ -24,13 +24,13 @@ export class AssetFiles {
   }
 }
 
-/** @throws SrbfError with the status where the server does not answer with the file. */
+/** @throws SrbfError with the status where the server does not return the file. */
 export async function fetched(fetcher: Fetch, url: string): Promise<Response> {
   let response: Response;
   try {
     response = await fetcher(url);
   } catch (error) {
-    throw new SrbfError(`expected an answer for ${url}, found ${error instanceof Error ? error.message : String(error)}; is the server up?`);
+    throw new SrbfError(`expected a response for ${url}, found ${error instanceof Error ? error.message : String(error)}; is the server up?`);
   }
   if (!response.ok) throw new SrbfError(`expected a file at ${url}, found status ${response.status}; serve the asset's whole folder`);
   return response;

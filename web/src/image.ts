@@ -1,4 +1,6 @@
 /** Decoded images: row 0 at the top, channels next to each other. */
+import { SrbfError } from "./errors";
+
 export interface HalfImage {
   kind: "half";
   width: number;
@@ -24,7 +26,7 @@ export interface ByteImage {
   data: Uint8Array;
 }
 
-/** The same rows the other way up, in place. */
+/** Reverse the order of the rows, in place. */
 export function flipRows(data: Uint16Array | Float32Array, height: number): void {
   const stride = data.length / height;
   const kept = data.slice(0, stride);
@@ -43,4 +45,13 @@ export function padToFour(data: Uint8Array, channels: number): Uint8Array {
     for (let c = 0; c < channels; ++c) out[j + c] = data[i + c];
   }
   return out;
+}
+
+/** @throws SrbfError on an image of another size than `expected`. */
+export function checkSize<I extends { width: number; height: number }>(image: I, expected: { width: number; height: number }, where: string): I {
+  const { width, height } = expected;
+  if (image.width !== width || image.height !== height) {
+    throw new SrbfError(`expected ${width}x${height} texels in ${where}, found ${image.width}x${image.height}`);
+  }
+  return image;
 }

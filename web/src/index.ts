@@ -1,4 +1,5 @@
-export { type Asset, type Basis, type LoadOptions, loadAsset } from "./asset";
+export { type Asset, type LoadOptions, loadAsset } from "./asset";
+export { type DistantLight, inAssetFrame, type LightsInAssetFrame } from "./asset_frame";
 export { SrbfError } from "./errors";
 export type { ByteImage, FloatImage, HalfImage } from "./image";
 export { type PointLightUniforms, pointLightRoom, pointLightUniforms, packedPointLights, versine } from "./point_light";
@@ -16,7 +17,9 @@ export {
   type SpotLight,
   spotLight,
 } from "./lights";
-export { checkManifest, type Encoding, type LayerEntry, type Manifest, type Method } from "./manifest";
+export { checkManifest, type Encoding, type LayerEntry, type Manifest, type Receiver, receiverKind, type ReceiverKind } from "./manifest";
 export { IDENTITY, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "./matrix";
-export { type FrameValues, frameValues, paddedCenters, shaderBody, shaderDefines, shaderText, uniformVectors } from "./shader";
+export { METHODS, methodNamed } from "./methods";
+export type { Method, Tables } from "./methods/method";
+export { constantVectors, type FrameValues, frameValues, shaderBody, shaderDefines, shaderText, uniformVectors } from "./shader";
 export { projectedWeights } from "./weights";

@@ -29,7 +29,7 @@ export function typed(bytes: Uint8Array, encoding: Encoding): Uint16Array | Floa
   return bytes;
 }
 
-/** @throws SrbfError where a container holds other texels than the manifest says. */
+/** @throws SrbfError where a container's texels differ from the manifest. */
 export function checkStack(stack: LayerStack, expected: Omit<LayerStack, "levels">, where: string): LayerStack {
   for (const key of ["width", "height", "count", "encoding"] as const) {
     if (stack[key] !== expected[key]) throw new SrbfError(`expected ${key} ${expected[key]} in ${where}, found ${stack[key]}; export the asset again`);

@@ -1,16 +1,17 @@
 /** Smooth RGB functions of light direction, combinations of dense spherical Gaussians: `srbf/basis/light_functions.py`. */
+import type { DistantLight } from "./asset_frame";
 import { gaussian } from "./gaussian";
 import { dot, type Triple } from "./matrix";
 
-/** F functions over B shared unit centers, each of a spread of its own (rad); `coefficients` is (F, B, 3), row by row. */
+/** F functions over B shared unit centers, each with its own spread (rad); `coefficients` is (F, B, 3), row by row. */
 export interface LightFunctions {
   readonly centers: readonly Triple[];
   readonly spreads: readonly number[];
   readonly coefficients: Float32Array;
 }
 
-/** sum over lights of color * w_f(direction), added to `folded` (F, 3). `lights` yields unit directions with their colors. */
-export function foldFunctions(functions: LightFunctions, lights: Iterable<readonly [Triple, Triple]>, projected: Float64Array): void {
+/** sum over lights of color * w_f(direction), added to `projected` (F, 3). */
+export function addProjected(functions: LightFunctions, lights: Iterable<DistantLight>, projected: Float64Array): void {
   const { centers, spreads, coefficients } = functions;
   const distinct = [...new Set(spreads)];
   const b = centers.length;

@@ -1,11 +1,11 @@
 /**
- * Lights to relight by: directional, point, spot, environment. Metres, radians, scene-linear Rec.709; the asset's own world, Blender's: right-handed,
+ * Lights to relight by: directional, point, spot, environment. Meters, radians, scene-linear Rec.709; the asset's own world, Blender's: right-handed,
  * z up. The arithmetic is that of `srbf/lights.py`, in double precision.
  */
 import { SrbfError } from "./errors";
 import { carried, determinant, type Matrix4, type Triple, turned } from "./matrix";
 
-export const DEFAULT_RADIUS = 1e-4; // meters: a receiver no nearer than this, so that a lamp in a surface stays finite
+export const DEFAULT_RADIUS = 1e-4; // meters: least distance to a receiver, so that a point light in a surface stays finite
 const WHITE: Triple = [1, 1, 1];
 
 /** A light at infinity: `direction` points from the surface to the light, `color` is its irradiance on a surface facing it. */
@@ -84,7 +84,7 @@ export function environmentLight(width: number, height: number, pixels: ArrayLik
   return { kind: "environment", width, height, pixels, color: finite(color, "color") };
 }
 
-/** A light carried by a rigid motion and uniform scale (a0 and radius scale along); an environment's directions are turned when it is folded. */
+/** A light under a rigid motion and uniform scale, which also scales a0 and radius; environments are unchanged: `inAssetFrame` turns their directions. */
 export function moved<L extends Light>(light: L, matrix: Matrix4): L {
   if (light.kind === "environment") return light;
   if (light.kind === "directional") return { ...light, direction: unit(turned(matrix, light.direction)) };

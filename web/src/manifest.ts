@@ -1,14 +1,16 @@
 /** asset.json, format srbf-asset, version 1: what is read of it, and the checks. Keys that are not known are ignored, unknown versions refused. */
 import { SrbfError } from "./errors";
-import type { Matrix4, Triple } from "./matrix";
+import type { Matrix4 } from "./matrix";
+import { METHODS, methodNamed } from "./methods";
+import type { Method } from "./methods/method";
 
-export type Method = "relighting-map" | "eigen-map" | "clustered-eigen-map";
 export type Encoding = "half" | "float" | "uint8" | "bc7" | "bc1";
+export type ReceiverKind = "lightmap" | "view" | "vertices";
 
-export const METHODS: readonly Method[] = ["relighting-map", "eigen-map", "clustered-eigen-map"];
 const ENCODINGS: readonly Encoding[] = ["half", "float", "uint8", "bc7", "bc1"];
+const RECEIVER_KINDS: readonly ReceiverKind[] = ["lightmap", "view", "vertices"];
 
-/** A stored layer: value = stored * scale + bias, three channels of a relighting map, four of scalar planes. */
+/** A stored layer: value = stored * scale + bias, three channels of an RGB coefficient map, or four of scalar ones. */
 export interface LayerEntry {
   file: string;
   encoding: Encoding;
@@ -20,25 +22,23 @@ export interface LayerEntry {
   levels?: number;
 }
 
+export interface Receiver {
+  kind: ReceiverKind;
+}
+
+/** The keys that every method has; a method's file types its own. */
 export interface Manifest {
   format: "srbf-asset";
   version: 1;
-  method: Method;
+  method: string;
   quantity: "irradiance" | "radiance";
   transport?: "combined" | "indirect";
   width: number;
   height: number;
   domain: "sphere" | "hemisphere";
-  basis?: { kind: string; centers?: Triple[]; spread?: number };
-  maps?: LayerEntry[];
-  r_table?: { file: string; size: number };
-  scalars?: number;
-  clusters?: number;
-  planes?: LayerEntry[];
-  light_basis?: { kind: string; centers: Triple[]; spreads: number[] };
-  light_coefficients?: { file: string };
-  w_table?: { file: string; size: number; columns: number };
-  cluster_index?: { file: string };
+  /** What is lit. `receivers` where several objects share one lightmap. */
+  receiver?: Receiver;
+  receivers?: Receiver[];
   position?: string;
   normal?: string;
   coverage?: string;
@@ -49,58 +49,66 @@ export interface Manifest {
   direct?: { sun_angle?: number; footprint?: number };
   asset_from_world?: Matrix4;
   sha256?: Record<string, string>;
+  /** How the asset was made. Nothing depends on it but `receiverKind`, for assets that lack the key `receiver`. */
   source?: { receiver?: { kind?: string }; receivers?: { kind?: string }[] };
+}
+
+/** What is lit; undefined where the asset does not say. Assets of older versions say so under `source`. */
+export function receiverKind(manifest: Manifest): ReceiverKind | undefined {
+  const { receiver, receivers, source } = manifest;
+  const first = receiver ?? receivers?.[0] ?? source?.receiver ?? source?.receivers?.[0];
+  return first?.kind as ReceiverKind | undefined;
 }
 
 /** Whether the asset is a picture, a view or photographs, rather than a texture: `receiver_kind` of `srbf/relighting/alpha.py`. */
 export function isPicture(manifest: Manifest): boolean {
-  const { receiver, receivers } = manifest.source ?? {};
-  return ((receiver ?? receivers?.[0])?.kind ?? "view") === "view";
+  return (receiverKind(manifest) ?? "view") === "view";
 }
 
-/** `value` as a manifest. @throws SrbfError that names the key which is not as the schema says. */
+/** Default source of receivers' positions in materials: a view has no mesh, so its position map. */
+export function receiversFrom(manifest: Manifest): "map" | "vertex" {
+  return receiverKind(manifest) === "view" ? "map" : "vertex";
+}
+
+/** `value` as a manifest. @throws SrbfError that names the key which breaks the schema. */
 export function checkManifest(value: unknown, where: string): Manifest {
   const manifest = value as Manifest;
   const fail = (expected: string, found: unknown): never => {
-    throw new SrbfError(`expected ${expected} in ${where}, found ${JSON.stringify(found) ?? "none"}; srbf fit and srbf export make one`);
+    throw new SrbfError(`expected ${expected} in ${where}, found ${JSON.stringify(found) ?? "none"}; srbf fit and srbf export write it`);
   };
   if (typeof value !== "object" || value === null || manifest.format !== "srbf-asset") fail("format srbf-asset", manifest?.format);
   if (manifest.version !== 1) fail("version 1", manifest.version);
-  if (!METHODS.includes(manifest.method)) fail(`a method of ${METHODS.join(", ")}`, manifest.method);
+  const method = methodNamed(manifest.method) ?? fail(`a method of ${METHODS.map(({ name }) => name).join(", ")}`, manifest.method);
   if (manifest.quantity !== "irradiance" && manifest.quantity !== "radiance") fail("a quantity of irradiance, radiance", manifest.quantity);
   for (const side of ["width", "height"] as const) {
     if (!(Number.isInteger(manifest[side]) && manifest[side] >= 1)) fail(`${side} of at least 1`, manifest[side]);
   }
   if (manifest.domain !== "sphere" && manifest.domain !== "hemisphere") fail("a domain of sphere, hemisphere", manifest.domain);
+  const { receiver, receivers } = manifest;
+  for (const one of [...(receiver === undefined ? [] : [receiver]), ...(receivers ?? [])]) {
+    if (!RECEIVER_KINDS.includes(one?.kind)) fail(`a receiver of ${RECEIVER_KINDS.join(", ")}`, one?.kind);
+  }
   const layers = layersOf(manifest);
-  if (!Array.isArray(layers) || layers.length === 0) fail(manifest.method === "relighting-map" ? "maps" : "planes", layers);
-  const channels = manifest.method === "relighting-map" ? 3 : 4;
+  if (!Array.isArray(layers) || layers.length === 0) fail(method.layersKey, layers);
+  const channels = method.layerChannels;
   for (const entry of layers) {
     if (!ENCODINGS.includes(entry.encoding)) fail(`an encoding of ${ENCODINGS.join(", ")}`, entry.encoding);
     if (entry.encoding !== layers[0].encoding) fail("one encoding for all layers", entry.encoding);
     if (entry.scale?.length !== channels || entry.bias?.length !== channels) fail(`scale and bias of ${channels} numbers`, entry.scale);
     if (typeof entry.file !== "string") fail("a file for each layer", entry.file);
   }
-  if (manifest.method === "relighting-map") {
-    if (manifest.basis?.kind !== "gaussian") fail("maps of Gaussians", manifest.basis?.kind);
-    if (manifest.basis?.centers?.length !== layers.length) fail("as many centers as maps", manifest.basis?.centers?.length);
-    if (!manifest.r_table) fail("an r_table", undefined);
-  } else {
-    if (!(Number.isInteger(manifest.scalars) && Math.ceil((manifest.scalars as number) / 4) === layers.length)) {
-      fail("scalars four to an image", manifest.scalars);
-    }
-    const functions = (manifest.clusters ?? 1) * ((manifest.scalars as number) + 1);
-    if (manifest.light_basis?.spreads.length !== functions) fail(`a spread for each of ${functions} light functions`, manifest.light_basis?.spreads.length);
-    if (!manifest.light_coefficients) fail("light_coefficients", undefined);
-    if (!manifest.w_table) fail("a w_table", undefined);
-    if (manifest.method === "clustered-eigen-map" && !manifest.cluster_index) fail("a cluster_index", undefined);
-  }
+  method.check(manifest, layers.length, fail);
   return manifest;
 }
 
-/** The stored layers: maps, or images of four planes. */
+/** The method of a checked manifest. */
+export function methodOf(manifest: Manifest): Method {
+  return methodNamed(manifest.method) as Method;
+}
+
+/** The stored layers: one RGB coefficient map each, or four scalar ones. */
 export function layersOf(manifest: Manifest): LayerEntry[] {
-  return (manifest.method === "relighting-map" ? manifest.maps : manifest.planes) as LayerEntry[];
+  return (manifest as unknown as Record<string, LayerEntry[]>)[methodOf(manifest).layersKey];
 }
 
 /** `name` as a path inside the asset's folder. @throws SrbfError where it leaves it. */

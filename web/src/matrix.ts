@@ -1,4 +1,4 @@
-/** 4 x 4 matrices as four rows, as manifests hold them; columns of translation are meters. */
+/** 4 x 4 matrices as four rows, as in manifests; translations in meters. */
 export type Triple = readonly [number, number, number];
 export type Matrix4 = readonly (readonly number[])[];
 
@@ -9,7 +9,7 @@ export const IDENTITY: Matrix4 = [
   [0, 0, 0, 1],
 ];
 
-/** Blender's z-up world from the y-up world of three.js, Babylon.js (right-handed) and PlayCanvas: (x, y, z) to (x, -z, y), as glTF exports turn it. */
+/** Blender's z-up world from the y-up world of three.js, Babylon.js (right-handed) and PlayCanvas: (x, y, z) to (x, -z, y), as in glTF exports. */
 export const Z_UP_FROM_Y_UP: Matrix4 = [
   [1, 0, 0, 0],
   [0, 0, -1, 0],
@@ -27,7 +27,7 @@ export function turned(matrix: Matrix4, v: Triple): Triple {
   return [row(0), row(1), row(2)];
 }
 
-/** A point carried by the whole matrix. */
+/** A point transformed by the whole matrix. */
 export function carried(matrix: Matrix4, p: Triple): Triple {
   const [x, y, z] = turned(matrix, p);
   return [x + matrix[0][3], y + matrix[1][3], z + matrix[2][3]];

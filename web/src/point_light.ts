@@ -4,7 +4,7 @@ import type { Triple } from "./matrix";
 
 export interface PointLightUniforms {
   position: Triple;
-  /** What single precision dropped of the position. */
+  /** The part of the position that single precision drops. */
   positionLow: Triple;
   color: Triple;
   axis: Triple;
@@ -17,7 +17,7 @@ export interface PointLightUniforms {
   falloff: number;
 }
 
-/** The uniforms of a lamp that is already in the asset's frame. */
+/** The uniforms of a light that is already in the asset's frame. */
 export function pointLightUniforms(light: PunctualLight): PointLightUniforms {
   const high = light.position.map(Math.fround) as unknown as Triple;
   return {
@@ -34,7 +34,7 @@ export function pointLightUniforms(light: PunctualLight): PointLightUniforms {
 }
 
 /**
- * Lamps as the shaders' arrays hold them, four vec4 each, zeros up to `room` lamps: (position, radius), (positionLow, falloff), (color at 1 m,
+ * Lights as the shaders' arrays hold them, four vec4 each, zeros up to `room` lights: (position, radius), (positionLow, falloff), (color at 1 m,
  * versineInner), (axis, versineOuter).
  */
 export function packedPointLights(pointLights: readonly PointLightUniforms[], room: number): Float32Array {
@@ -47,7 +47,7 @@ export function packedPointLights(pointLights: readonly PointLightUniforms[], ro
   return out;
 }
 
-/** Room for `count` lamps in a program: a power of two, so that few programs serve any number. */
+/** Room for `count` lights in a program: a power of two, so that few programs serve any number. */
 export function pointLightRoom(count: number): number {
   return 2 ** Math.ceil(Math.log2(Math.max(count, 1)));
 }

@@ -1,45 +1,42 @@
-/** What every engine's shader of an asset is made of: its text, its defines, and the numbers that change with the lights. */
+/** The parts of every engine's shader of an asset: its text, its defines, and the numbers that change with the lights. */
 import type { Asset } from "./asset";
-import { type PointLightUniforms, pointLightUniforms } from "./point_light";
-import { isPunctual, type Light, moved } from "./lights";
-import type { Method } from "./manifest";
+import { inAssetFrame } from "./asset_frame";
 import { SrbfError } from "./errors";
-import clusteredEigenMap from "./shaders/clustered_eigen_map.glsl";
-import eigenMap from "./shaders/eigen_map.glsl";
-import relightingMap from "./shaders/relighting_map.glsl";
-import { projectedWeights } from "./weights";
+import type { Light } from "./lights";
+import { type PointLightUniforms, pointLightUniforms } from "./point_light";
 
-const SOURCES: Record<Method, string> = {
-  "relighting-map": relightingMap,
-  "eigen-map": eigenMap,
-  "clustered-eigen-map": clusteredEigenMap,
-};
-
-/** Numbers of a frame: `weights` is vec4 after vec4, K of relighting maps, C rows of S + 1 of eigen maps. */
+/** The numbers of one frame: `weights` is vec4 after vec4, one for each light function. */
 export interface FrameValues {
   readonly weights: Float32Array;
   readonly pointLights: readonly PointLightUniforms[];
 }
 
-/** The frame's numbers under `lights`, which are in the asset's world. @throws SrbfError on lamps where the asset does not know where its receivers are. */
+/** The frame's numbers under `lights`, which are in the asset's world. */
 export function frameValues(asset: Asset, lights: readonly Light[]): FrameValues {
-  const projected = projectedWeights(asset, lights, asset.assetFromWorld);
+  const { distant, punctual } = inAssetFrame(asset, lights);
+  const projected = asset.tables.projectedWeights(distant);
   const weights = new Float32Array((projected.length / 3) * 4);
   for (let i = 0, j = 0; i < projected.length; i += 3, j += 4) weights.set([projected[i], projected[i + 1], projected[i + 2]], j);
-  const pointLights = lights.filter(isPunctual).map((light) => pointLightUniforms(moved(light, asset.assetFromWorld)));
-  return { weights, pointLights };
+  return { weights, pointLights: punctual.map(pointLightUniforms) };
 }
 
-/** @throws SrbfError where lamps need a position map and the asset has none. */
+/** @throws SrbfError where point lights need a position map and the asset has none. */
 export function needPositions(asset: Asset, pointLights: number): void {
   if (pointLights > 0 && !asset.position) {
     throw new SrbfError("point and spot lights need a position map, and this asset has none; relight it by directional lights");
   }
 }
 
+/** @throws SrbfError for an `engine` whose materials sum filtered layers, on a method whose layers must not be filtered. */
+export function needFilterable(asset: Asset, engine: string): void {
+  if (!asset.method.filterable) {
+    throw new SrbfError(`expected maps that ${engine} may filter, found ${asset.method.name}; fit another method, or use srbf/three`);
+  }
+}
+
 /**
  * GLSL that declares an asset's uniforms and `vec3 srbfRelit(vec2 uv, float level, vec3 receiver)`: uv with v downwards, receiver in the asset's frame,
- * meters, `room` for lamps. `srbfRelitSurface(uv, receiver)` finds the level of mip maps itself.
+ * meters, `room` for point lights. `srbfRelitSurface(uv, receiver)` finds the mip level itself.
  */
 export function shaderText(asset: Asset, room: number): string {
   const lines = Object.entries(shaderDefines(asset, room)).map(([name, value]) => `#define ${name} ${value}`);
@@ -48,22 +45,21 @@ export function shaderText(asset: Asset, room: number): string {
 
 /** `shaderText` without its defines, for engines that write those themselves. */
 export function shaderBody(asset: Asset): string {
-  return SOURCES[asset.manifest.method];
+  return asset.method.shader;
 }
 
 export function shaderDefines(asset: Asset, room: number): Record<string, number> {
-  const own: Record<string, number> =
-    asset.basis.kind === "gaussian" ? { SRBF_K: asset.layers.count } : { SRBF_COMPONENTS: asset.basis.scalars, SRBF_LAYERS: asset.layers.count };
-  return { ...own, SRBF_POINT_LIGHTS: room };
+  return { ...asset.tables.defines, SRBF_POINT_LIGHTS: room };
+}
+
+/** Uniform arrays of vec4 that never change, by name. */
+export function constantVectors(asset: Asset): Record<string, Float32Array> {
+  return { srbfScale: asset.scale, srbfBias: asset.bias, ...asset.tables.vectors };
 }
 
 /** vec4 of uniforms that the fragment shader of an asset needs, without the engine's own. */
 export function uniformVectors(asset: Asset, room: number): number {
-  return (asset.basis.kind === "gaussian" ? 4 : 2) * asset.layers.count + 4 * room;
-}
-
-/** Centers as vec4, w = 0. */
-export function paddedCenters(asset: Asset): Float32Array {
-  if (asset.basis.kind !== "gaussian") return new Float32Array(0);
-  return new Float32Array(asset.basis.centers.flatMap((center) => [...center, 0]));
+  const constant = Object.values(constantVectors(asset)).reduce((total, numbers) => total + numbers.length / 4, 0);
+  const { kind, width } = asset.tables.weights;
+  return constant + (kind === "uniform" ? width : 0) + 4 * room;
 }

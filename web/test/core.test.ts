@@ -6,9 +6,11 @@ import {
   IDENTITY,
   pointLightUniforms,
   loadAsset,
+  methodNamed,
   moved,
   multiplied,
   pointLight,
+  receiverKind,
   shaderText,
   SrbfError,
   spotLight,
@@ -41,7 +43,7 @@ describe("lights", () => {
     expect(() => directionalLight([0, 0, 0])).toThrow("expected a direction of non-zero, finite length");
   });
 
-  it("refuses numbers that no lamp can have", () => {
+  it("refuses numbers that no point light can have", () => {
     expect(() => pointLight([0, 0, 1], { a0: 0 })).toThrow("expected a0 above 0, found 0");
     expect(() => pointLight([0, Number.NaN, 1])).toThrow("expected position as three finite numbers");
     expect(() => spotLight([0, 0, 1], [0, 0, -1], { inner: 0.5, outer: 0.4 })).toThrow("expected spot half-angles");
@@ -49,7 +51,7 @@ describe("lights", () => {
     expect(() => environmentLight(1, 1, [1, Number.POSITIVE_INFINITY, 1])).toThrow("NaN or Inf");
   });
 
-  it("scales a lamp's a0 and radius with the frame", () => {
+  it("scales a point light's a0 and radius with the frame", () => {
     const doubled = multiplied([[2, 0, 0, 1], [0, 2, 0, 0], [0, 0, 2, 0], [0, 0, 0, 1]], IDENTITY);
     expect(moved(pointLight([1, 0, 0], { a0: 1.5, radius: 0.1 }), doubled)).toMatchObject({ position: [3, 0, 0], a0: 3, radius: 0.2 });
   });
@@ -99,10 +101,20 @@ describe("manifests", () => {
     [{ basis: { kind: "gaussian", centers: [], spread: 1 } }, "expected as many centers as maps"],
     [{ maps: [] }, "expected maps"],
     [{ maps: [{ ...MANIFEST.maps[0], encoding: "jpeg" }] }, "expected an encoding of half"],
+    [{ receiver: { kind: "room" } }, "expected a receiver of lightmap, view, vertices"],
     [{ width: 0 }, "expected width of at least 1"],
     [{ method: "eigen-map", scalars: 5, planes: [{ file: "p", encoding: "half", scale: [1, 1, 1, 1], bias: [0, 0, 0, 0] }] }, "scalars four to an image"],
   ])("refuses %j", (change, message) => {
     expect(() => checkManifest({ ...MANIFEST, ...change }, "asset.json")).toThrow(message);
+  });
+
+  it("read the receiver's kind from its own key, and from the source of assets that lack it", () => {
+    const kind = (keys: object) => receiverKind(checkManifest({ ...MANIFEST, ...keys }, "asset.json"));
+    expect(kind({ receiver: { kind: "view" }, source: { receiver: { kind: "lightmap" } } })).toBe("view");
+    expect(kind({ receivers: [{ kind: "lightmap" }, { kind: "lightmap" }] })).toBe("lightmap");
+    expect(kind({ source: { receiver: { kind: "vertices" } } })).toBe("vertices");
+    expect(kind({ source: { receivers: [{ kind: "lightmap" }] } })).toBe("lightmap");
+    expect(kind({})).toBeUndefined();
   });
 
   it("keeps files inside the folder", () => {
@@ -112,11 +124,11 @@ describe("manifests", () => {
 });
 
 describe("loading", () => {
-  const answering = (status: number, body: string) => async () => new Response(body, { status });
+  const serving = (status: number, body: string) => async () => new Response(body, { status });
 
   it("says what a server did not have", async () => {
-    await expect(loadAsset("http://x/a", { fetch: answering(404, "") })).rejects.toThrow("expected a file at http://x/a/asset.json, found status 404");
-    await expect(loadAsset("http://x/a/", { fetch: answering(200, "<html>") })).rejects.toThrow("expected JSON at http://x/a/asset.json");
+    await expect(loadAsset("http://x/a", { fetch: serving(404, "") })).rejects.toThrow("expected a file at http://x/a/asset.json, found status 404");
+    await expect(loadAsset("http://x/a/", { fetch: serving(200, "<html>") })).rejects.toThrow("expected JSON at http://x/a/asset.json");
   });
 
   it("names the damaged file", async () => {
@@ -137,7 +149,7 @@ describe("compressed layers", () => {
 
 describe("shader text", () => {
   it("is the pack's, each function once, with the sizes of the asset", () => {
-    const asset = { manifest: MANIFEST, layers: { count: 3 }, basis: { kind: "gaussian" } } as unknown as Asset;
+    const asset = { method: methodNamed("relighting-map"), tables: { defines: { SRBF_K: 3 } } } as unknown as Asset;
     const text = shaderText(asset, 2);
     expect(text).toContain("#define SRBF_K 3\n#define SRBF_POINT_LIGHTS 2");
     expect(text.match(/float srbfVersine\(/g)).toHaveLength(1);

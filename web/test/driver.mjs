@@ -1,4 +1,4 @@
-// A browser that answers jobs: JSON lines in, JSON lines out. node driver.mjs CHROMIUM PAGES ASSETS
+// A browser that runs jobs: JSON lines in, JSON lines out. node driver.mjs CHROMIUM PAGES ASSETS
 import { createReadStream, existsSync, statSync } from "node:fs";
 import { createServer } from "node:http";
 import { extname, join, normalize } from "node:path";
@@ -52,7 +52,7 @@ for await (const line of createInterface({ input: process.stdin })) {
   said.length = 0;
   let response;
   try {
-    const late = new Promise((_, reject) => setTimeout(() => reject(new Error(`no answer within ${PATIENCE} ms`)), PATIENCE).unref());
+    const late = new Promise((_, reject) => setTimeout(() => reject(new Error(`no response within ${PATIENCE} ms`)), PATIENCE).unref());
     response = await Promise.race([page.evaluate((job) => window.runJob(job), JSON.parse(line)), late]);
   } catch (error) {
     response = { error: String(error) };

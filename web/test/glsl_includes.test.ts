@@ -21,6 +21,11 @@ it("puts every file once, where it is first asked for, without versions and comm
   expect(files).toHaveLength(3);
 });
 
+it("follows no include in a comment", () => {
+  const root = folder({ "a.glsl": '/*\n#include "none.glsl"\n*/\n// #include "none.glsl"\nfloat a;' });
+  expect(resolveIncludes(join(root, "a.glsl"), root).text).toBe("float a;");
+});
+
 it("names cycles and missing files", () => {
   const root = folder({ "a.glsl": '#include "b.glsl"', "b.glsl": '#include "a.glsl"', "d.glsl": '\n#include "none.glsl"' });
   expect(() => resolveIncludes(join(root, "a.glsl"), root)).toThrow("a.glsl -> b.glsl -> a.glsl");

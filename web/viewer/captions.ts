@@ -1,4 +1,4 @@
-/** What the page says beside the picture: title, status, the sun's bearing, and what false colors mean. */
+/** Text beside the picture: title, status, the selected light's direction, and the legend of false colors. */
 import type { Light, Triple } from "../src";
 import type { Comparison } from "./comparison";
 import type { Facts } from "./loading";
@@ -6,10 +6,10 @@ import type { COLORS } from "./screen";
 import type { State } from "./state";
 import type { Subject } from "./subject";
 
-/** The scene's name, and what its asset is. */
+/** The scene's name, and its asset in one line. */
 export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): void {
-  const { manifest, layers } = asset;
-  const many = manifest.scalars === undefined ? `${layers.count} maps` : `${manifest.scalars} planes`;
+  const { manifest, method, tables } = asset;
+  const many = `${tables.maps} ${method.mapsName}`;
   const name = document.createElement("h1");
   name.textContent = facts.title;
   const line = document.createElement("p");
@@ -17,36 +17,36 @@ export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): vo
   place.replaceChildren(name, line);
 }
 
-/** Time (`pace`, ms; none while it is not known) and memory, what is compared with what, and what is left out of the picture. */
+/** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks. */
 export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number): void {
   const { asset, facts, hasDirect } = subject;
   const { compared, error } = comparison;
   const parts = [
-    `<b>${pace === undefined ? "–" : pace.toFixed(1)}</b> ms a frame`,
-    `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU, <b>${facts.bytes_per_texel}</b> bytes a texel`,
+    `<b>${pace === undefined ? "–" : pace.toFixed(1)}</b> ms per frame`,
+    `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU, <b>${facts.bytes_per_texel}</b> bytes per texel`,
   ];
   if (compared >= 0) parts.push(`baked light <b>${compared}</b> (${comparison.role})${error ? `, rmse <b>${error}</b>` : ""}`);
   if (asset.manifest.transport === "indirect") {
-    if (!hasDirect || compared >= 0 || terms === "indirect") parts.push("indirect light alone");
-    else if (shining.some((light) => light.kind !== "directional")) parts.push("lamps and skies: indirect light alone");
+    if (!hasDirect || compared >= 0 || terms === "indirect") parts.push("indirect light only");
+    else if (shining.some((light) => light.kind !== "directional")) parts.push("point, spot and environment lights: indirect light only");
   }
   place.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
 }
 
-/** Where a sun stands; `inside`: whether the capture saw light from there. */
+/** A directional light's azimuth and elevation; `inside`: whether it lies in the captured domain. */
 export function bearing(place: HTMLElement, direction: Triple | undefined, inside: boolean): void {
   if (!direction) {
-    place.textContent = "drag on the sky to add a sun";
+    place.textContent = "drag on the disc to add a directional light";
     return;
   }
   const [x, y, z] = direction;
   const elevation = (Math.asin(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z)))) * 180) / Math.PI;
   const azimuth = ((Math.atan2(y, x) * 180) / Math.PI + 360) % 360;
   place.classList.toggle("warn", !inside);
-  place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · the capture saw no light there"}`;
+  place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · outside the captured domain"}`;
 }
 
-/** What the colors of a picture that is no picture mean, up to `most`; hidden where it is one. */
+/** What false colors mean, up to `most`; hidden for a picture in true colors. */
 export function legend(place: HTMLElement, color: keyof typeof COLORS, most: number): void {
   const text = (x: number) => String(Number(x.toPrecision(3)));
   place.hidden = color !== "magnitude" && color !== "signed" && color !== "negative";
@@ -54,7 +54,7 @@ export function legend(place: HTMLElement, color: keyof typeof COLORS, most: num
   const bars = {
     magnitude: ["linear-gradient(90deg,#30123b,#4668e0,#1bcfd4,#61fc6c,#d1e834,#fe9b2d,#d93806,#7a0402)", "0", "luminance", text(most)],
     signed: ["linear-gradient(90deg,#d9f0ff,#2e80ff,#121315,#ff4729,#ffedcc)", text(-most), "0", text(most)],
-    negative: ["linear-gradient(90deg,#590d6b,#ff59ff)", "0", "below 0, cut off", text(-most / 8)],
+    negative: ["linear-gradient(90deg,#590d6b,#ff59ff)", "0", "below 0, clamped", text(-most / 8)],
   } as const;
   const [bar, left, middle, right] = bars[color as keyof typeof bars];
   place.innerHTML = `<i style="background:${bar}"></i><div><span>${left}</span><span>${middle}</span><span>${right}</span></div>`;

@@ -1,4 +1,4 @@
-/** The capture's picture that stands beside what is relit: of the baked light that is nearest to the sun; and every light's error. */
+/** The reference of the baked light that is nearest to the directional light, beside the relit picture; and every light's error. */
 import type { WebGLRenderer } from "three";
 import type { DirectionalLight, Triple } from "../src";
 import { fetched } from "../src/files";
@@ -18,9 +18,9 @@ export interface LightErrors {
 }
 
 export class Comparison {
-  /** The baked light that is compared with; none yet: -1. */
+  /** Index of the baked light that is compared with; -1 without one. */
   compared = -1;
-  /** Of what is shown now, three digits; empty while it is not known. */
+  /** Error of what is shown now, three digits; empty until it is known. */
   error = "";
   private wanted = -1;
   private readonly errorsOf = new Map<string, Promise<LightErrors>>();
@@ -30,8 +30,8 @@ export class Comparison {
     private readonly uniforms: ScreenUniforms,
     private readonly copy: Copy,
     private readonly receivers: Receivers,
-    /** Called around what takes a while, and when there is something new to draw. */
-    private readonly page: { wait(): void; done(): void; changed(): void; told(): void },
+    /** Called around slow work, and when there is something new to draw. */
+    private readonly page: { wait(): void; done(): void; changed(): void; measured(): void },
   ) {}
 
   get possible(): boolean {
@@ -43,7 +43,7 @@ export class Comparison {
     this.error = "";
   }
 
-  /** The light to relight by in the sun's stead; none while its picture is on its way. */
+  /** The baked light to relight by in place of `sun`; undefined while its image is loading. */
   light(sun: DirectionalState): DirectionalLight | undefined {
     const references = this.references as References;
     this.error = "";
@@ -53,31 +53,31 @@ export class Comparison {
     return this.compared < 0 ? undefined : { kind: "directional", direction: references.lights[this.compared].direction, color };
   }
 
-  /** After the light of `light` was drawn: how far it is from the capture's picture. */
+  /** Measure the error of the relit picture, once the light of `light` has been drawn. */
   measure(subject: Subject, sun: DirectionalState, renderer: WebGLRenderer): void {
     const [index, color] = [this.compared, linearColor(sun)];
     void this.references?.image(index).then((image) => {
       if (index !== this.compared) return;
       const relit = this.copy.read(renderer, subject.lightmap);
       this.error = rmse(relit, image, color, subject.asset.ambient, (texel) => this.receivers.covered(texel)).toPrecision(3);
-      this.page.told();
+      this.page.measured();
     });
   }
 
-  /** Likewise. */
+  /** Role of the baked light that is compared with. */
   get role(): string {
     return this.references?.lights[this.compared]?.role ?? "";
   }
 
-  /** Of the baked light that is compared with. */
+  /** Direction of the baked light that is compared with. */
   get direction(): Triple | undefined {
     return this.references?.lights[this.compared]?.direction;
   }
 
-  /** Every light's error of `subject`, measured by the server when it is first asked for. @throws SrbfError where it cannot be. */
+  /** Every light's error of `subject`, measured by the server on the first request. @throws SrbfError where that fails. */
   errors(subject: Subject): Promise<LightErrors> {
     const { errors: url } = subject.facts;
-    if (!url) return Promise.reject(new Error("expected a capture to tell errors by, found none; give it to srbf view"));
+    if (!url) return Promise.reject(new Error("expected a capture to measure errors against, found none; pass it to srbf view"));
     let found = this.errorsOf.get(url);
     if (!found) {
       found = fetched(fetch.bind(window), url).then((response) => response.json());
@@ -87,7 +87,7 @@ export class Comparison {
     return found;
   }
 
-  /** Compare with light `index` as soon as its picture is there. */
+  /** Compare with light `index` as soon as its image is loaded. */
   private want(index: number): void {
     const { references } = this;
     if (!references || index === this.wanted) return;

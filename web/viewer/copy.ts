@@ -1,4 +1,4 @@
-/** A texture drawn into another of single floats: to be kept while the first is drawn anew, or read back. */
+/** Copies a texture into one of single floats, to keep it or to read it back. */
 import { FloatType, GLSL3, Mesh, NearestFilter, NoBlending, OrthographicCamera, PlaneGeometry, RawShaderMaterial, RGBAFormat, Scene, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
 
 export class Copy {

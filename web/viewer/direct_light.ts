@@ -1,6 +1,6 @@
 /**
- * Direct light of suns on an indirect asset, by one orthographic shadow map each: the passes of `srbf/visibility/shadow_map.py`, with the same shaders.
- * Translucent walls multiply a second map by their tint. Lamps and skies add none.
+ * Direct light of directional lights on an indirect asset, by one orthographic shadow map each: the passes of `srbf/visibility/shadow_map.py`, with the
+ * same shaders. Translucent walls multiply a second map by their transmittance. Other kinds of lights add no direct light.
  */
 import {
   AddEquation,
@@ -40,27 +40,20 @@ import directFragment from "../../glsl/stages/direct.frag";
 import fullscreenVertex from "../../glsl/stages/fullscreen.vert";
 import heightFragment from "../../glsl/stages/shadow_height.frag";
 import shadowVertex from "../../glsl/stages/shadow.vert";
-import tintFragment from "../../glsl/stages/shadow_transmittance.frag";
-import { type Asset, type DirectionalLight, type FloatImage, type Light, SrbfError, type Triple } from "../src";
-import { turned } from "../src/matrix";
+import transmittanceFragment from "../../glsl/stages/shadow_transmittance.frag";
+import { type Asset, type DirectionalLight, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
 import { type DirectReceivers, directReceivers } from "./direct_points";
 import { fromThree } from "./frames";
+import { across, cross, discDirections } from "./sun_disc";
 
-const SIZE = 2048; // texels a side of a shadow map
+const SIZE = 2048; // texels per side of a shadow map
 const NOTHING = -1e30; // height where no occluder is
-const KNOTS = 8; // of a tint by the cosine
-// Of a sun that has a size: sixteen points that fill the unit disc evenly [Sobol1967], its area kept.
-const DISC = [
-  [0, 0], [-0.70710678, 0], [0, 0.5], [0, -0.8660254], [0.55901699, -0.55901699], [-0.25, 0.25], [-0.66143783, -0.66143783], [0.4330127, 0.4330127],
-  [-0.89454251, 0.37053164], [0.61108887, -0.2531213], [0.31730434, 0.76604044], [-0.16570679, -0.40005157], [-0.51646436, -0.21392654], [0.83277376, 0.34494618],
-  [0.09567086, -0.23096988], [-0.28701257, 0.69290965],
-] as const; // prettier-ignore
-
-/** What direct light needs beside the maps: images of the asset, and the scene that casts. */
+const KNOTS = 8; // of a transmittance by cosine
+/** What direct light needs besides the maps: images of the asset, and the scene that casts shadows. */
 export interface DirectInputs {
   normal: FloatImage;
   coverage?: FloatImage;
-  /** Of radiance. */
+  /** Of radiance assets. */
   albedo?: FloatImage;
   scene: Object3D;
 }
@@ -78,11 +71,11 @@ export class DirectLight {
   private readonly corners: { points: DataTexture; normals: DataTexture }[];
   private readonly heights = target(SIZE, SIZE, RedFormat, FloatType);
   private readonly wallHeights = target(SIZE, SIZE, RedFormat, FloatType);
-  private readonly tints = target(SIZE, SIZE, RGBAFormat, HalfFloatType, LinearFilter);
+  private readonly transmittances = target(SIZE, SIZE, RGBAFormat, HalfFloatType, LinearFilter);
   private readonly sum: WebGLRenderTarget;
   private readonly occluders = new Scene();
   private readonly walls = new Scene();
-  private readonly tinted = new Scene();
+  private readonly translucent = new Scene();
   private readonly quad = new Scene();
   private readonly camera = new Camera();
   private readonly frame = { across: { value: [0, 0, 0] }, up: { value: [0, 0, 0] }, toLight: { value: [0, 0, 0] }, low: { value: [0, 0] }, extent: { value: 1 } };
@@ -98,7 +91,7 @@ export class DirectLight {
     private readonly renderer: WebGLRenderer,
   ) {
     if (!renderer.extensions.has("EXT_color_buffer_float") || !renderer.extensions.has("EXT_float_blend")) {
-      throw new SrbfError("expected a GPU that blends floats for direct light, found one without: the indirect light is shown alone");
+      throw new SrbfError("expected a GPU that blends floats for direct light, found one without: only the indirect light is shown");
     }
     const { width, height, direct } = asset.manifest;
     this.sunAngle = direct?.sun_angle ?? 0;
@@ -117,7 +110,7 @@ export class DirectLight {
         normals: { value: null },
         heights: { value: this.heights.texture },
         wallHeights: { value: this.wallHeights.texture },
-        tints: { value: this.tints.texture },
+        transmittance: { value: this.transmittances.texture },
         reflectance: { value: this.reflectance },
         weight: { value: [0, 0, 0] },
       },
@@ -129,7 +122,7 @@ export class DirectLight {
     this.quad.add(unculled(corner, this.lookup));
   }
 
-  /** The direct light of the directional ones of `lights`, in the asset's quantity, drawn anew where they changed. */
+  /** The direct light of the directional ones of `lights`, in the asset's quantity, redrawn where they have changed. */
   draw(lights: readonly Light[]): Texture {
     const suns = lights.filter((light): light is DirectionalLight => light.kind === "directional");
     const state = JSON.stringify(suns);
@@ -147,19 +140,19 @@ export class DirectLight {
   }
 
   private add(sun: DirectionalLight): void {
-    const towards = unit(turned(this.asset.assetFromWorld, sun.direction));
-    const suns = disc(towards, this.sunAngle);
+    const towards = moved(sun, this.asset.assetFromWorld).direction;
+    const suns = discDirections(towards, this.sunAngle);
     for (const direction of suns) {
       this.setFrame(this.around(direction));
       this.clear(this.heights, NOTHING);
       this.renderer.render(this.occluders, this.camera);
       this.clear(this.wallHeights, NOTHING);
-      this.clear(this.tints, 1);
+      this.clear(this.transmittances, 1);
       if (this.walls.children.length) {
         this.renderer.setRenderTarget(this.wallHeights);
         this.renderer.render(this.walls, this.camera);
-        this.renderer.setRenderTarget(this.tints);
-        this.renderer.render(this.tinted, this.camera);
+        this.renderer.setRenderTarget(this.transmittances);
+        this.renderer.render(this.translucent, this.camera);
       }
       const { uniforms } = this.lookup;
       uniforms.weight.value = sun.color.map((value) => value / (suns.length * this.corners.length));
@@ -184,23 +177,23 @@ export class DirectLight {
 
   /** A square across the light that holds every point, and a hundredth more on every side. */
   private around(toLight: Triple): Frame {
-    const across = unit(cross(toLight, Math.abs(toLight[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
-    const up = cross(toLight, across);
+    const right = across(toLight);
+    const up = cross(toLight, right);
     const [least, most] = [[Infinity, Infinity], [-Infinity, -Infinity]];
     const { bounds } = this.receivers;
     for (let i = 0; i < bounds.length; i += 3) {
       const [x, y, z] = [bounds[i], bounds[i + 1], bounds[i + 2]];
-      const flat = [x * across[0] + y * across[1] + z * across[2], x * up[0] + y * up[1] + z * up[2]];
+      const flat = [x * right[0] + y * right[1] + z * right[2], x * up[0] + y * up[1] + z * up[2]];
       for (const a of [0, 1]) {
         least[a] = Math.min(least[a], flat[a]);
         most[a] = Math.max(most[a], flat[a]);
       }
     }
     const extent = Math.max(most[0] - least[0], most[1] - least[1], 1e-6) * 1.02;
-    return { across, up, toLight, low: [(least[0] + most[0] - extent) / 2, (least[1] + most[1] - extent) / 2], extent };
+    return { across: right, up, toLight, low: [(least[0] + most[0] - extent) / 2, (least[1] + most[1] - extent) / 2], extent };
   }
 
-  /** Sort the triangles that cast by whether they stop the light, or tint it. */
+  /** Split the triangles that cast shadows into opaque and translucent ones. */
   private readScene(scene: Object3D): void {
     scene.updateMatrixWorld(true);
     const height = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader: shadowVertex, fragmentShader: heightFragment, uniforms: this.frame, ...blending("max") });
@@ -208,20 +201,20 @@ export class DirectLight {
       const mesh = object as Mesh<BufferGeometry, Material>;
       if (!mesh.isMesh || casts(mesh) === false) return;
       const geometry = this.geometry(mesh);
-      const curve = tintOf(mesh.material);
+      const curve = transmittanceOf(mesh.material);
       if (!curve) {
         this.occluders.add(unculled(geometry, height));
         return;
       }
-      const tint = new RawShaderMaterial({
+      const transmittance = new RawShaderMaterial({
         glslVersion: GLSL3,
         vertexShader: shadowVertex,
-        fragmentShader: tintFragment,
+        fragmentShader: transmittanceFragment,
         uniforms: { ...this.frame, curve: { value: curve } },
         ...blending("multiply"),
       });
       this.walls.add(unculled(geometry, height));
-      this.tinted.add(unculled(geometry, tint));
+      this.translucent.add(unculled(geometry, transmittance));
     });
   }
 
@@ -249,7 +242,7 @@ export class DirectLight {
   }
 }
 
-/** The pack's stage with a light's color, and with what a texel answers to irradiance. */
+/** The pack's stage with a light's color, and with each texel's response to irradiance. */
 function colored(stage: string): string {
   return stage
     .replace("uniform float weight;", "uniform vec3 weight;\nuniform sampler2D reflectance;")
@@ -261,10 +254,10 @@ function casts(object: Object3D): boolean {
   return true;
 }
 
-/** What one wall lets through at eight cosines; none where it is opaque. */
-function tintOf(material: Material): Vector4[] | undefined {
-  const told = material.userData.tint_by_cosine as number[][] | undefined;
-  if (told) return told.some((row) => row.some((x) => x > 0)) ? told.map(([r, g, b]) => new Vector4(r, g, b, 0)) : undefined;
+/** Transmittance of one wall at eight cosines; undefined where it is opaque. */
+function transmittanceOf(material: Material): Vector4[] | undefined {
+  const curve = material.userData.tint_by_cosine as number[][] | undefined;
+  if (curve) return curve.some((row) => row.some((x) => x > 0)) ? curve.map(([r, g, b]) => new Vector4(r, g, b, 0)) : undefined;
   const { transmission = 0, color } = material as Material & { transmission?: number; color?: Color };
   if (!(transmission > 0)) return undefined;
   const { r, g, b } = color ?? new Color(1, 1, 1);
@@ -278,15 +271,6 @@ function reflectance(asset: Asset, albedo: FloatImage | undefined): Float32Array
   if (quantity === "irradiance" || !albedo) return out;
   for (let i = 0; i < width * height; ++i) for (let c = 0; c < 3; ++c) out[4 * i + c] = albedo.data[albedo.channels * i + c] / Math.PI;
   return out;
-}
-
-/** Unit directions that fill a sun's disc of the angular diameter `angle` (rad). */
-function disc(direction: Triple, angle: number): Triple[] {
-  if (angle === 0) return [direction];
-  const across = unit(cross(direction, Math.abs(direction[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
-  const up = cross(direction, across);
-  const t = Math.tan(angle / 2);
-  return DISC.map(([x, y]) => unit([0, 1, 2].map((c) => direction[c] + t * (x * across[c] + y * up[c])) as unknown as Triple));
 }
 
 function blending(kind: "add" | "max" | "multiply") {
@@ -308,11 +292,4 @@ function unculled(geometry: BufferGeometry, material: RawShaderMaterial): Mesh {
   const mesh = new Mesh(geometry, material);
   mesh.frustumCulled = false;
   return mesh;
-}
-
-const cross = (a: Triple, b: Triple): Triple => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-
-function unit(v: Triple): Triple {
-  const length = Math.hypot(...v);
-  return [v[0] / length, v[1] / length, v[2] / length];
 }

@@ -1,11 +1,11 @@
-/** Where an asset's texels are lit: four points of each texel's footprint, with their normals. `srbf/visibility/receivers.py` says the same in numpy. */
+/** Where an asset's texels are lit: four points of each texel's footprint, with their normals, as in `srbf/visibility/receivers.py`. */
 import type { Asset, FloatImage } from "../src";
 
 const SAME_SURFACE_COS = 0.9; // of the normals of two neighbors that lie on one smooth surface
 const OFF_PLANE = 0.2; // of their distance: how far a neighbor may lie off the tangent plane
-const LONGER = 2.0; // a neighbor farther off than this many times the other side's lies across a seam
+const LONGER = 2.0; // a neighbor farther away than this many times the opposite one lies across a seam
 const FEW = 1 << 14; // texels
-const BLOCK = 8; // texels a side
+const BLOCK = 8; // texels per side
 const CORNERS = [
   [-0.25, -0.25],
   [0.25, -0.25],
@@ -20,14 +20,14 @@ export interface LitPoints {
 }
 
 export interface DirectReceivers {
-  /** Metres, of the covered texels: single precision is finest about the origin. */
+  /** Meters, of the covered texels: single precision is finest about the origin. */
   center: [number, number, number];
   corners: LitPoints[];
-  /** Points, xyz, whose bounds along any axis hold those of all covered texels' points. */
+  /** Points, xyz, whose bounds along any axis contain those of all covered texels' points. */
   bounds: Float32Array;
 }
 
-/** The points that `asset` is lit at; `footprint` is how much of a texel counts. */
+/** The points at which `asset` is lit; `footprint` is the fraction of a texel's side that they span. */
 export function directReceivers(asset: Asset, position: FloatImage, normal: FloatImage, coverage: FloatImage | undefined, footprint: number): DirectReceivers {
   const { width, height } = asset.manifest;
   const real = (i: number) => coverage === undefined || coverage.data[coverage.channels * i] > 0;
@@ -89,7 +89,7 @@ function bounding(width: number, height: number, corners: readonly LitPoints[], 
 
 type Pair = [Float32Array, Float32Array];
 
-/** Change of position and normal a texel to the right, and a texel down; 0 where no neighbor lies on the same surface. */
+/** Change of position and normal per texel to the right and per texel down; 0 where no neighbor lies on the same surface. */
 function gradients(width: number, height: number, position: FloatImage, normal: FloatImage, real: (i: number) => boolean): { position: Pair; normal: Pair } {
   const of = (image: FloatImage, i: number, c: number) => image.data[image.channels * i + c];
   const pair = (): Pair => [new Float32Array(3 * width * height), new Float32Array(3 * width * height)];

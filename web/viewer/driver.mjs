@@ -24,7 +24,7 @@ let page;
 const settled = () => page.waitForFunction(() => document.body.dataset.state !== "busy" && document.body.dataset.state, undefined, { timeout: 60_000, polling: 20 });
 
 const commands = {
-  /** `moving`: what plays is never at rest. */
+  /** `moving`: do not wait for the page to come to rest. */
   async open({ url, width = 900, height = 700, touch = false, moving = false }) {
     await context?.close();
     context = await browser.newContext({ viewport: { width, height }, acceptDownloads: true, hasTouch: touch });
@@ -43,7 +43,7 @@ const commands = {
     const value = await page.evaluate(script);
     return value;
   },
-  /** The address once it says what is shown. */
+  /** The address, once it is up to date. */
   async address() {
     await page.waitForFunction(() => document.body.dataset.address !== "old", undefined, { timeout: 60_000, polling: 20 });
     return page.url();

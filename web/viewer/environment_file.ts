@@ -1,4 +1,4 @@
-/** Equirectangular pictures that are dropped on the page: EXR, Radiance HDR, PNG; values as `srbf relight --environment` reads them. */
+/** Environment maps that are dropped on the page: EXR, Radiance HDR, PNG; values as `srbf relight --environment` reads them. */
 import { FloatType } from "three";
 import { HDRLoader } from "three/addons/loaders/HDRLoader.js";
 import { SrbfError } from "../src";

@@ -6,14 +6,14 @@ export const toThree = (p: Triple): Vector3 => new Vector3(p[0], p[2], -p[1]);
 
 export const fromThree = (v: Vector3): Triple => [v.x, -v.z, v.y];
 
-/** viewer.json's camera: rows of `rotation` are right, down, forward; `lens` takes camera coordinates to (u, v, 1) times depth. */
+/** viewer.json's camera: rows of `rotation` are right, down, forward; `lens` maps camera coordinates to (u, v, 1) times depth. */
 export interface FittedCamera {
   position: Triple;
   rotation: [Triple, Triple, Triple];
   lens: [Triple, Triple, Triple];
 }
 
-/** A three.js camera that sees what the picture shows, the picture's corners at `scale` and `offset` in clip space. */
+/** A three.js camera that matches the picture, whose corners are at `scale` and `offset` in clip space. */
 export function viewCamera(fitted: FittedCamera, scale: [number, number], offset: [number, number], near: number, far: number): PerspectiveCamera {
   const camera = new PerspectiveCamera();
   const [right, down, forward] = fitted.rotation.map(toThree);

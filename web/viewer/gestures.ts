@@ -1,4 +1,4 @@
-/** What is dragged over the page that is no light: the comparison's slider, and files. */
+/** What else is dragged on the page besides lights: the comparison's slider, and files. */
 import { element } from "./messages";
 import type { Changed, State } from "./state";
 

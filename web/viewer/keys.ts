@@ -6,21 +6,21 @@ const STEP = (2 * Math.PI) / 180;
 const LARGE_STEP = (10 * Math.PI) / 180;
 
 const KEYS: [string, string][] = [
-  ["← → ↑ ↓", "move the sun, by 2°; with shift by 10°"],
-  ["space", "play or hold the path"],
+  ["← → ↑ ↓", "move the directional light by 2°, with shift by 10°"],
+  ["space", "play or pause the path"],
   ["1 … 9", "select a light"],
   ["delete", "remove the light"],
-  ["double click", "put the lamp above a point, or aim the spot at it"],
+  ["double click", "put the point light above a place, or aim the spot at it"],
   ["t", "the scene, the mesh alone, or texels"],
   ["a", "the next asset"],
-  ["c", "compare with the capture, the next way"],
-  ["m", "the next map"],
+  ["c", "next comparison with the capture"],
+  ["m", "the next coefficient map"],
   ["r", "reset the view"],
   ["h", "hide the panel"],
   ["?", "this list"],
 ];
 
-/** The list of them, as HTML. */
+/** The list of keys, as HTML. */
 export const tabled = () => `<h2>Keys</h2><table>${KEYS.map(([key, what]) => `<tr><td>${key}</td><td>${what}</td></tr>`).join("")}</table>`;
 
 export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void; nextAsset(): void }): void {
@@ -30,7 +30,7 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
     if (event.key === " " && target.tagName === "BUTTON") return;
     const step = event.shiftKey ? LARGE_STEP : STEP;
     const turns: Record<string, [number, number]> = { ArrowLeft: [step, 0], ArrowRight: [-step, 0], ArrowUp: [0, step], ArrowDown: [0, -step] };
-    if (turns[event.key]) moveSun(state, ...turns[event.key]);
+    if (turns[event.key]) moveDirectional(state, ...turns[event.key]);
     else if (event.key === " ") {
       state.playing = !state.playing;
       if (state.playing && state.path === "none") state.path = "turn";
@@ -52,11 +52,11 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
     event.preventDefault();
     changed({ lights: true });
   };
-  window.addEventListener("keydown", heard, { capture: true }); // the panel keeps to itself what is pressed on its buttons
+  window.addEventListener("keydown", heard, { capture: true }); // the panel does not pass on what is pressed on its buttons
 }
 
-/** The selected sun, or the first, by azimuth and elevation (rad); never over the zenith. */
-function moveSun(state: State, azimuth: number, elevation: number): void {
+/** Move the selected directional light, or the first, by azimuth and elevation (rad); never over the zenith. */
+function moveDirectional(state: State, azimuth: number, elevation: number): void {
   const selected = state.lights[state.selected];
   const sun = selected?.kind === "directional" ? selected : state.lights.find((light) => light.kind === "directional");
   if (sun?.kind !== "directional") return;

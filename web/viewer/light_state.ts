@@ -1,4 +1,4 @@
-/** Lights as the page holds them, in its URL too: numbers rounded when they are set, so that page, URL and FRAMES.json say the same. */
+/** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
 import { directionalLight, environmentLight, type Light, pointLight, spotLight, SrbfError, type Triple } from "../src";
 import type { Environment } from "./environment_file";
 
@@ -6,7 +6,7 @@ interface Common {
   on: boolean;
   /** sRGB, #rrggbb. */
   color: string;
-  /** Times the color, linear: irradiance of a directional light, of a lamp at a0; an environment's scale. */
+  /** Times the color, linear: irradiance of a directional light, and of a point or spot light at a0; an environment's scale. */
   intensity: number;
 }
 
@@ -26,7 +26,7 @@ export interface PointState extends PointLight {
   kind: "point";
 }
 
-/** Half-angles in degrees; it shines at `target`. */
+/** Half-angles in degrees; it is aimed at `target`. */
 export interface SpotState extends PointLight {
   kind: "spot";
   target: Triple;
@@ -69,7 +69,7 @@ export function isPointLightState(light: LightState | undefined): light is Point
   return light?.kind === "point" || light?.kind === "spot";
 }
 
-/** Five decimals: a hundredth of a millimetre, a thousandth of a degree. */
+/** Five decimals: a hundredth of a millimeter, a thousandth of a degree. */
 export const round = (x: number): number => Math.round(x * 1e5) / 1e5 + 0;
 
 export const rounded = (v: Triple): Triple => [round(v[0]), round(v[1]), round(v[2])];
@@ -83,7 +83,7 @@ export function linearColor(light: Common): Triple {
   return [channel(1), channel(3), channel(5)];
 }
 
-/** The library's light; none where it is off, or its environment was not dropped yet. @throws SrbfError on numbers that no light can have. */
+/** The library's light; undefined where it is off, or its environment map has not been dropped yet. @throws SrbfError on invalid numbers. */
 export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>): Light | undefined {
   if (!state.on) return undefined;
   const color = linearColor(state);
@@ -104,7 +104,7 @@ export function aim(spot: SpotState): Triple {
   return direction.some((x) => x !== 0) ? direction : [0, 0, -1];
 }
 
-/** `value` as a light's state. @throws SrbfError where it is none. */
+/** `value` as a light's state. @throws SrbfError on anything else. */
 export function checkLight(value: unknown): LightState {
   const light = value as Record<string, unknown>;
   const bad = (what: string): never => {

@@ -1,4 +1,4 @@
-/** What the page reads before it shows anything, and how far it is. */
+/** What the page loads before it shows anything, and its progress. */
 import type { BufferGeometry, Material, Mesh, Object3D, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { type Asset, type FloatImage, loadAsset, SrbfError } from "../src";
@@ -30,12 +30,12 @@ export interface Facts {
   notes: string[];
 }
 
-/** An asset with what only a page asks of it. */
+/** An asset with what only the page needs of it. */
 export interface LoadedAsset {
   facts: AssetFacts;
   asset: Asset;
   coverage?: FloatImage;
-  /** Of an indirect asset that can be given its direct light. */
+  /** For an indirect asset whose direct light can be added. */
   direct?: DirectInputs;
 }
 
@@ -49,14 +49,14 @@ export interface Loaded {
 
 type Fetcher = (url: string) => Promise<Response>;
 
-/** What is read of viewer.json before anything else. @throws SrbfError where it is missing. */
+/** Reads viewer.json. @throws SrbfError where it is missing. */
 export async function loadFacts(): Promise<Facts> {
   const facts: Facts = await (await fetched(fetch.bind(window), "viewer.json")).json();
   document.title = `${facts.title} · srbf`;
   return facts;
 }
 
-/** @throws SrbfError in one line where anything that is needed is missing or damaged. */
+/** @throws SrbfError in one line where a file is missing or damaged. */
 export async function load(facts: Facts, index: number, progress: (done: number, what: string) => void): Promise<Loaded> {
   const notes = [...facts.notes];
   const [first, model, references] = await Promise.all([
@@ -93,7 +93,7 @@ async function readImage(folder: string, name: string, fetcher: Fetcher): Promis
   return decodeFloat(await (await fetched(fetcher, url)).arrayBuffer(), url);
 }
 
-/** None of combined assets, and of indirect ones that were made without what direct light needs. */
+/** Undefined for combined assets, and for indirect ones that lack what direct light needs. */
 async function readDirect(asset: Asset, coverage: FloatImage | undefined, folder: string, fetcher: Fetcher): Promise<DirectInputs | undefined> {
   const { transport, scene, normal, albedo, quantity } = asset.manifest;
   if (transport !== "indirect" || !scene || !normal || !asset.position || (quantity === "radiance" && !albedo)) return undefined;

@@ -1,4 +1,4 @@
-/** The page: loads an asset and shows it, or says in one line why not. */
+/** The page: loads an asset and shows it, or says in one line why it cannot. */
 import { load, loadFacts } from "./loading";
 import { element, lineOf } from "./messages";
 import { Viewer } from "./viewer";
@@ -23,7 +23,7 @@ async function main(): Promise<void> {
   }
 }
 
-/** Which asset an address asks for; the first where it says none, or none that there is. */
+/** Index of the asset that an address names; 0 where it names none that exists. */
 function assetOf(hash: string, count: number): number {
   const index = Number(/'asset':(\d+)/.exec(decodeURIComponent(hash))?.[1] ?? 0);
   return index < count ? index : 0;

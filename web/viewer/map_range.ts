@@ -1,4 +1,4 @@
-/** How large a map's values are: what its false color is scaled to. */
+/** Where a coefficient map is stored, and how large its values are: what its false color is scaled to. */
 import { DataUtils } from "three";
 import type { Asset } from "../src";
 
@@ -7,7 +7,13 @@ const QUANTILE = 0.98; // a few texels may be far larger than the rest
 
 const known = new WeakMap<Asset, Map<number, number>>();
 
-/** The 98 % quantile of the magnitude of map `index`, or of scalar plane `index`; of compressed ones the most that they can hold. */
+/** The layer of coefficient map `index`, and its channel there; without one the map is all three of RGB. */
+export function mapPlace(asset: Asset, index: number): { layer: number; channel?: number } {
+  const { mapsPerLayer } = asset.method;
+  return mapsPerLayer === 1 ? { layer: index } : { layer: Math.floor(index / mapsPerLayer), channel: index % mapsPerLayer };
+}
+
+/** The 98 % quantile of the magnitude of coefficient map `index`; of a compressed one the largest that it can hold. */
 export function mapRange(asset: Asset, index: number): number {
   const ranges = known.get(asset) ?? new Map<number, number>();
   known.set(asset, ranges);
@@ -17,9 +23,8 @@ export function mapRange(asset: Asset, index: number): number {
 }
 
 function measured(asset: Asset, index: number): number {
-  const planes = asset.manifest.scalars !== undefined;
-  const layer = planes ? Math.floor(index / 4) : index;
-  const channels = planes ? [index % 4] : [0, 1, 2];
+  const { layer, channel } = mapPlace(asset, index);
+  const channels = channel === undefined ? [0, 1, 2] : [channel];
   const { width, height, encoding, levels } = asset.layers;
   const [scale, bias] = [asset.scale, asset.bias].map((all) => all.subarray(4 * layer, 4 * layer + 4));
   if (encoding === "bc7" || encoding === "bc1") return Math.max(...channels.flatMap((c) => [Math.abs(bias[c]), Math.abs(scale[c] + bias[c])]));

@@ -1,4 +1,4 @@
-/** The page's own elements, and the one line that it says. */
+/** The page's elements, and its one-line messages. */
 const TOAST = 8000; // milliseconds
 
 export const element = <E extends HTMLElement>(id: string) => document.getElementById(id) as E;

@@ -1,4 +1,4 @@
-/** The controls beside the picture: chips of the lights, and folders of numbers. */
+/** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
 import { directionalState, isPointLightState, type LightState, pointState, rounded, spotState } from "./light_state";
@@ -17,11 +17,11 @@ export interface Actions {
 }
 
 export interface PanelFacts {
-  /** Of the asset that is shown. */
+  /** Coefficient maps of the asset that is shown. */
   maps: number;
   hasPositions: boolean;
   hasDirect: boolean;
-  /** Names of all that can be switched between. */
+  /** Names of all assets. */
   assets: string[];
   hasMesh: boolean;
   hasScene: boolean;
@@ -29,7 +29,7 @@ export interface PanelFacts {
   bounds: Bounds;
 }
 
-const KINDS: Record<LightState["kind"], string> = { directional: "Sun", point: "Point", spot: "Spot", environment: "Sky" };
+const KINDS: Record<LightState["kind"], string> = { directional: "Directional", point: "Point", spot: "Spot", environment: "Environment" };
 
 export class Panel {
   private gui: GUI | undefined;
@@ -46,12 +46,12 @@ export class Panel {
     this.rebuild();
   }
 
-  /** After another asset was chosen. */
-  tell(facts: Partial<PanelFacts>): void {
+  /** Take the facts of another asset. */
+  setFacts(facts: Partial<PanelFacts>): void {
     this.facts = { ...this.facts, ...facts };
   }
 
-  /** After lights came, went or were selected. */
+  /** Redraw after lights were added, removed or selected. */
   rebuild(): void {
     this.gui?.folders.forEach((folder) => this.open.set(folder._title, !folder._closed));
     const scrolled = this.controls.parentElement?.scrollTop ?? 0;
@@ -67,7 +67,7 @@ export class Panel {
     if (this.controls.parentElement) this.controls.parentElement.scrollTop = scrolled;
   }
 
-  /** After numbers changed elsewhere. */
+  /** Show numbers that have changed elsewhere. */
   refresh(): void {
     this.gui?.controllersRecursive().forEach((controller) => controller.updateDisplay());
     this.drawChips();
@@ -80,10 +80,10 @@ export class Panel {
   private readonly relight = () => this.actions.changed({ lights: true });
   private readonly redraw = () => this.actions.changed();
 
-  private drawChips(anew = false): void {
+  private drawChips(always = false): void {
     const { lights, selected } = this.state;
     const drawn = JSON.stringify([selected, lights.map(({ kind, color, on }) => [kind, color, on])]);
-    if (!anew && drawn === this.drawn) return; // what is replaced loses its focus
+    if (!always && drawn === this.drawn) return; // replaced elements lose their focus
     this.drawn = drawn;
     const numbers = new Map<string, number>();
     const chips = lights.map((light, i) => {
@@ -112,7 +112,7 @@ export class Panel {
     this.chips.replaceChildren(...chips, add);
   }
 
-  /** A lamp at a place that hangs `height` above what it lights first. */
+  /** Add a light; a point or spot light at `at`, `height` above what it lights. */
   add(kind: LightState["kind"], at?: Triple, height = 0.5 * this.facts.bounds.radius): void {
     const { center } = this.facts.bounds;
     const place: Triple = at ?? [center[0], center[1], center[2] + height];
@@ -165,7 +165,7 @@ export class Panel {
           .onChange(this.relight);
       });
     };
-    coordinates("Point light", () => light.position, (place) => (light.position = place));
+    coordinates("Position", () => light.position, (place) => (light.position = place));
     folder.add(light, "a0", step, 4 * radius, step).name("a₀ (m)").onChange(this.relight);
     folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
     folder.add(light, "radius", 0.0001, radius, 0.0001).name("Radius (m)").onChange(this.relight);
@@ -173,20 +173,20 @@ export class Panel {
     coordinates("Aim", () => light.target, (place) => (light.target = place));
     folder
       .add(light, "inner", 0, 89, 0.1)
-      .name("Full within (°)")
+      .name("Inner half-angle (°)")
       .onChange(() => {
         light.outer = Math.max(light.outer, light.inner);
         this.relight();
       });
     folder
       .add(light, "outer", 0, 89, 0.1)
-      .name("None past (°)")
+      .name("Outer half-angle (°)")
       .onChange(() => {
         light.inner = Math.min(light.inner, light.outer);
         this.relight();
       });
     const target = { on: false };
-    folder.add(target, "on").name("Handles aim it").onChange(this.actions.moveTarget);
+    folder.add(target, "on").name("Handles move its aim").onChange(this.actions.moveTarget);
   }
 
   private picture(): void {
@@ -199,7 +199,7 @@ export class Panel {
     if (hasDirect) folder.add(this.state, "terms", { All: TERMS[0], Direct: TERMS[1], Indirect: TERMS[2] }).name("Light").onChange(this.relight);
     folder.add(this.state, "exposure", -8, 8, 0.05).name("Exposure (stops)").onChange(this.redraw);
     folder.add(this.state, "tone", { Linear: TONES[0], AgX: TONES[1], ACES: TONES[2] }).name("Tone").onChange(this.redraw);
-    folder.add(this.state, "show", { Picture: SHOWS[0], "False color": SHOWS[1], "Negative values": SHOWS[2], "A map": SHOWS[3] }).name("Show").onChange(this.relight);
+    folder.add(this.state, "show", { Picture: SHOWS[0], "False color": SHOWS[1], "Negative values": SHOWS[2], "Coefficient map": SHOWS[3] }).name("Show").onChange(this.relight);
     folder
       .add(this.state, "map", 0, this.facts.maps - 1, 1)
       .name("Map")
@@ -209,7 +209,7 @@ export class Panel {
       });
     folder.add(this.state, "spectrum").name("Spectrum").onChange(this.redraw);
     const views = { ...(hasScene ? { Scene: VIEWS[0] } : {}), Mesh: VIEWS[1], Texels: VIEWS[2] };
-    if (hasMesh) folder.add(this.state, "view", views).name("On").onChange(this.redraw);
+    if (hasMesh) folder.add(this.state, "view", views).name("Show on").onChange(this.redraw);
     folder.add(this.actions, "resetCamera").name("Reset view");
   }
 
@@ -217,13 +217,13 @@ export class Panel {
     const folder = (this.gui as GUI).addFolder("Compare");
     const names = { Off: COMPARES[0], "Slider: reference | relit": COMPARES[1], Difference: COMPARES[2], Reference: COMPARES[3] };
     folder.add(this.state, "compare", names).name("With the capture").onChange(this.relight);
-    folder.add(this.state, "errors").name("Errors on the sky").onChange(this.redraw);
+    folder.add(this.state, "errors").name("Error of each light").onChange(this.redraw);
   }
 
   private path(): void {
     const folder = (this.gui as GUI).addFolder("Path");
     folder.add(this.state, "path", { None: PATHS[0], Turn: PATHS[1], Swing: PATHS[2] }).name("Path").onChange(this.relight);
-    folder.add(this.state, "seconds", 1, 60, 0.5).name("Round (s)").onChange(this.redraw);
+    folder.add(this.state, "seconds", 1, 60, 0.5).name("Period (s)").onChange(this.redraw);
     folder
       .add(this.state, "playing")
       .name("Play")
@@ -231,7 +231,7 @@ export class Panel {
         if (this.state.playing && this.state.path === "none") this.state.path = "turn";
         this.relight();
       });
-    if (this.facts.hasMesh) folder.add(this.state, "turntable").name("Camera turns").onChange(this.redraw);
+    if (this.facts.hasMesh) folder.add(this.state, "turntable").name("Turntable").onChange(this.redraw);
   }
 
   private save(): void {

@@ -1,11 +1,12 @@
-/** Where a light is on its way: a turn about the vertical, or a swing over the zenith and back. */
+/** A light's place along its path: a turn about the vertical, or a swing over the zenith and back. */
 import type { Triple } from "../src";
 import { type LightState, rounded } from "./light_state";
+import type { Bounds } from "./receivers";
 import type { State } from "./state";
 
 const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
 
-/** `light` after `turns` rounds of `path`; lamps turn about `center`, and swing along x by the scene's `radius`. */
+/** `light` after `turns` rounds of `path`; point lights turn about `center`, and swing along x by the scene's `radius`. */
 export function along(light: LightState, path: State["path"], turns: number, center: Triple, radius: number): LightState {
   const angle = 2 * Math.PI * turns;
   if (path === "none" || light.kind === "environment") return light;
@@ -20,12 +21,43 @@ export function along(light: LightState, path: State["path"], turns: number, cen
   return { ...light, position: rounded([light.position[0] + 0.5 * radius * Math.sin(angle), light.position[1], light.position[2]]) };
 }
 
+/** Moves the selected light along the path while the page plays. */
+export class Playback {
+  private base?: { light: LightState; copy: LightState; turns: number };
+
+  constructor(
+    private readonly state: State,
+    private readonly bounds: Bounds,
+  ) {}
+
+  /** Start from the light's current place the next time. */
+  stop(): void {
+    this.base = undefined;
+  }
+
+  /** Advance by `seconds`; false where no light is selected. */
+  advance(seconds: number): boolean {
+    const light = this.state.lights[this.state.selected];
+    if (!light) return false;
+    if (this.base?.light !== light) this.base = { light, copy: structuredClone(light), turns: 0 };
+    this.base.turns += Math.min(seconds, 0.25) / this.state.seconds;
+    Object.assign(light, this.moved(this.base.copy, this.base.turns));
+    return true;
+  }
+
+  /** `light` after `turns` rounds of the path. */
+  moved(light: LightState, turns: number): LightState {
+    const { center, radius } = this.bounds;
+    return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, center, radius);
+  }
+}
+
 function turned([x, y, z]: Triple, angle: number): Triple {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
   return [c * x - s * y, s * x + c * y, z];
 }
 
-/** Along its own azimuth; at angle 0 it is where it is, up to the widest tilt. */
+/** Along its own azimuth; at angle 0 it is unchanged; the swing reaches the widest tilt. */
 function swung([x, y, z]: Triple, angle: number): Triple {
   const azimuth = Math.hypot(x, y) > 1e-9 ? Math.atan2(y, x) : 0;
   const tilt = Math.acos(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z))));

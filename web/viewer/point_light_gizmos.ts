@@ -1,4 +1,4 @@
-/** Lamps as they hang in the scene: a bulb each, the selected one with handles; a spot's cone; and the suns' directions. */
+/** Point and spot lights drawn in the scene: a bulb each, handles on the selected one, a spot's cone; and directional lights' directions. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -25,9 +25,9 @@ const BULB = 0.013; // of the distance to the eye
 const SUN = 1.5; // scene radii from the middle
 
 export class PointLightGizmos {
-  /** What the handles move of a spot. */
+  /** What the handles of a spot move. */
   moving: "position" | "target" = "position";
-  private drawing = false; // the handles tell of every change, of those too that drawing makes
+  private drawing = false; // the handles report every change, including those made by drawing
   private readonly overlay = new Scene();
   private readonly drawn = new Scene();
   private readonly controls: TransformControls;
@@ -65,7 +65,7 @@ export class PointLightGizmos {
     return this.controls.dragging || this.controls.axis !== null;
   }
 
-  /** Over what was drawn before; suns are shown about a mesh only. */
+  /** Draw over the picture; directional lights are shown around a mesh only. */
   draw(renderer: WebGLRenderer, camera: PerspectiveCamera, suns: boolean): void {
     this.drawing = true;
     this.controls.camera = camera;
@@ -78,7 +78,7 @@ export class PointLightGizmos {
     this.drawing = false;
   }
 
-  /** Hide the handles: no light of the scene is selected, or there is no camera to see it by. */
+  /** Attach the handles to the selected point or spot light, or hide them. */
   private attach(): void {
     const light = this.state.lights[this.state.selected];
     if (!isPointLightState(light) || !light.on) {

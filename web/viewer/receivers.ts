@@ -1,10 +1,10 @@
-/** Where an asset's receivers are: bounds, and the place of a texel. */
-import { type Asset, type FloatImage, IDENTITY, type Triple } from "../src";
+/** Positions of an asset's receivers: their bounds, and the position of a texel. */
+import { type Asset, type FloatImage, IDENTITY, receiverKind, type Triple } from "../src";
 import { carried, type Matrix4 } from "../src/matrix";
 
 export interface Bounds {
   center: Triple;
-  /** Of a sphere about the center. */
+  /** Of a sphere around the center. */
   radius: number;
 }
 
@@ -22,7 +22,7 @@ export class Receivers {
     return this.coverage === undefined || this.coverage.data[this.coverage.channels * texel] >= 0.5;
   }
 
-  /** The world position of what the picture shows at u, v (v down); none where it shows nothing. */
+  /** The world position of what the picture shows at u, v (v down); undefined where it shows nothing. */
   at(u: number, v: number): Triple | undefined {
     const { width, height } = this.asset.manifest;
     const [x, y] = [Math.floor(u * width), Math.floor(v * height)];
@@ -37,7 +37,7 @@ export class Receivers {
     return this.asset.assetFromWorld === IDENTITY ? p : carried(inverse(this.asset.assetFromWorld), p);
   }
 
-  /** Of all but the outermost twentieth on either side of each axis: what a view sees through a window is far away. */
+  /** Bounds of the receivers; a view's without the outermost twentieth at either end of each axis, such as what it sees through a window. */
   private measured(): Bounds {
     const { width, height } = this.asset.manifest;
     const axes: number[][] = [[], [], []];
@@ -48,7 +48,7 @@ export class Receivers {
     if (axes[0].length === 0) return { center: [0, 0, 0], radius: 1 };
     const ends = axes.map((values) => {
       values.sort((a, b) => a - b);
-      const outer = this.asset.manifest.source?.receiver?.kind === "view" ? Math.floor(values.length / 20) : 0;
+      const outer = receiverKind(this.asset.manifest) === "view" ? Math.floor(values.length / 20) : 0;
       return [values[outer], values[values.length - 1 - outer]];
     });
     const center = ends.map(([least, most]) => (least + most) / 2) as unknown as Triple;
@@ -58,7 +58,7 @@ export class Receivers {
 
 const SAMPLES = 65_536;
 
-/** Of a rigid motion and uniform scale. */
+/** Inverse of a rigid motion and uniform scale. */
 function inverse(m: Matrix4): Matrix4 {
   const scale = m[0][0] ** 2 + m[1][0] ** 2 + m[2][0] ** 2;
   const turn = [0, 1, 2].map((r) => [0, 1, 2].map((c) => m[c][r] / scale));

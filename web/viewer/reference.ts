@@ -1,10 +1,10 @@
-/** The capture's own pictures: which light is nearest to a direction, and its image. */
+/** The capture's images, and which of its lights is nearest to a direction. */
 import { DataTexture, FloatType, LinearFilter, NoColorSpace, RGBAFormat } from "three";
 import type { FloatImage, Triple } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { dot } from "../src/matrix";
-import type { SkyPoint } from "./sky_widget";
+import type { DirectionPoint } from "./direction_widget";
 
 const KEPT = 16;
 
@@ -15,10 +15,10 @@ export class References {
 
   private constructor(
     private readonly folder: string,
-    readonly lights: readonly SkyPoint[],
+    readonly lights: readonly DirectionPoint[],
   ) {}
 
-  /** @throws SrbfError where there is none. */
+  /** @throws SrbfError where the list is missing. */
   static async load(folder: string): Promise<References> {
     const { lights } = await (await fetched(fetch.bind(window), `${folder}lights.json`)).json();
     return new References(folder, lights);
@@ -48,7 +48,7 @@ export class References {
     return image;
   }
 
-  /** `image` as a texture, row 0 first; the one before is released. */
+  /** `image` as a texture, row 0 first; the previous one is released. */
   asTexture(index: number, image: FloatImage): DataTexture {
     if (this.texture && this.shown === index) return this.texture;
     this.texture?.dispose();

@@ -1,4 +1,4 @@
-/** Files that the page hands out: a PNG, and FRAMES.json for `srbf relight --lights`. */
+/** Files that the page saves: a PNG, and FRAMES.json for `srbf relight --lights`. */
 import { encode } from "fast-png";
 import { aim, type LightState, linearColor } from "./light_state";
 
@@ -7,15 +7,15 @@ export function savePng(name: string, image: { width: number; height: number; da
   const { width, height, data: rgba } = image;
   const channels = rgba.some((byte, i) => i % 4 === 3 && byte < 255) ? 4 : 3;
   const data = channels === 4 ? rgba : rgba.filter((_, i) => i % 4 !== 3);
-  handOut(name, new Blob([encode({ width, height, channels, data }) as BlobPart], { type: "image/png" }));
+  download(name, new Blob([encode({ width, height, channels, data }) as BlobPart], { type: "image/png" }));
 }
 
 export function saveFrames(name: string, frames: readonly (readonly LightState[])[]): void {
   const json = { frames: frames.map((lights) => ({ lights: lights.filter((light) => light.on).map(entry) })) };
-  handOut(name, new Blob([`${JSON.stringify(json, undefined, 1)}\n`], { type: "application/json" }));
+  download(name, new Blob([`${JSON.stringify(json, undefined, 1)}\n`], { type: "application/json" }));
 }
 
-/** A light as srbf/schemas/frames.schema.json has it; an environment's file is looked for beside FRAMES.json. */
+/** A light as srbf/schemas/frames.schema.json has it; an environment's file must lie beside FRAMES.json. */
 function entry(light: LightState): Record<string, unknown> {
   const color = linearColor(light);
   if (light.kind === "directional") return { kind: "directional", direction: light.direction, color };
@@ -26,7 +26,7 @@ function entry(light: LightState): Record<string, unknown> {
   return { kind: "spot", position, direction: aim(light), inner, outer, color, a0, falloff, radius };
 }
 
-function handOut(name: string, blob: Blob): void {
+function download(name: string, blob: Blob): void {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;

@@ -1,4 +1,4 @@
-/** What the screen shows of a texel: the relit picture, a map, or how it differs from the reference; exposure, tone, false color. */
+/** What the screen shows per texel: the relit picture, a coefficient map, or the difference to the reference; exposure, tone, false color. */
 import { Color, GLSL3, type IUniform, RawShaderMaterial, ShaderChunk, type Texture, Vector2, Vector4 } from "three";
 import type { SrbfTextures } from "../src/three";
 
@@ -131,7 +131,7 @@ void main() {
 
 export type ScreenUniforms = Record<string, IUniform> & { negative: IUniform<Texture | null>; reference: IUniform<Texture | null> };
 
-/** `coverage`: of a view, how much of every texel is there; 1 everywhere else. */
+/** `coverage`: alpha of a view; 1 everywhere for other assets. */
 export function screenUniforms(relit: Texture, textures: SrbfTextures, coverage: Texture): ScreenUniforms {
   return {
     relit: { value: relit },

@@ -1,8 +1,8 @@
-/** Singular values of what an asset answers, beside those of what its capture did: how many numbers a texel the light of the scene would need. */
+/** Singular values of an asset's responses, beside those of its capture: how many components per texel the light of the scene would need. */
 import { fetched } from "../src/files";
 import type { Subject } from "./subject";
 
-/** `srbf/viewer/measures.py`'s spectrum; values of one scale, largest first. */
+/** `srbf/viewer/measures.py`'s spectrum; values on one scale, largest first. */
 export interface Spectrum {
   scalars: number;
   asset: number[];
@@ -17,7 +17,7 @@ export class SpectrumPlot {
 
   constructor(private readonly canvas: HTMLCanvasElement) {}
 
-  /** @throws SrbfError where it cannot be had. */
+  /** @throws SrbfError where it cannot be loaded. */
   async draw(subject: Subject): Promise<void> {
     const url = subject.facts.spectrum;
     let found = this.found.get(url);
@@ -29,7 +29,7 @@ export class SpectrumPlot {
     this.plot(await found);
   }
 
-  private plot({ asset, capture, scalars }: Spectrum): void {
+  private plot({ asset, capture, scalars: components }: Spectrum): void {
     const ratio = Math.min(devicePixelRatio, 2);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     this.canvas.width = Math.round(width * ratio);
@@ -38,7 +38,7 @@ export class SpectrumPlot {
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.clearRect(0, 0, width, height);
     const first = Math.max(asset[0] ?? 0, capture?.[0] ?? 0) || 1;
-    const longest = Math.max(asset.length, capture?.length ?? 0, scalars, 10);
+    const longest = Math.max(asset.length, capture?.length ?? 0, components, 10);
     const x = (rank: number) => MARGIN.left + ((width - MARGIN.left - MARGIN.right) * Math.log(rank)) / Math.log(longest);
     const y = (value: number) => MARGIN.top + ((height - MARGIN.top - MARGIN.bottom) * Math.log(Math.max(value / first, FLOOR))) / Math.log(FLOOR);
     c.font = "10px system-ui, sans-serif";
@@ -55,10 +55,10 @@ export class SpectrumPlot {
       rule(c, [x(rank), MARGIN.top], [x(rank), height - MARGIN.bottom], "#ffffff18");
       c.fillText(String(rank), x(rank), height - MARGIN.bottom + 10);
     }
-    rule(c, [x(scalars), MARGIN.top], [x(scalars), height - MARGIN.bottom], "#ff8a6c");
+    rule(c, [x(components), MARGIN.top], [x(components), height - MARGIN.bottom], "#ff8a6c");
     c.fillStyle = "#ff8a6c";
-    c.textAlign = x(scalars) > width * 0.6 ? "right" : "left";
-    c.fillText(`${scalars} a texel`, x(scalars) + (c.textAlign === "left" ? 5 : -5), MARGIN.top + 8);
+    c.textAlign = x(components) > width * 0.6 ? "right" : "left";
+    c.fillText(`${components} per texel`, x(components) + (c.textAlign === "left" ? 5 : -5), MARGIN.top + 8);
     if (capture) curve(c, capture, x, y, first, "#9fb2c8");
     curve(c, asset, x, y, first, "#6ab7ff");
     c.textAlign = "left";
@@ -69,7 +69,7 @@ export class SpectrumPlot {
     c.fillStyle = "#8d96a1";
     c.textAlign = "right";
     c.fillText("singular values by rank", width - MARGIN.right, 11);
-    this.canvas.dataset.drawn = JSON.stringify({ asset: asset.length, capture: capture?.length ?? 0, scalars });
+    this.canvas.dataset.drawn = JSON.stringify({ asset: asset.length, capture: capture?.length ?? 0, components });
   }
 }
 

@@ -1,4 +1,4 @@
-/** The large picture: a mesh under an orbit camera, alone or in its scene, or texels as a picture to be panned and zoomed; lamps as gizmos on it. */
+/** The main picture: a mesh under an orbit camera, alone or in its scene, or texels as a picture to pan and zoom; point lights are drawn as gizmos. */
 import {
   type BufferGeometry,
   type Material,
@@ -19,12 +19,13 @@ import type { Light, Triple } from "../src";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
+import { panAndZoom } from "./pan_zoom";
 import type { Receivers } from "./receivers";
 import { BACKGROUND, COLORS, screenMaterial, type ScreenUniforms, VALUES } from "./screen";
 import type { Changed, State } from "./state";
 import { Surroundings } from "./surroundings";
 
-const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes what it clears a canvas to, not a target
+const BACKGROUND_BYTES = BACKGROUND.clone().convertLinearToSRGB(); // three encodes the clear color of a canvas, but not that of a target
 const MOST_PIXEL_RATIO = 2;
 
 export class Stage {
@@ -73,7 +74,7 @@ export class Stage {
     this.gizmos = new PointLightGizmos(this.orbitCamera, canvas, state, receivers.bounds, changed, (dragging) => {
       this.orbit.enabled = !dragging && this.hasMesh;
     });
-    this.panByPointer(canvas, changed);
+    panAndZoom(canvas, state, size, this, changed);
   }
 
   /** Whether the mesh is shown, rather than a picture. */
@@ -86,13 +87,13 @@ export class Stage {
     return this.surroundings !== undefined;
   }
 
-  /** Whether the mesh is shown in its scene: what is shown of the lightmap alone, such as a map, is shown on the mesh alone. */
+  /** Whether the mesh is shown in its scene; coefficient maps and other false colors are shown on the mesh alone. */
   private get inScene(): boolean {
     const { value, color } = this.uniforms;
     return this.canShowScene && this.state.view === "scene" && value.value === VALUES.picture && color.value !== COLORS.negative;
   }
 
-  /** Turn the orbit camera about its target, by so many rad. */
+  /** Turn the orbit camera about its target by `angle` (rad). */
   turn(angle: number): void {
     const { position } = this.orbitCamera;
     position.sub(this.orbit.target).applyAxisAngle(this.orbitCamera.up, angle).add(this.orbit.target);
@@ -105,14 +106,14 @@ export class Stage {
     return this.lit.length > 0;
   }
 
-  /** The orbit camera as it is at first. */
+  /** Reset the orbit camera. */
   resetCamera(): void {
     this.state.eye = undefined;
     this.state.zoom = 0;
     this.placeCamera();
   }
 
-  /** The camera as the state has it. */
+  /** Set the camera from the state. */
   resetTo(): void {
     this.placeCamera();
   }
@@ -141,8 +142,8 @@ export class Stage {
   }
 
   /**
-   * The picture texel for texel, or the mesh as large as the screen has it; RGBA bytes, top row first, nothing drawn over it. A view has its coverage as
-   * alpha, straight, and no background.
+   * The picture texel for texel, or the mesh at the screen's size, without gizmos; RGBA bytes, top row first. A view has its coverage as straight
+   * alpha, and no background.
    */
   pixels(lights: readonly Light[]): { width: number; height: number; data: Uint8Array } {
     const buffer = this.renderer.getDrawingBufferSize(new Vector2());
@@ -172,10 +173,10 @@ export class Stage {
     return { width, height, data };
   }
 
-  /** What is shown, without gizmos, into `target` or on the canvas, of so many pixels. */
+  /** Draw the picture without gizmos into `target`, or on the canvas, of `width` x `height` pixels. */
   private render(lights: readonly Light[], target: WebGLRenderTarget | null, width: number, height: number): void {
     const { renderer } = this;
-    const behind = BACKGROUND.clone().multiplyScalar(1 / this.uniforms.toneMappingExposure.value); // to be shown as it is elsewhere
+    const behind = BACKGROUND.clone().multiplyScalar(1 / this.uniforms.toneMappingExposure.value); // so that exposure leaves it unchanged
     const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;
@@ -196,13 +197,13 @@ export class Stage {
     return this.receivers.at((x - left) / wide, (y - top) / high);
   }
 
-  /** From the eye to a place, meters; where no eye is known, as if the whole scene were seen. */
+  /** Distance from the eye to a place, meters; without a camera, as if the whole scene were in view. */
   distance(place: Triple): number {
     const eye = this.hasMesh ? fromThree(this.orbitCamera.position) : this.fitted?.position;
     return eye ? Math.hypot(...place.map((x, i) => x - eye[i])) : 3 * this.receivers.bounds.radius;
   }
 
-  /** Screen pixels a texel, and the picture's rectangle on the canvas, CSS pixels. */
+  /** Screen pixels per texel, and the picture's rectangle on the canvas, CSS pixels. */
   spread(): { zoom: number; left: number; top: number; wide: number; high: number } {
     const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
     const { width, height } = this.size;
@@ -213,12 +214,13 @@ export class Stage {
     return { zoom, left: snapped(w / 2 - mx * zoom), top: snapped(h / 2 - my * zoom), wide: width * zoom, high: height * zoom };
   }
 
-  private fit(): number {
+  /** Screen pixels per texel at which the picture fits the canvas. */
+  fit(): number {
     const { clientWidth: w, clientHeight: h } = this.renderer.domElement;
     return Math.max(1e-3, Math.min((w - 48) / this.size.width, (h - 112) / this.size.height));
   }
 
-  /** Place the picture, or nothing of it where the mesh is shown, and the camera that gizmos are seen by. */
+  /** Place the picture, and the camera that gizmos are drawn with. */
   private aim(): void {
     if (this.hasMesh) {
       this.uniforms.nearest.value = false;
@@ -249,7 +251,7 @@ export class Stage {
     this.orbitCamera.updateMatrixWorld(true);
   }
 
-  /** From where the file's own camera stands, else from above and in front; it looks at the receivers' middle. */
+  /** From the position of the file's own camera, or from above and in front; it looks at the receivers' center. */
   private firstView(): [Triple, Triple] {
     const { center, radius } = this.receivers.bounds;
     const farther = Math.max(1, 1.15 / this.orbitCamera.aspect); // where the window is narrow
@@ -263,7 +265,7 @@ export class Stage {
     return [[center[0] - 0.9 * away, center[1] - 2.1 * away, center[2] + 1.9 * away], center];
   }
 
-  /** Meshes with the extension take the relit light; what else a file holds is left out. */
+  /** Meshes with the extension take the relit light; the rest of the file is ignored. */
   private addModel(model: Object3D): void {
     const material = screenMaterial(this.uniforms, "mesh");
     model.updateMatrixWorld(true);
@@ -281,51 +283,5 @@ export class Stage {
       this.lit.push(shown);
     });
     this.scene.updateMatrixWorld(true);
-  }
-
-  private panByPointer(canvas: HTMLCanvasElement, changed: Changed): void {
-    const held = new Map<number, [number, number]>();
-    const begin = () => {
-      if (this.state.zoom) return;
-      this.state.zoom = this.fit();
-      this.state.middle = [this.size.width / 2, this.size.height / 2];
-    };
-    const zoomed = (factor: number, x: number, y: number) => {
-      begin();
-      const { zoom, left, top } = this.spread();
-      const next = Math.min(64, Math.max(0.05, zoom * factor));
-      const [u, v] = [(x - left) / zoom, (y - top) / zoom];
-      this.state.zoom = next;
-      this.state.middle = [u - (x - canvas.clientWidth / 2) / next, v - (y - canvas.clientHeight / 2) / next];
-      changed();
-    };
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        if (this.hasMesh) return;
-        event.preventDefault();
-        zoomed(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
-      },
-      { passive: false },
-    );
-    canvas.addEventListener("pointerdown", (event) => {
-      if (!this.hasMesh) held.set(event.pointerId, [event.offsetX, event.offsetY]);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      const from = held.get(event.pointerId);
-      if (!from || this.hasMesh || this.gizmos.dragging) return;
-      const to: [number, number] = [event.offsetX, event.offsetY];
-      const other = [...held].find(([id]) => id !== event.pointerId)?.[1];
-      if (other) {
-        const apart = (p: [number, number]) => Math.hypot(p[0] - other[0], p[1] - other[1]);
-        zoomed(apart(to) / Math.max(1, apart(from)), (to[0] + other[0]) / 2, (to[1] + other[1]) / 2);
-      } else if (event.buttons) {
-        begin();
-        this.state.middle = [this.state.middle[0] - (to[0] - from[0]) / this.state.zoom, this.state.middle[1] - (to[1] - from[1]) / this.state.zoom];
-        changed();
-      }
-      held.set(event.pointerId, to);
-    });
-    for (const end of ["pointerup", "pointercancel", "pointerleave"] as const) canvas.addEventListener(end, (event) => held.delete(event.pointerId));
   }
 }

@@ -1,6 +1,6 @@
-/** All that the page shows, and its URL: `#` and JSON of it. */
+/** The page's state, and its URL: `#` followed by the state as JSON. */
 import { SrbfError, type Triple } from "../src";
-import { checkLight, type LightState, round } from "./light_state";
+import { checkLight, directionalState, type LightState, round, rounded } from "./light_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
 export const SHOWS = ["picture", "false color", "negative", "map"] as const;
@@ -10,41 +10,66 @@ export const TERMS = ["both", "direct", "indirect"] as const;
 export const VIEWS = ["scene", "mesh", "texels"] as const;
 
 export interface State {
-  /** Which of the assets. */
+  /** Index of the asset. */
   asset: number;
   lights: LightState[];
-  /** Which light the controls are of. */
+  /** Index of the light that the controls edit. */
   selected: number;
   /** Stops. */
   exposure: number;
   tone: (typeof TONES)[number];
   show: (typeof SHOWS)[number];
-  /** Which map, or scalar plane, `map` shows. */
+  /** Which coefficient map `map` shows. */
   map: number;
-  /** What an indirect asset is shown with: its own light, the direct light, or the two together. */
+  /** Which light of an indirect asset is shown: indirect, direct, or both. */
   terms: (typeof TERMS)[number];
-  /** Whether the sky shows every baked light's error, and whether the spectrum is drawn. */
+  /** Whether every baked light's error is shown at its direction, and whether the spectrum is drawn. */
   errors: boolean;
   spectrum: boolean;
   compare: (typeof COMPARES)[number];
-  /** Where the slider is, 0 to 1 of the picture's width. */
+  /** Position of the slider, as a fraction of the picture's width. */
   split: number;
-  /** The lit mesh among the rest of the scene, alone, or the lightmap's texels as a picture. */
+  /** The lit mesh in its scene, the mesh alone, or the lightmap's texels as a picture. */
   view: (typeof VIEWS)[number];
   /** The orbit camera's position and target, in the asset's world. */
   eye?: [Triple, Triple];
-  /** Of pictures: screen pixels a texel, 0: as large as fits; and the texel in the middle. */
+  /** Of pictures: screen pixels per texel, 0 to fit the window; and the texel in the middle. */
   zoom: number;
   middle: [number, number];
   path: (typeof PATHS)[number];
-  /** Seconds for one round. */
+  /** Period of the path, seconds. */
   seconds: number;
   playing: boolean;
-  /** Whether the camera goes round while the path plays, in twice its time. */
+  /** Whether the camera orbits while the path plays, with twice its period. */
   turntable: boolean;
 }
 
-/** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be drawn anew. */
+/** What the page shows of an asset at first. */
+export function firstState({ quantity, width, height }: { quantity: "irradiance" | "radiance"; width: number; height: number }, view: State["view"]): State {
+  return {
+    asset: 0,
+    lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
+    selected: 0,
+    exposure: quantity === "radiance" || view === "scene" ? 1.65 : 0,
+    tone: "linear",
+    show: "picture",
+    map: 0,
+    terms: "both",
+    errors: false,
+    spectrum: false,
+    compare: "off",
+    split: 0.5,
+    view,
+    zoom: 0,
+    middle: [width / 2, height / 2],
+    path: "none",
+    seconds: 8,
+    playing: false,
+    turntable: false,
+  };
+}
+
+/** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be redrawn. */
 export type Changed = (what?: { lights?: boolean; panel?: boolean }) => void;
 
 export function encodeState(state: State): string {
@@ -52,20 +77,20 @@ export function encodeState(state: State): string {
   return `#${encodeURIComponent(JSON.stringify(state, rounding)).replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
 }
 
-/** The state that `hash` says, the rest as in `plain`. @throws SrbfError in one line where it says none. */
+/** The state in `hash`, with defaults from `plain`. @throws SrbfError in one line where it holds none. */
 export function decodeState(hash: string, plain: State): State {
   if (hash.length < 2) return plain;
-  let said: Partial<State>;
+  let given: Partial<State>;
   try {
-    said = JSON.parse(decodeURIComponent(hash.slice(1).replaceAll("'", "%22")));
+    given = JSON.parse(decodeURIComponent(hash.slice(1).replaceAll("'", "%22")));
   } catch {
-    throw new SrbfError("expected a state that this page wrote in its address, found something else; it starts anew");
+    throw new SrbfError("expected a state that this page wrote in its address, found something else; the page uses its defaults");
   }
   const state: State = { ...plain };
   const one = <K extends keyof State>(key: K, fits: (value: never) => boolean) => {
-    const value = said[key];
+    const value = given[key];
     if (value === undefined) return;
-    if (!fits(value as never)) throw new SrbfError(`expected another ${key} in the page's address, found ${JSON.stringify(value)}; it starts anew`);
+    if (!fits(value as never)) throw new SrbfError(`expected another ${key} in the page's address, found ${JSON.stringify(value)}; the page uses its defaults`);
     state[key] = value as State[K];
   };
   const number = (least: number, most: number) => (value: number) => typeof value === "number" && value >= least && value <= most;
@@ -87,9 +112,9 @@ export function decodeState(hash: string, plain: State): State {
   one("path", choice(PATHS));
   one("seconds", number(0.1, 1e4));
   one("playing", (value: unknown) => typeof value === "boolean");
-  if (said.lights !== undefined) {
-    if (!Array.isArray(said.lights) || said.lights.length > MOST_LIGHTS) throw new SrbfError("expected a list of lights in the page's address; it starts anew");
-    state.lights = said.lights.map(checkLight);
+  if (given.lights !== undefined) {
+    if (!Array.isArray(given.lights) || given.lights.length > MOST_LIGHTS) throw new SrbfError("expected a list of lights in the page's address; the page uses its defaults");
+    state.lights = given.lights.map(checkLight);
   }
   one("selected", number(-1, state.lights.length - 1));
   state.selected = Math.min(state.selected, state.lights.length - 1);

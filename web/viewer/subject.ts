@@ -1,6 +1,6 @@
-/** The assets that the page can switch between, each relit once it is asked for; and the direct light of indirect ones. */
+/** The assets that the page can switch between, each loaded when it is first chosen; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
-import type { Asset, FloatImage, Light } from "../src";
+import type { Asset, FloatImage, Light, Triple } from "../src";
 import { alphaTexture } from "../src/three/textures";
 import { DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
@@ -8,12 +8,12 @@ import { lineOf, say } from "./messages";
 import { ViewerRelighting } from "./relighting";
 import type { State } from "./state";
 
-/** One asset at work. */
+/** One asset, relit. */
 export class Subject {
   readonly facts: AssetFacts;
   readonly asset: Asset;
   readonly coverage?: FloatImage;
-  /** What the picture is cut out by: a view's coverage; 1 everywhere of anything else. */
+  /** The picture's alpha: a view's coverage, 1 everywhere for other assets. */
   readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
   private readonly direct?: DirectLight;
@@ -33,7 +33,7 @@ export class Subject {
     }
   }
 
-  /** Whether its direct light can be added, so that it may be shown with it, without it, or as that alone. */
+  /** Whether its direct light can be added. */
   get hasDirect(): boolean {
     return this.direct !== undefined;
   }
@@ -42,16 +42,15 @@ export class Subject {
     return this.relighting.lightmap as Texture;
   }
 
-  /** How many maps, or scalar planes, there are to be looked at. */
-  get planes(): number {
-    return this.asset.manifest.scalars ?? this.asset.layers.count;
+  /** How many coefficient maps there are to look at. */
+  get maps(): number {
+    return this.asset.tables.maps;
   }
 
-  /** Where its basis has a center on the captured half of the sky. */
-  get centers(): readonly (readonly [number, number, number])[] {
-    const { basis, manifest } = this.asset;
-    const centers = basis.kind === "gaussian" ? basis.centers : basis.functions.centers;
-    return centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // light functions reach past the horizon
+  /** Centers of its light functions within the captured domain. */
+  get centers(): readonly Triple[] {
+    const { tables, manifest } = this.asset;
+    return tables.centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // some light functions lie past the horizon
   }
 
   /** Draw the lightmap under `lights`. */

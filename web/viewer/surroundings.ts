@@ -1,6 +1,6 @@
 /**
- * The lit mesh among the rest of its scene, in linear light: the relit lightmap on the receivers, three.js's own materials and shadows on what else the
- * file holds, and glass last, refracting what is behind it [Wong2005, fig. 12].
+ * The lit mesh in its scene, in linear light: the relit lightmap on the receivers, three.js's own materials and shadows on the rest of the file, and
+ * glass last, refracting what is behind it [Wong2005, fig. 12].
  */
 import {
   BackSide,
@@ -40,8 +40,8 @@ import { toThree } from "./frames";
 import type { ScreenUniforms } from "./screen";
 
 const SHADOW_SIZE = 2048;
-const SHADOWED_POINT_LIGHTS = 2; // lamps that cast shadows on what is no receiver; each draws the scene six times
-const FILL = 0.12; // of the lights' irradiance: a dim sky for what the lightmap does not light, and for glass to reflect
+const SHADOWED_POINT_LIGHTS = 2; // point lights that cast shadows on the rest of the scene; each draws it six times
+const FILL = 0.12; // of the lights' irradiance: dim daylight on what the lightmap does not light, and for glass to reflect
 const SAMPLES = 4;
 
 export class Surroundings {
@@ -49,13 +49,13 @@ export class Surroundings {
   private readonly lit: Object3D[] = [];
   private readonly target: WebGLRenderTarget;
   private readonly bounds: Sphere;
-  private readonly sky: Texture;
-  private readonly skies = new WeakMap<object, Texture>();
+  private readonly daylight: Texture;
+  private readonly environments = new WeakMap<object, Texture>();
   private readonly pmrem: PMREMGenerator;
   private drawn = "";
-  private drawnSky: object | undefined;
+  private drawnEnvironment: object | undefined;
 
-  /** `model` is the glTF's scene, in three's world; the receivers' materials take what `uniforms` show. */
+  /** `model` is the glTF's scene, in three's world; the receivers' materials show what `uniforms` hold. */
   constructor(
     model: Object3D,
     uniforms: ScreenUniforms,
@@ -75,12 +75,12 @@ export class Surroundings {
       else mesh.castShadow = mesh.receiveShadow = true;
     });
     this.target = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES, minFilter: LinearFilter, magFilter: LinearFilter });
-    renderer.shadowMap.autoUpdate = false; // a camera that moves changes no shadow
+    renderer.shadowMap.autoUpdate = false; // a moving camera changes no shadows
     this.pmrem = new PMREMGenerator(renderer);
-    this.sky = this.pmrem.fromScene(daylight(), 0.02).texture;
+    this.daylight = this.pmrem.fromScene(daylight(), 0.02).texture;
   }
 
-  /** Whether a file holds more than receivers. */
+  /** Whether a file holds meshes besides the receivers. */
   static in(model: Object3D): boolean {
     const [receivers, others] = [0, 0].map(() => [] as Object3D[]);
     model.traverse((object) => {
@@ -90,7 +90,7 @@ export class Surroundings {
     return receivers.length > 0 && others.length > 0;
   }
 
-  /** Linear radiance over `background`; of so many pixels, row 0 at the bottom. */
+  /** Linear radiance over `background`, `width` x `height` pixels, row 0 at the bottom. */
   draw(camera: PerspectiveCamera, lights: readonly Light[], background: Color, width: number, height: number): Texture {
     const { renderer } = this;
     this.target.setSize(width, height);
@@ -110,9 +110,9 @@ export class Surroundings {
   private setLights(lights: readonly Light[]): void {
     const state = JSON.stringify(lights, (key, value) => (key === "pixels" ? value.length : value));
     const shown = lights.find((light) => light.kind === "environment")?.pixels;
-    if (state === this.drawn && shown === this.drawnSky) return;
+    if (state === this.drawn && shown === this.drawnEnvironment) return;
     this.drawn = state;
-    this.drawnSky = shown;
+    this.drawnEnvironment = shown;
     for (const light of this.lit) {
       this.scene.remove(light);
       (light as DirectionalLight).dispose?.();
@@ -120,10 +120,10 @@ export class Surroundings {
     this.lit.length = 0;
     let pointLights = 0;
     let fill = 0;
-    let sky: EnvironmentLight | undefined;
+    let environment: EnvironmentLight | undefined;
     for (const light of lights) {
       if (light.kind === "environment") {
-        sky ??= light;
+        environment ??= light;
         continue;
       }
       const made = light.kind === "directional" ? this.sun(light.direction, light.color) : this.pointLight(light, pointLights++ < SHADOWED_POINT_LIGHTS);
@@ -132,8 +132,8 @@ export class Surroundings {
       this.lit.push(made);
       this.scene.add(made);
     }
-    this.scene.environment = sky ? this.skyOf(sky) : this.sky;
-    this.scene.environmentIntensity = sky ? (sky.color[0] + sky.color[1] + sky.color[2]) / 3 : (FILL * fill) / Math.PI;
+    this.scene.environment = environment ? this.environmentTexture(environment) : this.daylight;
+    this.scene.environmentIntensity = environment ? (environment.color[0] + environment.color[1] + environment.color[2]) / 3 : (FILL * fill) / Math.PI;
     this.renderer.shadowMap.needsUpdate = true;
   }
 
@@ -154,7 +154,7 @@ export class Surroundings {
     return sun;
   }
 
-  /** Irradiance color at the distance a0, as three has candelas. */
+  /** The irradiance at distance a0 in three's candelas. */
   private pointLight(light: PunctualLight, shadow: boolean): PointLight | SpotLight {
     const [decay, intensity] = light.falloff === "linear" ? [1, light.a0] : [2, light.a0 ** 2];
     const color = new Color(...(light.color as [number, number, number]));
@@ -175,10 +175,10 @@ export class Surroundings {
     return pointLight;
   }
 
-  /** A dropped environment, its top row +z and its middle column +x of Blender's world. */
-  private skyOf(light: EnvironmentLight): Texture {
+  /** An environment map, its top row +z and its middle column +x of Blender's world. */
+  private environmentTexture(light: EnvironmentLight): Texture {
     const key = light.pixels as object;
-    let found = this.skies.get(key);
+    let found = this.environments.get(key);
     if (!found) {
       const { width, height, pixels } = light;
       const data = new Float32Array(4 * width * height);
@@ -193,7 +193,7 @@ export class Surroundings {
       image.needsUpdate = true;
       found = this.pmrem.fromEquirectangular(image).texture;
       image.dispose();
-      this.skies.set(key, found);
+      this.environments.set(key, found);
     }
     return found;
   }
@@ -203,7 +203,7 @@ function isGlass(material: Material): boolean {
   return ((material as MeshPhysicalMaterial).transmission ?? 0) > 0;
 }
 
-/** A sky that is bright about the zenith over a dim ground: for reflections. */
+/** Daylight for reflections: bright near the zenith, over a dim ground. */
 function daylight(): Scene {
   const scene = new Scene();
   const material = new ShaderMaterial({
@@ -213,8 +213,8 @@ function daylight(): Scene {
     fragmentShader: `varying vec3 towards;
 void main() {
     float h = normalize(towards).y;
-    vec3 sky = mix(vec3(0.95, 0.97, 1.0), vec3(1.6, 1.75, 2.0), smoothstep(0.0, 0.9, h));
-    gl_FragColor = vec4(mix(vec3(0.16, 0.15, 0.14), sky, smoothstep(-0.05, 0.08, h)), 1.0);
+    vec3 above = mix(vec3(0.95, 0.97, 1.0), vec3(1.6, 1.75, 2.0), smoothstep(0.0, 0.9, h));
+    gl_FragColor = vec4(mix(vec3(0.16, 0.15, 0.14), above, smoothstep(-0.05, 0.08, h)), 1.0);
 }`,
   });
   scene.add(new Mesh(new SphereGeometry(10, 32, 16), material));
@@ -272,7 +272,7 @@ void main() {
     radiance = vec4(max(light, vec3(0.0)), 1.0);
 }`;
 
-/** The relit lightmap in the colors of the material that the mesh had: irradiance × albedo / π; radiance as it is. */
+/** The relit lightmap with the albedo of the mesh's own material: irradiance × albedo / π; radiance unchanged. */
 function receiverMaterial(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): RawShaderMaterial {
   const surface = mesh.userData.surface as MeshStandardMaterial | undefined;
   const { geometry } = mesh;

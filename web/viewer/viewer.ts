@@ -1,4 +1,4 @@
-/** The page at work: state, lights, picture, comparison, and what is saved. */
+/** The page: its state, lights, picture, comparison, and what it saves. */
 import { NoToneMapping, type Vector4, WebGLRenderer } from "three";
 import type { Light, Triple } from "../src";
 import { bearing, legend, statusLine, titles } from "./captions";
@@ -6,40 +6,41 @@ import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
-import { directionalState, type DirectionalState, environmentState, isPointLightState, lightOf, type LightState, rounded } from "./light_state";
+import { type DirectionalState, environmentState, isPointLightState, lightOf, rounded } from "./light_state";
 import { listen, tabled } from "./keys";
 import { checkGpu, type Loaded } from "./loading";
-import { mapRange } from "./map_range";
+import { mapPlace, mapRange } from "./map_range";
 import { element, lineOf, say } from "./messages";
 import { Panel, type PanelFacts } from "./panel";
-import { along } from "./path";
+import { Playback } from "./path";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng } from "./saving";
 import { COLORS, screenUniforms, VALUES } from "./screen";
-import { type SkyPoint, SkyWidget } from "./sky_widget";
+import { type DirectionPoint, DirectionWidget } from "./direction_widget";
 import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
-import { type Changed, COMPARES, decodeState, encodeState, MOST_LIGHTS, type State, VIEWS } from "./state";
+import { type Changed, COMPARES, decodeState, encodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects } from "./subject";
 import { Surroundings } from "./surroundings";
 
 const FRAMES_PER_SECOND = 24;
 const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
-const PACES = 15; // frames whose median is told
-const ABOVE = 0.12; // of the distance to the eye: where a lamp hangs over what was picked
+const PACES = 15; // frames whose median is shown
+const ABOVE = 0.12; // of the distance to the eye: height of a point light above the picked place
 
-/** One asset of those that the page was given, drawn whenever a light or a control changed. */
+/** Shows one of the page's assets, and draws whenever a light or a control has changed. */
 export class Viewer {
   private readonly state: State;
   private readonly renderer: WebGLRenderer;
   private readonly subjects: Subjects;
   private subject: Subject;
   private readonly uniforms;
-  private readonly inScene: boolean; // at first, and so as radiance
+  private readonly inScene: boolean; // whether the page opens with the scene, which is radiance
   private readonly receivers: Receivers;
+  private readonly playback: Playback;
   private readonly stage: Stage;
-  private readonly sky: SkyWidget;
+  private readonly directions: DirectionWidget;
   private readonly panel: Panel;
   private readonly copy: Copy;
   private readonly comparison: Comparison;
@@ -49,12 +50,11 @@ export class Viewer {
   private lightsChanged = true;
   private drawNeeded = true;
   private waiting = 0;
-  private base?: { light: LightState; copy: LightState; turns: number };
   private error = "";
   private last = 0;
   private readonly paces: number[] = [];
-  private asking?: Subject; // for its errors
-  private plotted?: Subject; // its spectrum
+  private asking?: Subject; // whose errors are being measured
+  private plotted?: Subject; // whose spectrum is drawn
   private urlTimer = 0;
   private written = "";
 
@@ -73,7 +73,8 @@ export class Viewer {
     this.receivers = new Receivers(asset, coverage);
     this.copy = new Copy(asset.manifest.width, asset.manifest.height);
     this.inScene = model !== undefined && Surroundings.in(model);
-    this.state = this.begun();
+    this.state = this.firstState();
+    this.playback = new Playback(this.state, this.receivers.bounds);
     this.readUrl(location.hash);
     this.state.asset = facts.assets.indexOf(first.facts);
     const changed: Changed = (what = {}) => this.changed(what);
@@ -81,14 +82,14 @@ export class Viewer {
       wait: () => this.wait(),
       done: () => this.done(),
       changed: () => this.changed({ lights: true }),
-      told: () => this.status(),
+      measured: () => this.status(),
     });
     this.spectrum = new SpectrumPlot(element<HTMLCanvasElement>("spectrum"));
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
     if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
-    this.sky = new SkyWidget(element<HTMLCanvasElement>("sky"), this.state, asset.manifest.domain, this.skyPoints(), changed);
+    this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, this.directionPoints(), changed);
     this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
       changed,
       chooseAsset: () => this.chooseAsset(),
@@ -123,7 +124,7 @@ export class Viewer {
 
   private panelFacts(): PanelFacts {
     return {
-      maps: this.subject.planes,
+      maps: this.subject.maps,
       hasPositions: this.subject.asset.position !== undefined,
       hasDirect: this.subject.hasDirect,
       assets: this.loaded.facts.assets.map(({ name }) => name),
@@ -134,12 +135,12 @@ export class Viewer {
     };
   }
 
-  /** The capture's lights, else the centers of the basis. */
-  private skyPoints(): readonly SkyPoint[] {
-    return this.loaded.references?.lights ?? this.subject.centers.map((direction): SkyPoint => ({ direction, role: "center" }));
+  /** The capture's lights, or else the centers of the basis. */
+  private directionPoints(): readonly DirectionPoint[] {
+    return this.loaded.references?.lights ?? this.subject.centers.map((direction): DirectionPoint => ({ direction, role: "center" }));
   }
 
-  /** Show the asset that the state names, as soon as it is read. */
+  /** Show the asset that the state names, once it is loaded. */
   private chooseAsset(): void {
     const index = this.state.asset;
     this.wait();
@@ -153,10 +154,10 @@ export class Viewer {
         this.uniforms.layers.value = layers;
         this.uniforms.ambient.value = ambient;
         this.uniforms.coverage.value = subject.alpha;
-        this.state.map = Math.min(this.state.map, subject.planes - 1);
-        this.sky.show(this.skyPoints());
-        this.sky.errors = undefined;
-        this.panel.tell(this.panelFacts());
+        this.state.map = Math.min(this.state.map, subject.maps - 1);
+        this.directions.show(this.directionPoints());
+        this.directions.errors = undefined;
+        this.panel.setFacts(this.panelFacts());
         titles(element("title"), this.loaded.facts, this.subject);
         this.changed({ lights: true, panel: true });
       })
@@ -168,41 +169,21 @@ export class Viewer {
       .finally(() => this.done());
   }
 
-  private begun(): State {
-    const { asset } = this.subject;
-    return {
-      asset: 0,
-      lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
-      selected: 0,
-      exposure: asset.manifest.quantity === "radiance" || this.inScene ? 1.65 : 0,
-      tone: "linear",
-      show: "picture",
-      map: 0,
-      terms: "both",
-      errors: false,
-      spectrum: false,
-      compare: "off",
-      split: 0.5,
-      view: this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels",
-      zoom: 0,
-      middle: [asset.manifest.width / 2, asset.manifest.height / 2],
-      path: "none",
-      seconds: 8,
-      playing: false,
-      turntable: false,
-    };
+  private firstState(): State {
+    const { manifest } = this.subject.asset;
+    return firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels");
   }
 
   private readUrl(hash: string): void {
     try {
-      const plain = this.begun();
+      const plain = this.firstState();
       const state = decodeState(hash, plain);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
-      state.map = Math.min(state.map, this.subject.planes - 1);
+      state.map = Math.min(state.map, this.subject.maps - 1);
       if (!this.loaded.references) Object.assign(state, { compare: "off", errors: false });
       Object.assign(this.state, { eye: undefined }, state);
       for (const light of state.lights) {
-        if (light.kind === "environment" && !this.environments.has(light.file)) say(`drop ${light.file} on the page again: an address holds no pictures`, "hint");
+        if (light.kind === "environment" && !this.environments.has(light.file)) say(`drop ${light.file} on the page again: an address holds no images`, "hint");
       }
     } catch (error) {
       say(lineOf(error));
@@ -235,7 +216,7 @@ export class Viewer {
     const since = now - this.last;
     this.last = now;
     if (this.state.playing) this.play(since / 1000);
-    else this.base = undefined;
+    else this.playback.stop();
     if (!this.drawNeeded) {
       if (document.body.dataset.state === "busy" && !this.waiting) document.body.dataset.state = "idle";
       return;
@@ -255,7 +236,7 @@ export class Viewer {
     }
   }
 
-  /** Until `waiting` is counted down again the page is not at rest. */
+  /** The page counts as busy until `done` has been called as often. */
   private wait(): void {
     ++this.waiting;
     document.body.dataset.state = "busy";
@@ -266,23 +247,13 @@ export class Viewer {
       this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
       this.changed({});
     }
-    const light = this.state.lights[this.state.selected];
-    if (!light) return;
-    if (this.base?.light !== light) this.base = { light, copy: structuredClone(light), turns: 0 };
-    this.base.turns += Math.min(seconds, 0.25) / this.state.seconds;
-    Object.assign(light, this.moved(this.base.copy, this.base.turns));
-    this.changed({ lights: true });
-  }
-
-  private moved(light: LightState, turns: number): LightState {
-    const { center, radius } = this.receivers.bounds;
-    return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, center, radius);
+    if (this.playback.advance(seconds)) this.changed({ lights: true });
   }
 
   private relight(): void {
     const comparing = this.comparing();
     this.shining = this.lights();
-    const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold no other
+    const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
     if (this.state.show === "negative" && !comparing) {
       this.subject.relight(negated(this.shining), terms, this.renderer);
       this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
@@ -296,17 +267,17 @@ export class Viewer {
     return this.state.compare !== "off" && this.comparison.possible && this.sun() !== undefined;
   }
 
-  /** The lights, or what they are compared by: the baked one that is nearest to the sun, in the sun's color. */
+  /** The lights, or while comparing the baked light nearest to the directional one, in its color. */
   private lights(): Light[] {
     const sun = this.sun();
     if (!sun || !this.comparing()) {
       this.comparison.off();
-      this.sky.marked = -1;
-      if (this.state.compare !== "off") say("comparing needs a sun: add one", "hint");
+      this.directions.marked = -1;
+      if (this.state.compare !== "off") say("comparing needs a directional light: add one", "hint");
       return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
     }
     const light = this.comparison.light(sun);
-    this.sky.marked = this.comparison.compared;
+    this.directions.marked = this.comparison.compared;
     return light ? [light] : [];
   }
 
@@ -330,11 +301,11 @@ export class Viewer {
     this.chooseMap();
     this.stage.draw(this.shining);
     this.showErrors();
-    this.sky.draw();
+    this.directions.draw();
     this.showSpectrum();
     this.panel.refresh();
     const shown = this.comparison.direction ?? this.sun()?.direction;
-    bearing(element("bearing"), shown, shown !== undefined && this.sky.inside(shown));
+    bearing(element("bearing"), shown, shown !== undefined && this.directions.inside(shown));
     legend(element("legend"), color, most * 2 ** -state.exposure);
     const split = element("split");
     split.hidden = !(comparing && state.compare === "slider");
@@ -345,23 +316,22 @@ export class Viewer {
 
   private chooseMap(): void {
     const { asset } = this.subject;
-    const planes = asset.manifest.scalars !== undefined;
-    const layer = planes ? Math.floor(this.state.map / 4) : this.state.map;
+    const { layer, channel } = mapPlace(asset, this.state.map);
     const shader = this.uniforms;
     shader.layer.value = layer;
-    shader.channel.value = planes ? this.state.map % 4 : -1;
+    shader.channel.value = channel ?? -1;
     (shader.layerScale.value as Vector4).fromArray(asset.scale, 4 * layer);
     (shader.layerBias.value as Vector4).fromArray(asset.bias, 4 * layer);
   }
 
-  /** Every baked light's error in its place on the sky, once they are measured. */
+  /** Every baked light's error at its direction, once they are measured. */
   private showErrors(): void {
     const { subject } = this;
     if (!this.state.errors) {
-      this.sky.errors = undefined;
+      this.directions.errors = undefined;
       return;
     }
-    if (this.sky.errors || this.asking === subject) return;
+    if (this.directions.errors || this.asking === subject) return;
     this.asking = subject;
     this.wait();
     say("measuring every light's error …", "hint");
@@ -369,8 +339,8 @@ export class Viewer {
       .errors(subject)
       .then(({ psnr, texels }) => {
         if (this.subject !== subject) return;
-        this.sky.errors = psnr;
-        say(`PSNR of every baked light, by ${texels} texels; rings are tested lights`, "hint");
+        this.directions.errors = psnr;
+        say(`PSNR of every baked light over ${texels} texels; rings mark held-out lights`, "hint");
         this.changed({});
       })
       .catch((error) => {
@@ -408,7 +378,7 @@ export class Viewer {
       this.stage.resize();
       changed();
     }).observe(element("stage"));
-    new ResizeObserver(() => changed()).observe(element("sky"));
+    new ResizeObserver(() => changed()).observe(element("directions"));
     window.addEventListener("hashchange", () => {
       if (location.hash === this.written) return;
       this.readUrl(location.hash);
@@ -429,7 +399,7 @@ export class Viewer {
         if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
-        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.planes : this.state.map;
+        this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.maps : this.state.map;
         this.state.show = "map";
       },
       nextView: () => {
@@ -448,12 +418,12 @@ export class Viewer {
       tapped = event.timeStamp;
     });
     canvas.addEventListener("dblclick", (event) => this.place(event.offsetX, event.offsetY));
-    canvas.addEventListener("webglcontextlost", () => say("the GPU gave up on this page: reload it"));
+    canvas.addEventListener("webglcontextlost", () => say("the GPU context was lost: reload the page"));
     dragSplit(this.state, changed);
     dropFiles((file) => void this.environment(file));
   }
 
-  /** Put the selected lamp above what is seen at a place of the canvas, or a new one. */
+  /** Move the selected point light, or add one, above what is seen at a place of the canvas. */
   private place(x: number, y: number): void {
     const place = this.stage.pick(x, y);
     if (!place) return;
@@ -466,7 +436,7 @@ export class Viewer {
     } else if (this.state.lights.length < MOST_LIGHTS) this.panel.add("point", over, over[2] - place[2]);
   }
 
-  /** A dropped sky; the first takes the suns' place. */
+  /** Add a dropped environment map; the first one turns the other lights off. */
   private async environment(file: File): Promise<void> {
     this.wait();
     try {
@@ -492,7 +462,7 @@ export class Viewer {
   private savePath(): void {
     const { lights, selected, seconds } = this.state;
     const count = Math.max(1, Math.round(seconds * FRAMES_PER_SECOND));
-    const frame = (i: number) => lights.map((light, j) => (j === selected ? this.moved(light, i / count) : light));
+    const frame = (i: number) => lights.map((light, j) => (j === selected ? this.playback.moved(light, i / count) : light));
     saveFrames("FRAMES.json", Array.from({ length: count }, (_, i) => frame(i)));
   }
 }

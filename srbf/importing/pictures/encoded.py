@@ -1,4 +1,4 @@
-"""JPEG by Pillow, which refuses what is cut short; PNG and all other pictures by OpenImageIO, which keeps 16 bits."""
+"""JPEG by Pillow, which refuses truncated files; PNG and all other formats by OpenImageIO, which keeps 16 bits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CICP_CURVES = {8: 1.0, 4: 2.2, 5: 2.8, 13: None}  # None: sRGB's
 
 
 def read_jpeg(path: Path) -> Found:
-    """Gray, RGB or inks of a JPEG, of an MPO its first picture."""
+    """Gray, RGB or inks of a JPEG, or of the first image of an MPO."""
     Image = _pillow()
     try:
         with Image.open(path) as image:
@@ -40,7 +40,7 @@ def read_jpeg(path: Path) -> Found:
 
 
 def read_other(path: Path) -> Found:
-    """The first image of a file of any kind that OpenImageIO reads; of PNG with what its chunks say."""
+    """The first image of any file that OpenImageIO reads; for PNG, with the tags of its chunks."""
     try:
         parts = parts_of(path)
     except ImageError as error:
@@ -55,7 +55,7 @@ def read_other(path: Path) -> Found:
 
 
 def _exif_tags(exif: Any, profile: bytes | None) -> Tags:
-    """Orientation and, without a profile, the Adobe RGB that cameras tell by EXIF alone."""
+    """Orientation and, without a profile, Adobe RGB, which cameras mark in EXIF only."""
     orientation = _orientation(exif)
     if profile:
         return Tags(profile=profile, orientation=orientation)
@@ -81,7 +81,7 @@ def _orientation(exif: Any) -> int:
 
 
 def _png_tags(path: Path) -> Tags:
-    """What a PNG's chunks say, in their order of rank: cICP, iCCP, sRGB, then gAMA and cHRM."""
+    """The tags of a PNG's chunks, by precedence: cICP, iCCP, sRGB, then gAMA and cHRM."""
     Image = _pillow()
     chunks = dict(_chunks(path))
     exif = Image.Exif()
@@ -114,13 +114,13 @@ def _png_tags(path: Path) -> Tags:
     if len(chromaticities) == 32:
         stored = [n / 1e5 for n in struct.unpack(">8I", chromaticities)]
         xy = (*stored[2:], *stored[:2])
-    if exponent is not None and abs(exponent - SRGB_GAMMA) < 0.01:  # the file means sRGB's curve, which this approximates
+    if exponent is not None and abs(exponent - SRGB_GAMMA) < 0.01:  # approximates sRGB's curve
         return Tags(chromaticities=xy, space="primaries of their own", orientation=orientation)
     return Tags(gamma=exponent, chromaticities=xy, orientation=orientation)
 
 
 def _chunks(path: Path) -> Iterator[tuple[bytes, bytes]]:
-    """Type and bytes of the small chunks; of an old text chunk with EXIF its keyword in place of the type."""
+    """Type and bytes of the small chunks; for an old text chunk with EXIF, its keyword instead of the type."""
     with path.open("rb") as file:
         file.seek(8)
         while len(head := file.read(8)) == 8:

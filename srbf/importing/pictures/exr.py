@@ -1,4 +1,4 @@
-"""Which part and layer of an OpenEXR file is the picture, by the names of its channels."""
+"""The main part and layer of an OpenEXR file, by the names of its channels."""
 
 from __future__ import annotations
 
@@ -10,16 +10,46 @@ from srbf.errors import ImageError
 from srbf.importing.pictures.found import Found, Tags, stripped
 from srbf.io.image import Part, parts_of, read_channels
 
-PICTURES = {"combined", "rgb", "rgba", "beauty", "color", "final"}
-VIEWS = {"left", "right"}
-DATA = {"ao", "ambientocclusion", "ambient", "depth", "z", "mist", "normal", "normals", "n", "position", "p", "pos", "uv", "st", "vector"}
-DATA |= {"motion", "velocity", "indexob", "indexma", "id", "mask", "matte", "shadow", "denoising", "noisy", "albedo", "debug", "variance"}
-GRAY = ("Y", "L", "I", "gray", "gray", "luminance")
+MAIN_NAMES = {"combined", "rgb", "rgba", "beauty", "color", "final"}
+VIEW_NAMES = {"left", "right"}
+DATA_NAMES = {
+    "ao",
+    "ambientocclusion",
+    "ambient",
+    "depth",
+    "z",
+    "mist",
+    "normal",
+    "normals",
+    "n",
+    "position",
+    "p",
+    "pos",
+    "uv",
+    "st",
+    "vector",
+}
+DATA_NAMES |= {
+    "motion",
+    "velocity",
+    "indexob",
+    "indexma",
+    "id",
+    "mask",
+    "matte",
+    "shadow",
+    "denoising",
+    "noisy",
+    "albedo",
+    "debug",
+    "variance",
+}
+GRAY = ("Y", "L", "I", "gray", "grey", "luminance")  # words: ok
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Red, green and blue of one layer of one part; gray where it has one channel alone. `name` is what --layer takes."""
+    """Red, green and blue of one layer of one part; gray if it has one channel only. `name` is the value for `layer`."""
 
     part: Part
     prefix: str
@@ -27,30 +57,30 @@ class Layer:
 
     @property
     def name(self) -> str:
-        """Part and layer, the part left out where the layer says it or the file has no name for it."""
+        """Part and layer; without the part if the layer includes it or the part has no name."""
         if self.prefix and (not self.part.name or self.prefix == self.part.name or self.prefix.startswith(f"{self.part.name}.")):
             return self.prefix
         return ".".join(word for word in (self.part.name, self.prefix) if word) or "R, G, B"
 
     @property
     def is_picture(self) -> bool:
-        """Named as the whole picture."""
-        return not self.is_data and any(words & PICTURES for words in self._words())
+        """Whether the name is that of a main image."""
+        return not self.is_data and any(words & MAIN_NAMES for words in self._words())
 
     @property
     def is_data(self) -> bool:
-        """Named, by its last part other than a view's, as something that is no light."""
-        words = ([words for words in self._words() if words and not words <= VIEWS] or [set()])[-1]
-        return bool(words & DATA) or any(word.startswith("crypto") for word in words)
+        """Whether the last part of the name, views excluded, is that of data other than light."""
+        words = ([words for words in self._words() if words and not words <= VIEW_NAMES] or [set()])[-1]
+        return bool(words & DATA_NAMES) or any(word.startswith("crypto") for word in words)
 
     def _words(self) -> list[set[str]]:
-        """The words of each part of its name, without digits at their end: `V.Crypto00` is v, crypto."""
+        """The words of each part of the name, without trailing digits: `V.Crypto00` is v, crypto."""
         names = re.split(r"[.:/]+", self.name)
         return [{re.sub(r"[\W\d]+$", "", word).lower() for word in re.split(r"[\s_-]+", name)} - {""} for name in names]
 
 
 def layers_of(parts: list[Part]) -> list[Layer]:
-    """All layers with R, G and B, then, where there is none, those with a luminance alone, then a file's only channel."""
+    """All layers with R, G and B; if there are none, those with luminance only; then a file's only channel."""
     colored, gray = [], []
     for part in parts:
         grouped: dict[str, dict[str, int]] = {}
@@ -69,7 +99,7 @@ def layers_of(parts: list[Part]) -> list[Layer]:
 
 
 def chosen(path: Path, layers: list[Layer], wanted: str | None) -> Layer:
-    """The layer of that name; without one, the only plain RGB, the one named as the picture, the only one that is no data."""
+    """The layer named `wanted`; without a name, the only plain RGB layer, else the one named as main image, else the only one of light."""
     listed = ", ".join(layer.name for layer in layers)
     if wanted is not None:
         name = wanted.strip().lower()
@@ -78,7 +108,7 @@ def chosen(path: Path, layers: list[Layer], wanted: str | None) -> Layer:
         ]
         if len(fits) != 1:
             found = f"several ({', '.join(layer.name for layer in fits)})" if fits else f"only {listed}"
-            raise ImageError(f"expected one layer {wanted!r} in {path}, found {found}; name one of them by --layer")
+            raise ImageError(f"expected one layer {wanted!r} in {path}, found {found}; name one of them by `layer`")
         return fits[0]
     if len(layers) == 1 and not layers[0].prefix and (not layers[0].is_data or layers[0].part.index == 0):
         return layers[0]
@@ -88,11 +118,11 @@ def chosen(path: Path, layers: list[Layer], wanted: str | None) -> Layer:
     for group in (plain, [layer for layer in plain if not layer.is_data], [layer for layer in plain if layer.is_picture], whole, light):
         if len(group) == 1 and not group[0].is_data:
             return group[0]
-    raise ImageError(f"expected one layer of {path} to be the picture, found {listed}; name one by --layer")
+    raise ImageError(f"expected one layer of {path} to be the picture, found {listed}; name one by `layer`")
 
 
 def read_exr(path: Path, layer: str | None) -> Found:
-    """The layer that is the picture, in its display window. ImageError that lists the layers where none, or several, may be meant."""
+    """The main layer, in its display window. ImageError with a list of the layers if none or several qualify."""
     parts = parts_of(path)
     layers = layers_of(parts)
     if not layers and len(parts) == 1 and layer is None:

@@ -1,4 +1,4 @@
-"""What a file holds before its colors are converted and it is turned."""
+"""The content of a file before color conversion and rotation."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy import ndarray
 from srbf.arrays import Float32
 
 Model = Literal["gray", "rgb", "cmyk", "lab"]
-# Raw files of cameras. Their suffix is tried after those of pictures where a name without one fits several.
+# Raw files of cameras. If a name without suffix fits several files, these suffixes are tried after those of images.
 RAW_NAMES = (
     "3fr arw bay cap cr2 cr3 crw dcr dng erf fff iiq k25 kc2 kdc mdc mef mos mrw nef nrw orf pef ptx pxn raf raw rw2 rwl sr2 srf srw "
     "sti x3f"
@@ -21,10 +21,10 @@ RAW_SUFFIXES = tuple(f".{name}" for name in RAW_NAMES.split())
 
 @dataclass(frozen=True)
 class Tags:
-    """What a file says of its values. All are absent from most files, which are then decoded as the user says.
+    """The tags of a file about its values. Most files have none and are decoded by the `transfer` given.
 
-    profile: an ICC profile. gamma: light = value^gamma. curve: light of each stored level, (n,) or (n, 3). chromaticities: x and y of
-    red, green, blue and white. srgb: the file says that it is sRGB. orientation: EXIF's, 1 to 8.
+    profile: an ICC profile. gamma: light = value^gamma. curve: linear value of each stored level, (n,) or (n, 3). chromaticities: x and y
+    of red, green, blue and white. srgb: the file is tagged as sRGB. orientation: EXIF's, 1 to 8.
     """
 
     profile: bytes | None = None
@@ -40,7 +40,7 @@ class Tags:
 class Found:
     """Pixels as stored, without alpha: (H, W, 1, 3 or 4), integers over their maximum; inks of CMYK 1 where full; L*, a*, b* of Lab.
 
-    levels: what integers were divided by, 0 for floats.
+    levels: the divisor of integers, 0 for floats.
     """
 
     pixels: Float32[ndarray, "H W C"]
@@ -52,7 +52,7 @@ class Found:
 
 
 def stripped(pixels: ndarray) -> tuple[Float32[ndarray, "H W C"], Model]:
-    """Gray or RGB without the channels beyond: alpha, depth and the like."""
+    """Gray or RGB without further channels such as alpha and depth."""
     pixels = pixels[:, :, None] if pixels.ndim == 2 else pixels
     kept = 1 if pixels.shape[2] < 3 else 3
     return np.ascontiguousarray(pixels[:, :, :kept], np.float32), "gray" if kept == 1 else "rgb"

@@ -1,4 +1,4 @@
-"""Stored values to linear Rec.709, by what the file says of them, else by what the user says."""
+"""Stored values to linear Rec.709, by the tags of the file, else by the given transfer."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32
-from srbf.importing.pictures.color import ALIKE, by_profile, character, from_lab, model_of, name_of, to_rec709
+from srbf.importing.pictures.color import SRGB_TOLERANCE, by_profile, character, from_lab, model_of, name_of, to_rec709
 from srbf.importing.pictures.found import Found, Tags
 from srbf.io.image import decode_srgb
 
 Transfer = Literal["srgb", "linear"]
-GAMMA_ALIKE = 0.01
+GAMMA_TOLERANCE = 0.01
 
 
 def linear(found: Found, transfer: Transfer) -> tuple[Float32[ndarray, "H W 3"], list[str]]:
-    """Linear Rec.709, and what was done that is not plain.
+    """Linear Rec.709 values, and notes on the conversions.
 
-    A file's profile or tags are followed under `srgb`. `linear` is the user's word on the curve: stored values are taken as they are
-    where the file says another curve, and the file's primaries are followed where it says a linear one or none. Lab and inks, which
-    are no light, are always converted.
+    With `srgb`, a file's profile or tags win. `linear` fixes the curve: stored values stay unchanged if the file has another curve, and
+    the file's primaries apply if it has a linear curve or none. Lab and inks are always converted.
     """
     pixels, tags = found.pixels, found.tags
     if found.model == "lab":
@@ -42,28 +41,28 @@ def linear(found: Found, transfer: Transfer) -> tuple[Float32[ndarray, "H W 3"],
 
 
 def _by_profile(found: Found, profile: bytes, transfer: Transfer) -> tuple[Float32[ndarray, "H W 3"] | None, list[str]]:
-    """None in place of pixels where the profile decides nothing."""
+    """Converted pixels and notes; None instead of pixels if the profile does not apply."""
     pixels, model = found.pixels, model_of(profile)
     if found.model == "gray" and model == "rgb":
         pixels = np.repeat(pixels, 3, axis=2)
     elif found.model != model:
-        return None, [f"could not use the color profile of {{}}, which is for other values; took them by --transfer {transfer}"]
+        return None, [f"could not use the color profile of {{}}, which is for other values; took them by `transfer={transfer}`"]
     name = name_of(profile)
     try:
         is_srgb, is_linear = (False, False) if model == "cmyk" else character(profile)
         if is_srgb:
             return None, []
         if transfer == "linear" and not is_linear and model != "cmyk":
-            return None, [f"took the values of {{}} as linear by --transfer linear, and left their profile ({name}) aside"]
+            return None, [f"took the values of {{}} as linear by `transfer=linear`, and left their profile ({name}) aside"]
         return by_profile(pixels, profile, found.levels), [f"converted {{}} from {name} to linear Rec.709 by their profile"]
     except ValueError:
-        return None, [f"could not read the color profile of {{}}; took their values by --transfer {transfer}"]
+        return None, [f"could not read the color profile of {{}}; took their values by `transfer={transfer}`"]
 
 
 def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) -> tuple[Float32[ndarray, "H W 3"], list[str]]:
     if tags.srgb:
         return _decoded(pixels, transfer), []
-    own_linear = tags.gamma is not None and abs(tags.gamma - 1) < GAMMA_ALIKE
+    own_linear = tags.gamma is not None and abs(tags.gamma - 1) < GAMMA_TOLERANCE
     own_curve = tags.curve is not None or tags.gamma is not None
     notes, matrix = [], None
     if tags.chromaticities is not None:
@@ -71,13 +70,13 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
             matrix = to_rec709(tags.chromaticities)
         except ValueError:
             notes.append("could not use the chromaticities of {}; took them as Rec.709")
-    if matrix is not None and np.abs(matrix - np.eye(3)).max() <= ALIKE:
+    if matrix is not None and np.abs(matrix - np.eye(3)).max() <= SRGB_TOLERANCE:
         matrix = None
     if matrix is None and not own_curve:
         return _decoded(pixels, transfer), notes
     space = tags.space or ("linear values" if own_linear else "a curve of their own" if own_curve else "primaries of their own")
     if transfer == "linear" and not own_linear and (own_curve or tags.space):
-        return pixels, [*notes, f"took the values of {{}} as linear by --transfer linear, and left their tags ({space}) aside"]
+        return pixels, [*notes, f"took the values of {{}} as linear by `transfer=linear`, and left their tags ({space}) aside"]
     if transfer == "srgb" and tags.curve is not None:
         levels = np.linspace(0, 1, len(tags.curve))
         pixels = np.stack([np.interp(pixels[:, :, c], levels, tags.curve[:, c]) for c in range(3)], axis=2).astype(np.float32)
@@ -88,7 +87,7 @@ def _by_tags(pixels: Float32[ndarray, "H W 3"], tags: Tags, transfer: Transfer) 
     if matrix is not None:
         pixels = (pixels @ matrix.T.astype(np.float32)).astype(np.float32)
     elif own_linear and transfer == "linear":
-        return pixels, notes  # as the user said
+        return pixels, notes  # as requested
     return pixels, [*notes, f"converted {{}} from {space} to linear Rec.709 by their tags"]
 
 

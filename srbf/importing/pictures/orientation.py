@@ -1,4 +1,4 @@
-"""EXIF's Orientation: where the stored row 0 and column 0 are in the picture that is meant."""
+"""EXIF's Orientation: the sides of the displayed image on which the stored row 0 and column 0 lie."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy import ndarray
 
 
 def turned(pixels: ndarray, orientation: int) -> ndarray:
-    """(H, W, C) pixels as they are to be seen; 5 to 8 swap height and width. Values other than 1 to 8 turn nothing."""
+    """(H, W, C) pixels in display orientation; 5 to 8 swap height and width. Values other than 1 to 8 have no effect."""
     if orientation in (5, 6, 7, 8):
         pixels = np.swapaxes(pixels, 0, 1)
     if orientation in (3, 4, 7, 8):

@@ -1,4 +1,4 @@
-"""Raw files of cameras, developed by LibRaw in one fixed way, so that the images of a set fit each other."""
+"""Raw files of cameras, developed by LibRaw with fixed settings, so that the images of a set are comparable."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ TURNED = "turned {} by their EXIF orientation"
 
 
 def read_raw(path: Path) -> Found:
-    """Linear Rec.709 of 16 bits, turned. Neither white balance nor scale depends on the picture: both are the camera's, not the shot's.
+    """Linear Rec.709 of 16 bits, rotated. White balance and scale are the camera's and do not depend on the image.
 
-    MissingLibraryError without rawpy; ImageError where LibRaw does not know the file.
+    MissingLibraryError without rawpy; ImageError if LibRaw does not support the file.
     """
     try:
         import rawpy

@@ -1,4 +1,4 @@
-"""A picture of any kind, as linear Rec.709 and the right way up."""
+"""Reading an image of any supported format as linear Rec.709 in display orientation."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ JPEG = b"\xff\xd8\xff"
 
 @dataclass(frozen=True)
 class Picture:
-    """Linear Rec.709, row 0 at the top of what was seen; colors outside of Rec.709 are negative somewhere.
+    """Linear Rec.709, row 0 at the top; colors outside of Rec.709 have negative channels.
 
-    bits: of a stored channel. notes: what was done that is not plain, each with {} where the picture's name or a count belongs.
+    bits: of a stored channel. notes: the conversions, each with {} in place of the image's name or a count.
     """
 
     pixels: Float32[ndarray, "H W 3"]
@@ -39,12 +39,12 @@ class Picture:
 
 
 def read_picture(path: Path, transfer: Transfer, layer: str | None = None) -> Picture:
-    """Read, convert, turn. `transfer` is for values of which the file says nothing; `layer` names one of an EXR.
+    """Read, convert and rotate an image. `transfer` applies to values without tags; `layer` is a layer of an EXR.
 
-    ImageError where the file is missing, empty, damaged, not finite, of no picture, or where its layers leave open which is meant.
+    ImageError if the file is missing, empty, damaged, not finite, not an image, or if its layers are ambiguous.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # other libraries': they name no file, and what matters is checked here
+        warnings.simplefilter("ignore")  # of other libraries: they name no file, and the relevant faults are checked here
         found = _found(path, layer)
     require_finite(found.pixels, path)
     pixels, notes = linear(found, transfer)
@@ -54,7 +54,7 @@ def read_picture(path: Path, transfer: Transfer, layer: str | None = None) -> Pi
 
 
 def said_once(pictures: Iterable[tuple[str, tuple[str, ...]]]) -> list[str]:
-    """The notes of many pictures of (name, notes), each kind once, with their number, or the name where it is one alone."""
+    """The notes of many images, each kind once, with the number of images, or the name if it is only one."""
     counts: Counter[str] = Counter()
     names: dict[str, str] = {}
     for name, notes in pictures:
@@ -74,12 +74,12 @@ def _found(path: Path, layer: str | None) -> Found:
     if read is None:
         return read_exr(path, layer)
     if layer is not None:
-        raise ImageError(f"expected an EXR with the layer {layer!r}, found {path}; leave --layer out")
+        raise ImageError(f"expected an EXR with the layer {layer!r}, found {path}; leave `layer` out")
     return read(path)
 
 
 def _reader(path: Path) -> Callable[[Path], Found] | None:
-    """By the first bytes, not the suffix, which may be wrong; None for EXR."""
+    """The reader by the first bytes, since the suffix may be wrong; None for EXR."""
     if not path.is_file():
         raise ImageError(f"cannot read image {path}: no such file")
     with path.open("rb") as file:

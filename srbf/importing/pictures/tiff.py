@@ -1,4 +1,4 @@
-"""TIFF: the largest page that is not reduced, whatever its samples mean."""
+"""TIFF: the largest full-resolution page, of any supported sample format."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from srbf.errors import ImageError
 from srbf.importing.pictures.found import Found, Tags, stripped
 from srbf.importing.pictures.raw import read_raw
 
-logging.getLogger("tifffile").addHandler(logging.NullHandler())  # what it warns of is checked here, or is of no account
+logging.getLogger("tifffile").addHandler(logging.NullHandler())  # its warnings are checked here or irrelevant
 WHITE_IS_ZERO, BLACK_IS_ZERO, RGB, PALETTE, INKS, YCBCR, CIELAB, ICCLAB = 0, 1, 2, 3, 5, 6, 8, 9
-RAW = (32803, 34892)  # a mosaic of a sensor; linear values in a camera's own space
-FAX = (2, 3, 4)  # kinds of compression that tifffile leaves out
-MOST_PIXELS = 2**30  # 12 GB as float32
+RAW = (32803, 34892)  # a sensor mosaic; linear values in the camera's color space
+FAX = (2, 3, 4)  # compressions that tifffile lacks
+MAX_PIXELS = 2**30  # 12 GB as float32
 REDUCED, MASK = 1, 4  # bits of NewSubfileType
 ORIENTATION, TRANSFER_FUNCTION, WHITE_POINT, PRIMARIES, PROFILE = 274, 301, 318, 319, 34675
 
 
 def read_tiff(path: Path) -> Found:
-    """The largest page, sub-pages counted, that is neither reduced nor a mask. A page of raw samples makes the whole file a raw one.
+    """The largest page or sub-page that is neither reduced nor a mask. A file with a page of raw samples is read as a raw file.
 
-    ImageError where the file is damaged, cut short, or of samples that mean no color.
+    ImageError if the file is damaged, truncated, or has samples that are no color.
     """
     import tifffile
 
@@ -41,7 +41,7 @@ def read_tiff(path: Path) -> Found:
                 raise ImageError(f"cannot read image {path}: it has no page; is it damaged or cut short?")
             page = _largest(pages)
             size = path.stat().st_size
-            if len(page.dataoffsets) < math.prod(page.chunked) or page.imagewidth * page.imagelength > MOST_PIXELS:
+            if len(page.dataoffsets) < math.prod(page.chunked) or page.imagewidth * page.imagelength > MAX_PIXELS:
                 raise ImageError(f"cannot read image {path}: {page.imagewidth}x{page.imagelength} pixels are not in it; is it damaged?")
             if any(at + count > size for at, count in zip(page.dataoffsets, page.databytecounts, strict=False)):
                 raise ImageError(f"cannot read image {path}: it is cut short, or damaged; copy it again")
@@ -120,7 +120,7 @@ def _meant(page: Any, path: Path) -> tuple[Float32[ndarray, "H W C"], Any]:
 
 
 def _by_pillow(page: Any, path: Path) -> tuple[Float32[ndarray, "H W C"], Any]:
-    """What libtiff undoes for Pillow, with white as 1 already. ImageError where the page is not of the first row of pages."""
+    """Samples decoded by libtiff through Pillow, with white as 1. ImageError for sub-pages."""
     from PIL import Image
 
     if not isinstance(page.index, int):
@@ -172,7 +172,7 @@ def _tags(page: Any, first: Any, kind: int) -> Tags:
 
 
 def _chromaticities(primaries: Any, white: Any) -> tuple[float, ...] | None:
-    """Red, green, blue, white, out of two tags of numerators and denominators; None unless both are whole."""
+    """Red, green, blue, white, out of two tags of numerators and denominators; None unless both are complete."""
     if primaries is None or white is None or len(primaries) != 12 or len(white) != 4:
         return None
     numbers = (*primaries, *white)

@@ -14,7 +14,7 @@ UNPACK = {".dds": dds.unpack, ".ktx2": ktx2.unpack}
 
 
 def read_texture_array(path: Path) -> TextureArray:
-    """The array in a .dds or .ktx2 file; ImageError, in one line, where it is none of those that we write, or cut short."""
+    """The array in a .dds or .ktx2 file; ImageError if it is not one that srbf writes, or truncated."""
     if path.suffix not in UNPACK:
         raise ImageError(f"expected a texture array named .dds or .ktx2, found {path}")
     if not path.is_file():

@@ -16,16 +16,16 @@ from srbf.io.containers.dds_header import header
 from srbf.io.image import read_stored
 
 BlockFormat = Literal["bc7", "bc1"]
-BLOCK_BYTES: dict[str, int] = {"bc7": 16, "bc1": 8}  # 8 and 4 bits a texel
+BLOCK_BYTES: dict[str, int] = {"bc7": 16, "bc1": 8}  # 8 and 4 bits per texel
 SIDE = 4
-ROW_BATCH = 1 << 14  # of one picture that OpenImageIO decodes
+ROW_BATCH = 1 << 14  # of one image that OpenImageIO decodes
 
 
 def encode(pixels: ndarray, form: BlockFormat) -> ndarray:
     """(h, w, 3) or (h, w, 4) uint8 as blocks, (bytes,) uint8, row by row of blocks.
 
-    Three channels count alike, no eye's weights among them: the bytes are coefficients. Their alpha is 255; `bc1` has none. Blocks that
-    stick out at the right and the bottom repeat the last texels: the texture keeps its size.
+    All channels have equal weight, without perceptual weights, since the bytes are coefficients. The alpha of three channels is 255;
+    `bc1` has none. Blocks beyond the right and the bottom edge repeat the last texels, and the texture keeps its size.
     MissingLibraryError without etcpak.
     """
     height, width, channels = pixels.shape
@@ -35,7 +35,7 @@ def encode(pixels: ndarray, form: BlockFormat) -> ndarray:
 
 
 def decode(blocks: ndarray, form: BlockFormat, width: int, height: int) -> ndarray:
-    """(N, height, width, 4) uint8 of N layers' blocks, (N, bytes) uint8, by OpenImageIO's reader of DDS files."""
+    """(N, height, width, 4) uint8 of N layers' blocks, (N, bytes) uint8, by OpenImageIO's DDS reader."""
     high, wide = -(-height // SIDE) * SIDE, -(-width // SIDE) * SIDE
     pixels = np.empty((len(blocks), height, width, 4), np.uint8)
     at_a_time = max(1, ROW_BATCH // high)
@@ -43,7 +43,7 @@ def decode(blocks: ndarray, form: BlockFormat, width: int, height: int) -> ndarr
         path = Path(folder) / "blocks.dds"
         for start in range(0, len(blocks), at_a_time):
             some = blocks[start : start + at_a_time]
-            path.write_bytes(header(form, wide, high * len(some)) + some.tobytes())  # layers one below the other
+            path.write_bytes(header(form, wide, high * len(some)) + some.tobytes())  # layers stacked vertically
             picture = np.round(read_stored(path, 4) * 255).astype(np.uint8)
             pixels[start : start + at_a_time] = picture.reshape(len(some), high, wide, 4)[:, :height, :width]
     return pixels
@@ -54,7 +54,7 @@ def _compressor(form: BlockFormat) -> Callable[[bytes, int, int], bytes]:
     if form == "bc1":
         return lambda data, width, height: etcpak.compress_bc1(data, width, height)
     settings = etcpak.BC7CompressBlockParams()
-    settings.init_linear_weights()  # else luma counts most
+    settings.init_linear_weights()  # otherwise luma has the largest weight
     return lambda data, width, height: etcpak.compress_bc7(data, width, height, settings)
 
 

@@ -1,4 +1,4 @@
-"""DDS with the DX10 header: layer after layer, each with its levels from the full size down."""
+"""DDS with the DX10 header: one layer after the other, each with its levels from full size down."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def pack(texture: TextureArray) -> bytes:
 
 
 def unpack(data: bytes) -> TextureArray:
-    """The array in the bytes of a file; ValueError on what `pack` does not write."""
+    """The array in the bytes of a file; ValueError for files that `pack` does not write."""
     if len(data) < LENGTH or data[:4] != MAGIC:
         raise ValueError("no DDS header")
     height, width = struct.unpack_from("<2I", data, 12)

@@ -13,7 +13,7 @@ CAPS, HEIGHT, WIDTH, PITCH, PIXEL_FORMAT, MIPMAPS, LINEAR_SIZE = 1, 2, 4, 8, 0x1
 FOURCC, DX10 = 4, 0x30315844
 COMPLEX, TEXTURE, MIPMAP = 8, 0x1000, 0x400000
 TEXTURE_2D = 3
-BITS = {"bc7": 8, "bc1": 4, "uint8": 32, "half": 64}  # a texel
+BITS = {"bc7": 8, "bc1": 4, "uint8": 32, "half": 64}  # per texel
 
 
 def header(form: TexelFormat, width: int, height: int, layers: int = 1, levels: int = 1) -> bytes:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srbf.io.containers.texture_array import TexelFormat, TextureArray, level_bytes, level_size
+from srbf.io.containers.dds_header import TexelFormat
+from srbf.io.containers.texture_array import TextureArray, level_bytes, level_size
 
 IDENTIFIER = b"\xabKTX 20\xbb\r\n\x1a\n"
 HEADER, LEVEL = 80, 24
@@ -24,8 +25,8 @@ class Described:
     vulkan: int
     type_size: int
     model: int
-    block: int  # texels a side
-    plane: int  # bytes a block, and what a level starts on a multiple of
+    block: int  # texels per side
+    plane: int  # bytes per block; levels start at multiples of it
     samples: tuple[tuple[int, int, int, int, int], ...]
 
 
@@ -64,7 +65,7 @@ def pack(texture: TextureArray) -> bytes:
 
 
 def unpack(data: bytes) -> TextureArray:
-    """The array in the bytes of a file; ValueError on what `pack` does not write."""
+    """The array in the bytes of a file; ValueError for files that `pack` does not write."""
     if len(data) < HEADER or data[:12] != IDENTIFIER:
         raise ValueError("no KTX2 header")
     vulkan, _, width, height, depth, layers, faces, count, scheme = struct.unpack_from("<9I", data, 12)

@@ -1,4 +1,4 @@
-"""A texture array in memory as a GPU takes it: layers of one size, four channels, and their mip levels."""
+"""A texture array in GPU layout: layers of one size, four channels, and their mip levels."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ DTYPES = {"uint8": np.uint8, "half": np.float16}
 
 
 def level_size(width: int, height: int, level: int) -> tuple[int, int]:
-    """(width, height) of a mip level: halved and rounded down as often, at least one texel."""
+    """(width, height) of a mip level: halved and rounded down `level` times, at least one texel."""
     return max(1, width >> level), max(1, height >> level)
 
 
 def level_bytes(form: str, width: int, height: int) -> int:
-    """Bytes of one layer's level of width x height texels: blocks of 4 x 4 texels, begun ones whole, or plain texels."""
+    """Bytes of one layer's level of width x height texels: blocks of 4 x 4 texels, rounded up, or plain texels."""
     if form in BLOCK_BYTES:
         return -(-width // 4) * -(-height // 4) * BLOCK_BYTES[form]
     return width * height * TEXEL_BYTES[form]
@@ -32,7 +32,7 @@ def level_bytes(form: str, width: int, height: int) -> int:
 class TextureArray:
     """N layers of `width` x `height` texels, linear values, row 0 at the top.
 
-    `levels`: from the full size down, each (N, bytes) uint8, a layer's bytes as they lie in GPU memory: texels or blocks, row by row.
+    `levels`: from full size down, each (N, bytes) uint8 in the layout of GPU memory: texels or blocks, row by row.
     """
 
     form: TexelFormat
@@ -48,7 +48,7 @@ class TextureArray:
 
     @staticmethod
     def of(form: TexelFormat, pixels: Sequence[ndarray]) -> TextureArray:
-        """The array of plain texels (N, h, w, C) uint8 or float16, a level each; three channels get a fourth of 1."""
+        """The array of plain texels (N, h, w, C) uint8 or float16, with one level; three channels get a fourth of 1."""
         height, width = pixels[0].shape[1:3]
         return TextureArray(form, width, height, tuple(_four(level).reshape(len(level), -1).view(np.uint8) for level in pixels))
 

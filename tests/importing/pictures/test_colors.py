@@ -100,7 +100,7 @@ def test_srgb_profiles_change_nothing_and_say_nothing(tmp_path: Path) -> None:
 def test_linear_by_the_user_keeps_a_curve_out_and_follows_primaries(tmp_path: Path, gamma: float, kept: bool) -> None:
     picture = read_picture(written(tmp_path / "a.png", COLORS, profile(DISPLAY_P3, gamma)), "linear")
     agree(picture.pixels, COLORS / 255 if kept else COLORS / 255 @ P3_TO_709.T)
-    assert ("--transfer linear" in picture.notes[0]) == kept
+    assert ("`transfer=linear`" in picture.notes[0]) == kept
 
 
 @pytest.mark.parametrize("kind", ["rgb", "cmyk"])
@@ -111,7 +111,7 @@ def test_a_profile_that_cannot_be_read_is_said(tmp_path: Path, kind: str) -> Non
         bad = bytearray(ink_profile())
     picture = read_picture(written(tmp_path / "a.png", COLORS, bytes(bad)), "srgb")
     np.testing.assert_allclose(picture.pixels, decode_srgb(COLORS / 255), atol=1e-6)
-    assert len(picture.notes) == 1 and "--transfer srgb" in picture.notes[0]
+    assert len(picture.notes) == 1 and "`transfer=srgb`" in picture.notes[0]
 
 
 @pytest.mark.parametrize("suffix", [".tif", ".jpg"])

@@ -106,7 +106,7 @@ def test_damaged_bytes_never_end_otherwise(tmp_path: Path) -> None:
 
 
 def test_asymmetry() -> None:
-    """The picture that the turns are told by is its own turn in none of the eight ways."""
+    """The test image of the orientations differs in all eight of them."""
     square = asymmetrical(8, 8)
     turns = [np.rot90(flipped, i) for flipped in (square, np.fliplr(square)) for i in range(4)]
     assert sum(np.array_equal(square, turn) for turn in turns) == 1

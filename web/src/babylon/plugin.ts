@@ -8,7 +8,7 @@ import type { AbstractEngine } from "@babylonjs/core/Engines/abstractEngine.js";
 import type { SubMesh } from "@babylonjs/core/Meshes/subMesh.js";
 import type { Scene } from "@babylonjs/core/scene.js";
 import type { Asset } from "../asset";
-import { paddedCenters, shaderBody, shaderDefines } from "../shader";
+import { constantVectors, shaderBody, shaderDefines } from "../shader";
 import type { BabylonTextures } from "./textures";
 
 export interface PluginOptions {
@@ -16,7 +16,7 @@ export interface PluginOptions {
   uv?: "uv" | "uv2";
   /** Where v is 0: `top` as glTF has it, `bottom` otherwise. */
   uvOrigin?: "top" | "bottom";
-  /** Where receivers are: `vertex`, as the mesh stands, or `map`, as the asset recorded it. */
+  /** Receivers' positions: `vertex`, from the mesh, or `map`, as the asset recorded them. */
   receivers?: "vertex" | "map";
   /** Who adds the direct diffuse light of the scene's lights. */
   direct?: "asset" | "engine";
@@ -28,11 +28,11 @@ export interface SharedFrame {
   pointLights: Float32Array;
   pointLightCount: number;
   room: number;
-  /** Column by column. */
+  /** Column-major. */
   assetFromScene: Float32Array;
 }
 
-const UNIFORMS = ["srbfWeights", "srbfCenters", "srbfScale", "srbfBias", "srbfPointLights", "srbfPointLightCount", "srbfTableSize", "srbfAssetFromScene"];
+const UNIFORMS = ["srbfPointLights", "srbfPointLightCount", "srbfAssetFromScene"];
 
 export class SrbfPlugin extends MaterialPluginBase {
   private readonly constants: Record<string, Float32Array>;
@@ -45,9 +45,9 @@ export class SrbfPlugin extends MaterialPluginBase {
     private readonly options: Required<PluginOptions>,
   ) {
     super(material, "Srbf", 200, { SRBF: true, ...shaderDefines(asset, 1) }, false, false);
-    this.constants = { srbfScale: asset.scale, srbfBias: asset.bias, ...(asset.basis.kind === "gaussian" ? { srbfCenters: paddedCenters(asset) } : {}) };
+    this.constants = constantVectors(asset);
     this.registerForExtraEvents = true; // so that hardBindForSubMesh is called
-    this._pluginManager._addPlugin(this); // asks for the code at once, so not from the constructor of the base
+    this._pluginManager._addPlugin(this); // asks for the code at once, so not in the base's constructor
     this._enable(true);
   }
 
@@ -72,7 +72,9 @@ export class SrbfPlugin extends MaterialPluginBase {
   }
 
   override getUniforms() {
-    return { externalUniforms: UNIFORMS };
+    const { integers, weights } = this.asset.tables;
+    const own = [...Object.keys(this.constants), ...Object.keys(integers), ...(weights.kind === "uniform" ? ["srbfWeights"] : [])];
+    return { externalUniforms: [...UNIFORMS, ...own] };
   }
 
   override hardBindForSubMesh(_buffer: UniformBuffer, _scene: Scene, _engine: AbstractEngine, subMesh: SubMesh): void {
@@ -80,8 +82,8 @@ export class SrbfPlugin extends MaterialPluginBase {
     if (!effect) return;
     for (const [name, texture] of Object.entries(this.textures.samplers)) effect.setTexture(name, texture);
     for (const [name, values] of Object.entries(this.constants)) effect.setFloatArray4(name, values);
-    if (this.asset.basis.kind === "gaussian") effect.setFloatArray4("srbfWeights", this.frame.weights);
-    else effect.setInt("srbfTableSize", this.asset.basis.tableSize);
+    for (const [name, value] of Object.entries(this.asset.tables.integers)) effect.setInt(name, value);
+    if (this.asset.tables.weights.kind === "uniform") effect.setFloatArray4("srbfWeights", this.frame.weights);
     effect.setFloatArray4("srbfPointLights", this.frame.pointLights);
     effect.setInt("srbfPointLightCount", this.frame.pointLightCount);
     effect.setMatrices("srbfAssetFromScene", this.frame.assetFromScene);

@@ -2,11 +2,11 @@
 import { PBRMaterial } from "@babylonjs/core/Materials/PBR/pbrMaterial.js";
 import type { Scene } from "@babylonjs/core/scene.js";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
-import { SrbfError } from "../errors";
 import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
+import { receiversFrom } from "../manifest";
 import { columnMajor, type Matrix4, multiplied, Z_UP_FROM_Y_UP } from "../matrix";
-import { frameValues, needPositions } from "../shader";
+import { frameValues, needFilterable, needPositions } from "../shader";
 import { type PluginOptions, type SharedFrame, SrbfPlugin } from "./plugin";
 import { BabylonTextures } from "./textures";
 
@@ -18,7 +18,7 @@ export const Z_UP_FROM_LEFT_HANDED: Matrix4 = [
   [0, 0, 0, 1],
 ];
 
-/** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+/** An asset that lights PBR materials of Babylon.js under WebGL2. Set `lights`, call `update` after every change, and `dispose` at the end. */
 export class SrbfRelightingMap {
   /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
@@ -28,15 +28,13 @@ export class SrbfRelightingMap {
   private readonly frame: SharedFrame;
   private readonly plugins: SrbfPlugin[] = [];
 
-  /** @throws SrbfError on clustered eigen maps, which must be drawn into a lightmap first, and on block-compressed layers. */
+  /** @throws SrbfError on layers that must not be filtered (clustered eigen maps), and on block-compressed ones. */
   constructor(
     readonly asset: Asset,
     scene: Scene,
     options: { filter?: "linear" | "nearest" } = {},
   ) {
-    if (asset.manifest.method === "clustered-eigen-map") {
-      throw new SrbfError("expected relighting maps or an eigen map for Babylon.js, found a clustered eigen map; fit another, or use srbf/three");
-    }
+    needFilterable(asset, "Babylon.js");
     this.worldFromScene = scene.useRightHandedSystem ? Z_UP_FROM_Y_UP : Z_UP_FROM_LEFT_HANDED;
     this.textures = new BabylonTextures(asset, scene, options.filter ?? "linear");
     this.frame = { weights: new Float32Array(0), pointLights: new Float32Array(16), pointLightCount: 0, room: 1, assetFromScene: new Float32Array(16) };
@@ -48,19 +46,19 @@ export class SrbfRelightingMap {
     return new SrbfRelightingMap(await loadAsset(url, options), scene, options);
   }
 
-  /** Light `material` by this asset: irradiance in the place of its direct diffuse light, or radiance in that of all its light. */
+  /** Light `material` by this asset: irradiance replaces its direct diffuse light, radiance replaces all its light. */
   apply(material: PBRMaterial, options: PluginOptions = {}): PBRMaterial {
-    const { source, transport } = this.asset.manifest;
-    const receivers = options.receivers ?? (source?.receiver?.kind === "view" ? "map" : "vertex");
+    const { manifest } = this.asset;
+    const receivers = options.receivers ?? receiversFrom(manifest);
     if (receivers === "map") needPositions(this.asset, 1);
-    const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
+    const direct = options.direct ?? (manifest.transport === "indirect" ? "engine" : "asset");
     const chosen = { uv: options.uv ?? "uv2", uvOrigin: options.uvOrigin ?? "top", receivers, direct } as const;
     if (this.asset.alpha) material.transparencyMode = PBRMaterial.PBRMATERIAL_ALPHABLEND;
     this.plugins.push(new SrbfPlugin(material, this.asset, this.textures, this.frame, chosen));
     return material;
   }
 
-  /** Bring the uniforms to the lights as they are now. */
+  /** Update the uniforms to the current lights. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
     const room = pointLightRoom(values.pointLights.length);

@@ -8,34 +8,33 @@ import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 
 const TYPES = { half: Constants.TEXTURETYPE_HALF_FLOAT, float: Constants.TEXTURETYPE_FLOAT, uint8: Constants.TEXTURETYPE_UNSIGNED_BYTE };
-const { TEXTUREFORMAT_R, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT, TEXTURETYPE_HALF_FLOAT } = Constants;
+const { TEXTUREFORMAT_R, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT } = Constants;
 
-/** By the name of the shader's sampler. `weights` of eigen maps changes with the lights. */
+/** By the name of the shader's sampler. `weights` changes with the lights. */
 export class BabylonTextures {
   readonly samplers: Record<string, Texture>;
   readonly weights?: RawTexture;
 
-  /** @throws SrbfError on block-compressed layers, of which Babylon.js makes no texture arrays. */
+  /** @throws SrbfError on block-compressed layers, for which Babylon.js has no texture arrays. */
   constructor(asset: Asset, scene: Scene, filter: "linear" | "nearest") {
     const { width, height, count, encoding, levels } = asset.layers;
     if (encoding === "bc7" || encoding === "bc1") {
-      throw new SrbfError(`expected half, float or uint8 layers for Babylon.js, found ${encoding}; srbf export --target exr or uint8`);
+      throw new SrbfError(`expected half, float or uint8 layers for Babylon.js, found ${encoding}; srbf export --target exr or png`);
     }
     const sampling = filter === "linear" ? Texture.BILINEAR_SAMPLINGMODE : Texture.NEAREST_SAMPLINGMODE;
     const plain = (data: ArrayBufferView, w: number, h: number, format: number, type: number) =>
       new RawTexture(data, w, h, format, scene, false, false, Texture.NEAREST_SAMPLINGMODE, type);
-    const { basis, ambient } = asset;
-    const table =
-      basis.kind === "gaussian"
-        ? plain(basis.table, basis.table.length, 1, TEXTUREFORMAT_R, TEXTURETYPE_FLOAT)
-        : plain(basis.wTable.data, basis.wTable.width, basis.wTable.height, TEXTUREFORMAT_RGBA, TEXTURETYPE_HALF_FLOAT);
+    const { tables, ambient } = asset;
     this.samplers = {
       srbfLayers: new RawTexture2DArray(levels[0], width, height, count, TEXTUREFORMAT_RGBA, scene, false, false, sampling, TYPES[encoding]),
       srbfAmbient: plain(ambient?.data ?? new Float32Array(4), ambient?.width ?? 1, ambient?.height ?? 1, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT),
-      srbfTable: table,
     };
-    if (basis.kind === "light-functions") {
-      this.weights = plain(new Float32Array(4 * (basis.scalars + 1)), basis.scalars + 1, 1, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT);
+    for (const [name, { data, width: w, height: h, channels, kind }] of Object.entries(tables.textures)) {
+      this.samplers[name] = plain(data, w, h, channels === 1 ? TEXTUREFORMAT_R : TEXTUREFORMAT_RGBA, TYPES[kind]);
+    }
+    const { kind, width: columns, height: rows } = tables.weights;
+    if (kind === "texture") {
+      this.weights = plain(new Float32Array(4 * columns * rows), columns, rows, TEXTUREFORMAT_RGBA, TEXTURETYPE_FLOAT);
       this.samplers.srbfWeights = this.weights;
     }
     if (asset.alpha) {

@@ -1,11 +1,11 @@
 /** An asset in a PlayCanvas scene: its textures, its lights, the materials that show it. */
 import { BLEND_NORMAL, type GraphicsDevice, SEMANTIC_POSITION, SEMANTIC_TEXCOORD0, SEMANTIC_TEXCOORD1, ShaderMaterial } from "playcanvas";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
-import { SrbfError } from "../errors";
 import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
+import { receiversFrom } from "../manifest";
 import { columnMajor, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
-import { frameValues, needPositions, paddedCenters } from "../shader";
+import { constantVectors, frameValues, needFilterable, needPositions } from "../shader";
 import { fragmentText, type ShaderOptions, vertexText } from "./shader";
 import { PlayCanvasTextures } from "./textures";
 
@@ -21,7 +21,7 @@ interface Shown {
   options: ShaderOptions & { channel: 0 | 1 };
 }
 
-/** An asset that PlayCanvas shows under WebGL2 by materials of its own. Set `lights`, call `update` when they have changed, `dispose` at the end. */
+/** An asset that PlayCanvas shows under WebGL2 with its own materials. Set `lights`, call `update` after every change, and `dispose` at the end. */
 export class SrbfRelightingMap {
   /** In the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
@@ -31,15 +31,13 @@ export class SrbfRelightingMap {
   private readonly shown: Shown[] = [];
   private room = 1;
 
-  /** @throws SrbfError on clustered eigen maps, which must be drawn into a lightmap first, and on block-compressed layers. */
+  /** @throws SrbfError on layers that must not be filtered (clustered eigen maps), and on block-compressed ones. */
   constructor(
     readonly asset: Asset,
     device: GraphicsDevice,
     options: { filter?: "linear" | "nearest" } = {},
   ) {
-    if (asset.manifest.method === "clustered-eigen-map") {
-      throw new SrbfError("expected relighting maps or an eigen map for PlayCanvas, found a clustered eigen map; fit another, or use srbf/three");
-    }
+    needFilterable(asset, "PlayCanvas");
     this.textures = new PlayCanvasTextures(asset, device, options.filter ?? "linear");
   }
 
@@ -48,10 +46,9 @@ export class SrbfRelightingMap {
     return new SrbfRelightingMap(await loadAsset(url, options), device, options);
   }
 
-  /** A material that shows this asset alone: none of the scene's lights, no fog, no skins; tone mapped and encoded as the camera asks. */
+  /** A material that shows only this asset, without the scene's lights, fog or skins; tone mapped and encoded for the camera. */
   material(options: ShowOptions = {}): ShaderMaterial {
-    const kind = this.asset.manifest.source?.receiver?.kind;
-    const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
+    const receivers = options.receivers ?? receiversFrom(this.asset.manifest);
     if (receivers === "map") needPositions(this.asset, 1);
     const shown: Shown = {
       material: new ShaderMaterial(),
@@ -61,17 +58,15 @@ export class SrbfRelightingMap {
     if (this.asset.alpha) material.blendType = BLEND_NORMAL;
     for (const [name, texture] of Object.entries(this.textures.samplers)) material.setParameter(name, texture);
     material.setParameter("srbfAlbedo", [...(options.albedo ?? [1, 1, 1])]);
-    material.setParameter("srbfScale[0]", this.asset.scale);
-    material.setParameter("srbfBias[0]", this.asset.bias);
-    if (this.asset.basis.kind === "gaussian") material.setParameter("srbfCenters[0]", paddedCenters(this.asset));
-    else material.setParameter("srbfTableSize", this.asset.basis.tableSize);
+    for (const [name, values] of Object.entries(constantVectors(this.asset))) material.setParameter(`${name}[0]`, values);
+    for (const [name, value] of Object.entries(this.asset.tables.integers)) material.setParameter(name, value);
     this.shown.push(shown);
     this.compile(shown);
     this.update();
     return material;
   }
 
-  /** Bring the materials to the lights as they are now. */
+  /** Update the materials to the current lights. */
   update(): void {
     const values = frameValues(this.asset, this.lights);
     const room = pointLightRoom(values.pointLights.length);
@@ -85,7 +80,7 @@ export class SrbfRelightingMap {
       this.textures.weights.unlock();
     }
     for (const { material } of this.shown) {
-      if (this.asset.basis.kind === "gaussian") material.setParameter("srbfWeights[0]", values.weights);
+      if (this.asset.tables.weights.kind === "uniform") material.setParameter("srbfWeights[0]", values.weights);
       material.setParameter("srbfPointLights[0]", packedPointLights(values.pointLights, room));
       material.setParameter("srbfPointLightCount", values.pointLights.length);
       material.setParameter("srbfAssetFromScene", assetFromScene);

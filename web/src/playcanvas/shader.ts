@@ -5,7 +5,7 @@ import { shaderText } from "../shader";
 export interface ShaderOptions {
   /** Where v is 0: `top` as glTF has it, `bottom` otherwise. */
   uvOrigin: "top" | "bottom";
-  /** Where receivers are: `vertex`, as the mesh stands, or `map`, as the asset recorded it. */
+  /** Receivers' positions: `vertex`, from the mesh, or `map`, as the asset recorded them. */
   receivers: "vertex" | "map";
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What an engine's material says of clustered eigen maps: its uniforms, and srbfRelit, the light of all lamps and far lights together.
-// A scalar means something else in the next cluster: srbfRelit is the light of the texel that uv lies in, for drawing the lightmap anew, and
+// An engine's material for clustered eigen maps: its uniforms, and srbfRelit, the light of all point and distant lights together.
+// A component has another meaning in another cluster: srbfRelit is the light of the texel that uv lies in, for redrawing the lightmap, and
 // level must be 0.
 #include "combine/mip_level.glsl"
 #include "methods/clustered_eigen_map_lights.glsl"
@@ -27,7 +27,7 @@ vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
     return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
-// At a place on a surface: the level of mip maps that fits the pixel.
+// At a place on a surface, at the mip level that fits the pixel.
 vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
     vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
     return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);

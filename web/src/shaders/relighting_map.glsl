@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What an engine's material says of relighting maps: its uniforms, and srbfRelit, the light of all lamps and far lights together.
+// An engine's material for relighting maps: its uniforms, and srbfRelit, the light of all point and distant lights together.
 #include "combine/mip_level.glsl"
 #include "methods/relighting_map_lights.glsl"
 
@@ -23,7 +23,7 @@ vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
     return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
-// At a place on a surface: the level of mip maps that fits the pixel.
+// At a place on a surface, at the mip level that fits the pixel.
 vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
     vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
     return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);

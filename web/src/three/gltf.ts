@@ -12,8 +12,8 @@ interface Extension {
 }
 
 /**
- * Load the assets that a model's materials name, once each, and light its meshes by them: what GLTFLoader gave, and the `folder` that it came from. The
- * picture of fixed light that other viewers show gives way to a white Lambert material of the same sides.
+ * Load the assets that a model's materials name, once each, and light its meshes by them: `gltf` is GLTFLoader's result, `folder` where it was loaded from. The
+ * fixed-light picture that other viewers show is replaced by a white Lambert material with the same `side`.
  */
 export async function relightGltf(
   gltf: { scene: Object3D },

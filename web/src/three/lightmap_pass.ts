@@ -1,4 +1,4 @@
-/** The asset drawn anew into a texture of its own size whenever its light changes, to be filtered as any lightmap is. */
+/** Draws the asset into a texture of its own size whenever its light changes, to be filtered like any lightmap. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -23,16 +23,16 @@ import type { Filter } from "./textures";
 import type { Uniforms } from "./uniforms";
 
 export interface TargetOptions {
-  /** What the lightmap is kept in. */
+  /** Precision of the lightmap. */
   target?: "half" | "float";
   /** How it is sampled. */
   filter?: Filter;
-  /** Mip maps, as far as the gutter between charts reaches. */
+  /** Mip maps; coarse levels bleed between charts where the gutter is narrower. */
   mipmaps?: boolean;
   anisotropy?: number;
 }
 
-/** What is added to the sum texel for texel, before the clamp: an indirect asset's direct light. */
+/** Added to the sum texel by texel, before the clamp: an indirect asset's direct light. */
 export interface Added {
   texture: Texture;
   /** Whether the maps' own light is left out. */
@@ -45,7 +45,7 @@ void main() {
     gl_Position = vec4(position.xy, 0.0, 1.0);
 }`;
 
-/** `srbfRelit` over every texel, and a view's coverage as alpha, straight; row 0 of the target is the asset's top row. */
+/** `srbfRelit` of every texel, and a view's coverage as straight alpha; row 0 of the target is the asset's top row. */
 export class LightmapPass {
   readonly target: WebGLRenderTarget;
   private readonly mesh: Mesh<BufferGeometry, RawShaderMaterial>;
@@ -75,7 +75,7 @@ export class LightmapPass {
     this.mesh.frustumCulled = false;
   }
 
-  /** Draw it with the numbers that the uniforms hold; the renderer is left as it was. */
+  /** Draw it with the numbers that the uniforms hold; the renderer's state is restored. */
   draw(renderer: WebGLRenderer, added?: Added): void {
     if (added?.texture !== this.added?.texture || added?.alone !== this.added?.alone) this.room = 0;
     this.added = added;

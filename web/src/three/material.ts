@@ -10,11 +10,11 @@ export interface MaterialOptions {
   channel?: 0 | 1 | 2 | 3;
   /** Where v is 0: `top` as glTF has it, `bottom` as three's own geometries do. */
   uvOrigin?: "top" | "bottom";
-  /** Where receivers are: `vertex`, as the mesh stands in the scene, or `map`, as the asset recorded it; for lamps alone. */
+  /** Receivers' positions: `vertex`, from the mesh in the scene, or `map`, as the asset recorded them; only point and spot lights need them. */
   receivers?: "vertex" | "map";
   /**
-   * Who adds the direct diffuse light of the scene's lights: the `asset`, whose light then replaces three's, or the `engine`. An asset of combined
-   * transport holds it, an indirect one does not.
+   * Who adds the direct diffuse light of the scene's lights: the `asset`, whose light then replaces three's, or the `engine`. Assets of combined
+   * transport hold it, indirect ones do not.
    */
   direct?: "asset" | "engine";
 }
@@ -22,9 +22,9 @@ export interface MaterialOptions {
 export interface Patch {
   asset: Asset;
   uniforms: Uniforms;
-  /** `maps`: the layers are summed in the material; `lightmap`: a lightmap that was drawn before is sampled. */
+  /** `maps`: the layers are summed in the material; `lightmap`: a lightmap that `update` has drawn is sampled. */
   source: "maps" | "lightmap";
-  /** For so many lamps. */
+  /** How many point lights the program has room for. */
   room: number;
   options: Required<MaterialOptions>;
 }
@@ -40,7 +40,7 @@ export function checkMaterial(material: Material): void {
   }
 }
 
-/** What tells one patched program from another. */
+/** Equal for patches that share a program. */
 export function patchKey(patch: Patch): string {
   const { asset, source, room, options } = patch;
   return ["srbf", asset.manifest.method, asset.manifest.quantity, asset.layers.count, asset.alpha !== undefined, source, room, ...Object.values(options)].join(" ");

@@ -3,18 +3,19 @@ import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
+import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
-import { SceneAsset } from "./scene_asset";
+import { SceneAsset, sourceOf } from "./scene_asset";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 
 export interface RelightingMapOptions extends TargetOptions {
   /**
    * `maps`: materials sum the layers at every pixel. `lightmap`: `update` draws a lightmap whenever a light changes, and materials sample it, with mip
-   * maps if asked for; clustered eigen maps know only this.
+   * maps if asked for; the only choice for clustered eigen maps.
    */
   source?: "maps" | "lightmap";
 }
@@ -24,7 +25,7 @@ const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
 
 /**
  * An asset that lights three.js materials. Add lights by `follow` (three's own, in three's world) or to `lights` (of the library, in the asset's
- * world: Blender's, z up), call `update` once a frame, `dispose` at the end.
+ * world: Blender's, z up), call `update` once per frame, `dispose` at the end.
  */
 export class SrbfRelightingMap extends SceneAsset {
   readonly textures: SrbfTextures;
@@ -36,14 +37,10 @@ export class SrbfRelightingMap extends SceneAsset {
   private drawn = "";
   private added: Added | undefined;
 
-  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingMapOptions = {}) {
     super(asset);
-    const clustered = asset.manifest.method === "clustered-eigen-map";
-    this.source = options.source ?? (clustered ? "lightmap" : "maps");
-    if (clustered && this.source === "maps") {
-      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
-    }
+    this.source = sourceOf(asset, options.source);
     this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
     this.uniforms = assetUniforms(asset, this.textures);
     if (this.source === "lightmap") {
@@ -57,17 +54,17 @@ export class SrbfRelightingMap extends SceneAsset {
     return new SrbfRelightingMap(await loadAsset(url, options), options);
   }
 
-  /** The lightmap that `update` draws (v downwards), for shaders of your own; only with `source: "lightmap"`. */
+  /** The lightmap that `update` draws (v downwards), for your own shaders; only with `source: "lightmap"`. */
   get lightmap(): Texture | undefined {
     return this.pass?.target.texture;
   }
 
   /**
-   * Add `texture` of the asset's size to the sum of its maps before the clamp, or show it `alone`: direct light of an indirect asset, in its quantity.
+   * Add `texture`, of the asset's size, to the sum of its maps before the clamp, or show it `alone`: an indirect asset's direct light, in its quantity.
    * Only with `source: "lightmap"`; the next `update` draws it.
    */
   add(texture?: Texture, alone = false): void {
-    if (!texture && !this.added) return; // nothing to draw anew
+    if (!texture && !this.added) return; // nothing to redraw
     this.added = texture && { texture, alone };
     this.drawn = "";
   }
@@ -85,7 +82,7 @@ export class SrbfRelightingMap extends SceneAsset {
       options: {
         channel: options.channel ?? 1,
         uvOrigin: options.uvOrigin ?? "top",
-        receivers: options.receivers ?? (manifest.source?.receiver?.kind === "view" ? "map" : "vertex"),
+        receivers: options.receivers ?? receiversFrom(manifest),
         direct: options.direct ?? (manifest.transport === "indirect" ? "engine" : "asset"),
       },
     };
@@ -104,9 +101,9 @@ export class SrbfRelightingMap extends SceneAsset {
   }
 
   /**
-   * Bring uniforms, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   * Update the uniforms, and the lightmap where there is one, to the current lights. The renderer is needed for `source: "lightmap"`.
    *
-   * @throws SrbfError on lamps where the asset has no positions for them, or more layers and lamps than the GPU's uniforms hold.
+   * @throws SrbfError on point lights where the asset has no positions, or more layers and point lights than the GPU's uniforms hold.
    */
   update(renderer?: WebGLRenderer): void {
     const frame = this.frame();
@@ -148,8 +145,8 @@ export class SrbfRelightingMap extends SceneAsset {
     const needed = uniformVectors(this.asset, room);
     if (needed > most) {
       throw new SrbfError(
-        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} lamps; ` +
-          (this.pass ? "fit with fewer layers, or follow fewer lamps" : 'take source: "lightmap", or an eigen map'),
+        `expected at most ${most} vectors of uniforms on this GPU, found ${needed} for ${this.asset.layers.count} layers and ${room} point lights; ` +
+          (this.pass ? "fit with fewer layers, or follow fewer point lights" : 'take source: "lightmap", or an eigen map'),
       );
     }
   }

@@ -1,6 +1,7 @@
 /** What both renderers' classes share: an asset with lights in a three.js scene. */
 import { type Light as ThreeLight, Matrix4 } from "three";
 import type { Asset } from "../asset";
+import { SrbfError } from "../errors";
 import { type Light, moved } from "../lights";
 import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
@@ -9,7 +10,7 @@ import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 
 /** An asset, and the lights that shine on it: three's own by `follow`, in three's world, and those of the library in `lights`. */
 export class SceneAsset {
-  /** Lights of the library beside the followed ones, in the asset's world: Blender's, z up, meters. */
+  /** Lights of the library besides the followed ones, in the asset's world: Blender's, z up, meters. */
   readonly lights: Light[] = [];
   /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
   readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
@@ -17,7 +18,7 @@ export class SceneAsset {
 
   constructor(readonly asset: Asset) {}
 
-  /** Take three.js lights as they are at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
+  /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
   follow(...lights: ThreeLight[]): this {
     for (const light of lights) {
       checkKind(light);
@@ -31,14 +32,14 @@ export class SceneAsset {
     return this;
   }
 
-  /** Every light as the library has it, in the asset's world. */
+  /** All lights as lights of the library, in the asset's world. */
   currentLights(): Light[] {
     const worldFromScene = rowsOf(this.worldFromScene);
     const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
     return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
   }
 
-  /** The numbers that shaders take of the lights as they are now. */
+  /** The current lights' numbers for shaders. */
   protected frame(): FrameValues {
     return frameValues(this.asset, this.currentLights());
   }
@@ -47,4 +48,13 @@ export class SceneAsset {
   protected assetFromScene(): Matrix4 {
     return threeMatrix(multiplied(this.asset.assetFromWorld, rowsOf(this.worldFromScene)));
   }
+}
+
+/** Where materials take the light from. @throws SrbfError on `maps` for layers that must not be filtered. */
+export function sourceOf(asset: Asset, asked?: "maps" | "lightmap"): "maps" | "lightmap" {
+  const { filterable, name } = asset.method;
+  if (!filterable && asked === "maps") {
+    throw new SrbfError(`expected source "lightmap" for ${name}, found "maps": its layers must not be filtered between texels`);
+  }
+  return asked ?? (filterable ? "maps" : "lightmap");
 }

@@ -7,9 +7,9 @@ import type { Triple } from "../matrix";
 export type SceneLight = DirectionalLight | PointLight | SpotLight;
 
 /**
- * What a three.js light is to an asset, in three's own units: a directional light's color * intensity (lux) is the irradiance; a lamp's (candela) is
- * the irradiance at 1 m. `decay` 2 is inverse-square down to 0.1 m, where three stops it, 1 is linear down to 0.01 m. A spot is full inside
- * angle * (1 - penumbra) and ends at angle. An invisible light gives nothing.
+ * A three.js light as a light of the library, in three's own units: a directional light's color * intensity (lux) is the irradiance; a point or spot light's (candela)
+ * is the irradiance at 1 m. `decay` 2 is inverse-square down to 0.1 m, where three stops it, 1 is linear down to 0.01 m. A spot is full inside
+ * angle * (1 - penumbra) and ends at angle. Invisible lights are left out.
  *
  * @throws SrbfError on another kind of light, a decay that is neither 1 nor 2, or a `distance` that cuts the light off.
  */
@@ -27,7 +27,7 @@ export function lightOf(light: SceneLight): Light | undefined {
   return pointLight(triple(place.toArray()), fade);
 }
 
-/** @throws SrbfError where `light` is of a kind that an asset cannot answer. */
+/** @throws SrbfError where an asset cannot be relit by lights of this kind. */
 export function checkKind(light: ThreeLight): asserts light is SceneLight {
   const known = light as Partial<Record<"isDirectionalLight" | "isPointLight" | "isSpotLight", boolean>>;
   if (!(known.isDirectionalLight || known.isPointLight || known.isSpotLight)) {

@@ -21,43 +21,40 @@ import {
   UnsignedByteType,
 } from "three";
 import type { Asset } from "../asset";
-import type { FloatImage } from "../image";
+import type { ByteImage, FloatImage, HalfImage } from "../image";
 
 export type Filter = "linear" | "nearest";
 
 const TYPES = { half: HalfFloatType, float: FloatType, uint8: UnsignedByteType } as const;
 
-/** Everything that shaders read of one asset. `weights` of eigen maps changes with the lights. */
+/** The textures that the shaders of one asset read. `weights` changes with the lights. */
 export class SrbfTextures {
   readonly layers: DataArrayTexture | CompressedArrayTexture;
   readonly ambient: DataTexture;
-  /** The R table, or the atlas of light functions. */
-  readonly table: DataTexture;
+  /** Those that only the asset's method has, by the name of the shader's sampler. */
+  readonly tables: Readonly<Record<string, DataTexture>>;
+  /** The projected weights, where the method's shader reads them from a texture. */
   readonly weights?: DataTexture;
-  readonly clusters?: DataTexture;
   readonly positions?: DataTexture;
-  /** Of a view that does not fill its picture. */
+  /** Coverage of a view that does not fill its picture. */
   readonly alpha?: DataTexture;
 
-  /** Layers and ambient are filtered as asked, compressed layers by their mip levels too; clustered ones must be `nearest`. */
+  /** Layers and ambient are filtered as asked, compressed layers by their mip levels too; layers that are not filterable must be `nearest`. */
   constructor(asset: Asset, filter: Filter) {
-    const { basis } = asset;
     this.layers = layersTexture(asset, filter);
     this.ambient = ambientTexture(asset.ambient, filter);
     if (asset.position) this.positions = rgbaTexture(asset.position.data, asset.position.width, asset.position.height, FloatType);
     if (asset.alpha) this.alpha = alphaTexture(asset.alpha);
-    if (basis.kind === "gaussian") {
-      this.table = plain(basis.table, basis.table.length, 1, RedFormat, FloatType);
-      return;
+    const { textures, weights } = asset.tables;
+    this.tables = Object.fromEntries(Object.entries(textures).map(([name, image]) => [name, tableTexture(image)]));
+    if (weights.kind === "texture") {
+      this.weights = rgbaTexture(new Float32Array(4 * weights.width * weights.height), weights.width, weights.height, FloatType);
     }
-    const { wTable, scalars, clusters, clusterIndex } = basis;
-    this.table = rgbaTexture(wTable.data, wTable.width, wTable.height, HalfFloatType);
-    this.weights = rgbaTexture(new Float32Array(4 * (scalars + 1) * clusters), scalars + 1, clusters, FloatType);
-    if (clusterIndex) this.clusters = plain(clusterIndex.data, clusterIndex.width, clusterIndex.height, RedFormat, UnsignedByteType);
   }
 
   dispose(): void {
-    for (const texture of [this.layers, this.ambient, this.table, this.weights, this.clusters, this.positions, this.alpha]) texture?.dispose();
+    const own = [this.layers, this.ambient, this.weights, this.positions, this.alpha];
+    for (const texture of [...own, ...Object.values(this.tables)]) texture?.dispose();
   }
 }
 
@@ -81,14 +78,18 @@ function layersTexture(asset: Asset, filter: Filter): DataArrayTexture | Compres
 function ambientTexture(ambient: FloatImage | undefined, filter: Filter): DataTexture {
   if (!ambient) return rgbaTexture(new Float32Array(4), 1, 1, FloatType);
   if (filter === "nearest") return rgbaTexture(ambient.data, ambient.width, ambient.height, FloatType);
-  const halves = Uint16Array.from(ambient.data, (value) => DataUtils.toHalfFloat(value)); // few GPUs of phones filter single floats
+  const halves = Uint16Array.from(ambient.data, (value) => DataUtils.toHalfFloat(value)); // few mobile GPUs filter single floats
   return finished(rgbaTexture(halves, ambient.width, ambient.height, HalfFloatType), filter);
 }
 
-/** The share of every texel that is there, filtered: layers hold whole colors past its edge. */
+/** Coverage, filtered: layers hold straight colors past its edge. */
 export function alphaTexture({ data, width, height }: FloatImage): DataTexture {
   const halves = Uint16Array.from(data, (value) => DataUtils.toHalfFloat(value));
   return finished(plain(halves, width, height, RedFormat, HalfFloatType), "linear");
+}
+
+function tableTexture({ data, width, height, kind, channels }: FloatImage | HalfImage | ByteImage): DataTexture {
+  return plain(data, width, height, channels === 1 ? RedFormat : RGBAFormat, TYPES[kind]);
 }
 
 function rgbaTexture(data: ArrayBufferView, width: number, height: number, type: TextureDataType): DataTexture {

@@ -2,37 +2,28 @@
 import { type IUniform, Matrix4 } from "three";
 import type { Asset } from "../asset";
 import { pointLightRoom, packedPointLights } from "../point_light";
-import { type FrameValues, paddedCenters } from "../shader";
+import { constantVectors, type FrameValues } from "../shader";
 import type { SrbfTextures } from "./textures";
 
 export type Uniforms = Record<string, IUniform>;
 
-/** Uniforms that hold the asset; the lights are none yet. */
+/** Uniforms that hold the asset, without lights. */
 export function assetUniforms(asset: Asset, textures: SrbfTextures): Uniforms {
   const uniforms: Uniforms = {
     srbfLayers: { value: textures.layers },
     srbfAmbient: { value: textures.ambient },
-    srbfTable: { value: textures.table },
-    srbfScale: { value: asset.scale },
-    srbfBias: { value: asset.bias },
     srbfPointLights: { value: packedPointLights([], 1) },
     srbfPointLightCount: { value: 0 },
     srbfAssetFromScene: { value: new Matrix4() },
   };
   if (textures.alpha) uniforms.srbfAlpha = { value: textures.alpha };
   if (textures.positions) uniforms.srbfPositions = { value: textures.positions };
-  if (asset.basis.kind === "gaussian") {
-    uniforms.srbfWeights = { value: new Float32Array(4 * asset.layers.count) };
-    uniforms.srbfCenters = { value: paddedCenters(asset) };
-  } else {
-    uniforms.srbfWeights = { value: textures.weights };
-    uniforms.srbfTableSize = { value: asset.basis.tableSize };
-    if (textures.clusters) uniforms.srbfClusters = { value: textures.clusters };
-  }
+  uniforms.srbfWeights = { value: textures.weights ?? new Float32Array(4 * asset.tables.weights.width) };
+  for (const [name, value] of Object.entries({ ...constantVectors(asset), ...asset.tables.integers, ...textures.tables })) uniforms[name] = { value };
   return uniforms;
 }
 
-/** Write the numbers of a frame. */
+/** Write the numbers of one frame. */
 export function setFrame(uniforms: Uniforms, textures: SrbfTextures, frame: FrameValues): void {
   if (textures.weights) {
     (textures.weights.image.data as Float32Array).set(frame.weights);

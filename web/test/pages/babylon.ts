@@ -16,7 +16,7 @@ import { type Job, lightOfJson, picture, upsideDown } from "./job";
 
 let engine: Engine | undefined;
 
-/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+/** A quad of the receivers' plane under an orthographic camera, one pixel per texel. */
 export async function babylonMaterial(job: Job) {
   engine ??= new Engine(document.createElement("canvas"), false);
   const scene = new Scene(engine);

@@ -3,11 +3,11 @@ import { frameValues, loadAsset } from "../../src";
 import { projectedWeights } from "../../src/weights";
 import { type Job, lightOfJson } from "./job";
 
-/** Folded weights in double precision, and the lamps' uniforms. */
+/** Projected weights in double precision, and the point lights' uniforms. */
 export async function host(job: Job) {
   const asset = await loadAsset(job.asset, { verify: true });
   const lights = job.lights.map(lightOfJson);
-  return { weights: [...projectedWeights(asset, lights, asset.assetFromWorld)], pointLights: frameValues(asset, lights).pointLights };
+  return { weights: [...projectedWeights(asset, lights)], pointLights: frameValues(asset, lights).pointLights };
 }
 
 /** The layers as they were decoded, level after level. */

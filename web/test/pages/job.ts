@@ -1,4 +1,4 @@
-/** What the tests ask of a page, and what it answers. */
+/** Jobs that the tests send to a page, and their results. */
 import { directionalLight, environmentLight, type Light, pointLight, spotLight, type Triple } from "../../src";
 
 export interface Job {

@@ -20,7 +20,7 @@ async function shared(): Promise<pc.AppBase> {
   return app;
 }
 
-/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+/** A quad of the receivers' plane under an orthographic camera, one pixel per texel. */
 export async function playcanvasMaterial(job: Job) {
   const own = await shared();
   const device = own.graphicsDevice;

@@ -37,7 +37,7 @@ export async function nodesLightmap(job: Job) {
   return { pictures };
 }
 
-/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+/** A quad of the receivers' plane under an orthographic camera, one pixel per texel. */
 export async function nodesMaterial(job: Job) {
   const renderer = await rendererOf(job);
   const map = await SrbfRelightingNodes.load(job.asset, { source: job.source as "maps", filter: (job.filter as "nearest") ?? "nearest", target: "float" });

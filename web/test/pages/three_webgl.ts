@@ -30,7 +30,7 @@ export async function threeLightmap(job: Job) {
   return { pictures };
 }
 
-/** A quad of the receivers' plane under an orthographic camera, one pixel a texel. */
+/** A quad of the receivers' plane under an orthographic camera, one pixel per texel. */
 export async function threeMaterial(job: Job) {
   const map = await SrbfRelightingMap.load(job.asset, { source: job.source as "maps", filter: (job.filter as "nearest") ?? "nearest", target: "float" });
   const { width, height } = map.asset.manifest;

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 @tool
 extends EditorImportPlugin
-## Makes a SrbfAsset of NAME.srbf, whose one line is the path of an asset.json. A game that is built has no reader of EXR: all is read here.
+## Imports NAME.srbf, whose one line is the path of an asset.json, as a SrbfAsset. An exported game cannot read EXR, so everything is read here.
 
 
 func _get_importer_name() -> String:

@@ -2,17 +2,17 @@
 @tool
 class_name SrbfAsset
 extends Resource
-## An asset of srbf in one resource: layers, tables, geometry, and the weights that far lights give the layers.
+## An srbf asset as one resource: layers, tables, geometry, and the projected weights of distant lights.
 ##
-## Directions and positions here are in the asset's own frame, z up; SrbfRelight turns Godot's y-up world into it.
+## Directions and positions are in the asset's own frame, z up; SrbfRelight transforms Godot's y-up world into it.
 
 @export var method: String
 @export var quantity: String
-## Whether direct light is left out, to be added by the engine.
+## Whether the asset lacks direct light, which the engine adds.
 @export var is_indirect: bool
 ## Whether the texels are the pixels of a fixed camera.
 @export var is_view: bool
-## A view, or photographs, rather than a texture: its coverage is the alpha of what is shown.
+## A view, or photographs, rather than a texture: its coverage is the picture's alpha.
 @export var is_picture: bool
 @export_enum("sphere", "hemisphere") var domain := "sphere"
 @export var width: int
@@ -28,14 +28,14 @@ extends Resource
 @export var normal: Image
 @export var coverage: Image
 @export var ambient: Image
-## Unit centers of the Gaussians: of the maps themselves, or of the light functions.
+## Unit centers of the Gaussians of the maps, or of the light functions.
 @export var centers: PackedVector3Array
 ## Relighting maps: R at cos θ = -1 + 2 j / (n - 1).
 @export var r_table: Image
 @export var scalars: int
 @export var clusters: int
 @export var spreads: PackedFloat64Array
-## Scalar planes: red, green, blue of center b in function f at 3 (f B + b).
+## Coefficient maps: red, green, blue of center b in function f at 3 (f B + b).
 @export var light_coefficients: PackedFloat32Array
 @export var w_table: Image
 @export var w_table_size: int
@@ -45,11 +45,11 @@ var _textures := {}
 var _table := PackedFloat32Array()  # red, green, blue of w_table
 
 
-## The asset that an asset.json describes; null, and an error in the log, where something is missing.
+## Read the asset that an asset.json describes; null, with an error in the log, where something is missing.
 static func read(manifest_path: String) -> SrbfAsset:
 	var manifest = JSON.parse_string(FileAccess.get_file_as_string(manifest_path))
 	if not manifest is Dictionary or manifest.get("format") != "srbf-asset" or manifest.get("version") != 1:
-		push_error("expected an asset of srbf, version 1, at %s, found none" % manifest_path)
+		push_error("expected an srbf asset, version 1, at %s, found none" % manifest_path)
 		return null
 	var folder := manifest_path.get_base_dir()
 	var asset := SrbfAsset.new()
@@ -57,10 +57,9 @@ static func read(manifest_path: String) -> SrbfAsset:
 	asset.quantity = manifest.quantity
 	asset.domain = manifest.domain
 	asset.is_indirect = manifest.get("transport") == "indirect"
-	var source: Dictionary = manifest.get("source", {})
-	var receiver: Dictionary = source.get("receiver", source.get("receivers", [{}])[0])
-	asset.is_view = receiver.get("kind") == "view"
-	asset.is_picture = receiver.get("kind", "view") == "view"
+	var receiver := _receiver_kind(manifest)
+	asset.is_view = receiver == "view"
+	asset.is_picture = receiver in ["view", ""]
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
@@ -101,7 +100,7 @@ static func read(manifest_path: String) -> SrbfAsset:
 	return asset
 
 
-## All stored layers, one texture.
+## All stored layers as one texture.
 func layers() -> Texture2DArray:
 	if not _textures.has("layers"):
 		var texture := Texture2DArray.new()
@@ -110,7 +109,7 @@ func layers() -> Texture2DArray:
 	return _textures.layers
 
 
-## One of the images as a texture; null where the asset has none.
+## One of the images as a texture; null where the asset lacks it.
 func texture(name: StringName) -> ImageTexture:
 	var image: Image = get(name)
 	if image == null:
@@ -129,15 +128,15 @@ func defines() -> String:
 	return kind + "#define %s\n#define SRBF_COMPONENTS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
-## One weight a map, or a light function of every cluster, for all far lights together: the sum of color w(direction), w = 1.
-## `by_table`: scalar planes by the table that lamps use, off by w_table.error of asset.json, in a fraction of the time.
+## One weight per map, or per light function of every cluster, for all distant lights together: the sum of color w(direction), w = 1.
+## `by_table`: coefficient maps by the table of point lights, with the error w_table.error of asset.json, in a fraction of the time.
 func weights(directions: PackedVector3Array, colors: PackedVector3Array, by_table := false) -> PackedVector4Array:
 	if method == "relighting-map":
 		return _map_weights(directions, colors)
-	return _table_weights(directions, colors) if by_table else _plane_weights(directions, colors)
+	return _table_weights(directions, colors) if by_table else _function_weights(directions, colors)
 
 
-## `weights` of a panorama, Godot's, in linear radiance; `rotation` turns Godot's world into the asset's frame.
+## `weights` of a panorama as Godot has it, in linear radiance; `rotation` turns Godot's world into the asset's frame.
 func sky_weights(sky: Image, rotation: Basis) -> PackedVector4Array:
 	var upright := rotation.y.is_equal_approx(Vector3(0.0, 0.0, 1.0))
 	var directions := PackedVector3Array()
@@ -175,7 +174,7 @@ func _map_weights(directions: PackedVector3Array, colors: PackedVector3Array) ->
 	return sums
 
 
-func _plane_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
+func _function_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
 	var gaussians := {}  # by spread, of which there are few
 	for spread in spreads:
 		if not gaussians.has(spread):
@@ -220,12 +219,12 @@ func _table_weights(directions: PackedVector3Array, colors: PackedVector3Array) 
 	return padded
 
 
-## Where a texel is, in Godot's frame, y up.
+## Position of a texel in Godot's frame, y up.
 func point(texel: Vector2i) -> Vector3:
-	return _to_godot(position.get_pixel(texel.x, texel.y))
+	return to_godot(position.get_pixel(texel.x, texel.y))
 
 
-## Where nine in ten of the covered texels are, by each axis, in Godot's frame: what a view sees far away is no part of it.
+## Bounds of nine tenths of the covered texels along each axis, in Godot's frame, without what a view sees far away.
 func bounds() -> AABB:
 	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
 	for row in height:
@@ -242,74 +241,6 @@ func bounds() -> AABB:
 		low[axis] = sides[axis][count / 20] if count else 0.0
 		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
 	return AABB(low, high - low)
-
-
-## A mesh through the position map's covered texels, of at most some `most` vertices: second UV layer, normals, triangles; Godot's frame.
-## What is longer than `longest` times the middle length of an edge spans two charts, and is left out.
-func texel_mesh(longest := 4.0, most := 65536) -> ArrayMesh:
-	if position == null:
-		push_error("expected a position map in the asset, found none: it has no mesh")
-		return null
-	var step := maxi(1, ceili(sqrt(float(width) * height / most)))
-	var columns := _steps(width, step)
-	var rows := _steps(height, step)
-	var across := columns.size()
-	var points := PackedVector3Array()
-	var normals := PackedVector3Array()
-	var places := PackedVector2Array()
-	var covered := PackedByteArray()
-	for row in rows:
-		for column in columns:
-			points.append(point(Vector2i(column, row)))
-			normals.append(_to_godot(normal.get_pixel(column, row)) if normal else Vector3.UP)
-			places.append(Vector2((column + 0.5) / width, (row + 0.5) / height))
-			covered.append(1 if not coverage or coverage.get_pixel(column, row).r >= 0.5 else 0)
-	var lengths := PackedFloat32Array()
-	for corner in points.size() - 1:
-		if covered[corner] and covered[corner + 1] and (corner + 1) % across:
-			lengths.append(points[corner].distance_to(points[corner + 1]))
-	lengths.sort()
-	var limit := longest * lengths[lengths.size() / 2] if lengths else INF
-	var indices := PackedInt32Array()
-	for row in rows.size() - 1:
-		for column in across - 1:
-			var corner := row * across + column
-			for triangle in [[corner, corner + 1, corner + across], [corner + 1, corner + across + 1, corner + across]]:
-				if _belongs(triangle, points, covered, limit):
-					if _faces_away(triangle, points, normals):
-						triangle.reverse()
-					indices.append_array(PackedInt32Array(triangle))
-	var arrays := []
-	arrays.resize(Mesh.ARRAY_MAX)
-	arrays[Mesh.ARRAY_VERTEX] = points
-	arrays[Mesh.ARRAY_NORMAL] = normals
-	arrays[Mesh.ARRAY_TEX_UV2] = places
-	arrays[Mesh.ARRAY_INDEX] = indices
-	var mesh := ArrayMesh.new()
-	if indices:
-		mesh.add_surface_from_arrays(Mesh.PRIMITIVE_TRIANGLES, arrays)
-	return mesh
-
-
-## Every so many texels of a side, the last one always.
-static func _steps(size: int, step: int) -> PackedInt32Array:
-	var chosen := PackedInt32Array(range(0, size, step))
-	if chosen[-1] != size - 1:
-		chosen.append(size - 1)
-	return chosen
-
-
-static func _belongs(triangle: Array, points: PackedVector3Array, covered: PackedByteArray, limit: float) -> bool:
-	for n in 3:
-		if not covered[triangle[n]] or points[triangle[n]].distance_to(points[triangle[(n + 1) % 3]]) > limit:
-			return false
-	return true
-
-
-## Godot's front faces turn clockwise.
-static func _faces_away(triangle: Array, points: PackedVector3Array, normals: PackedVector3Array) -> bool:
-	var across := (points[triangle[1]] - points[triangle[0]]).cross(points[triangle[2]] - points[triangle[0]])
-	return across.dot(normals[triangle[0]]) > 0.0
 
 
 func _entry(texel: int) -> Vector3:
@@ -333,6 +264,16 @@ func _gaussians(spread: float, directions: PackedVector3Array, colors: PackedVec
 			sum += colors[n] * exp(-0.5 * angle * angle)
 		sums.append_array([sum.x, sum.y, sum.z])
 	return sums
+
+
+## What is lit: its kind, or "" where the asset does not say. Assets of older versions say so under `source`.
+static func _receiver_kind(manifest: Dictionary) -> String:
+	for place in [manifest, manifest.get("source", {})]:
+		if place.has("receiver"):
+			return place.receiver.get("kind", "")
+		if place.get("receivers", []):
+			return place.receivers[0].get("kind", "")
+	return ""
 
 
 static func _image(folder: String, file: String) -> Image:
@@ -363,5 +304,6 @@ static func _vector4(numbers: Array) -> Vector4:
 	return Vector4(numbers[0], numbers[1], numbers[2], numbers[3] if numbers.size() > 3 else 0.0)
 
 
-static func _to_godot(color: Color) -> Vector3:
+## A vector of the asset's frame in Godot's, y up.
+static func to_godot(color: Color) -> Vector3:
 	return Vector3(color.r, color.b, -color.g)

@@ -2,15 +2,15 @@
 @tool
 class_name SrbfDds
 extends RefCounted
-## The layers of a texture array in a DDS file, compressed and with their mip levels as they are.
+## Reads the layers of a texture array from a DDS file, still compressed, with their mip levels.
 
 const HEADER := 148  # bytes, with the DX10 extension
 const DX10 := 0x30315844
 const FORMATS := {98: Image.FORMAT_BPTC_RGBA, 71: Image.FORMAT_DXT1, 28: Image.FORMAT_RGBA8, 10: Image.FORMAT_RGBAH}  # by DXGI's number
-const SMALLEST := {98: [4, 16], 71: [4, 8], 28: [1, 4], 10: [1, 8]}  # texels a side and bytes of a block
+const SMALLEST := {98: [4, 16], 71: [4, 8], 28: [1, 4], 10: [1, 8]}  # texels per side and bytes of a block
 
 
-## Empty, and an error in the log, where the file is not such an array.
+## Empty, with an error in the log, where the file is not such an array.
 static func read(path: String) -> Array[Image]:
 	var bytes := FileAccess.get_file_as_bytes(path)
 	if bytes.size() < HEADER or bytes.decode_u32(84) != DX10 or not FORMATS.has(bytes.decode_u32(128)):
@@ -29,7 +29,7 @@ static func read(path: String) -> Array[Image]:
 		var full := size
 		if levels > 1:
 			full = Image.create_empty(width, height, true, FORMATS[number]).get_data().size()
-		if data.size() < full:  # Godot asks for all levels down to one texel: what the file leaves out is never read there
+		if data.size() < full:  # Godot requires all levels down to one texel; those that the file lacks are never read
 			data.resize(full)
 		layers.append(Image.create_from_data(width, height, levels > 1, FORMATS[number], data))
 	return layers

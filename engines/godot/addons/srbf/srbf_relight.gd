@@ -3,33 +3,33 @@ class_name SrbfRelight
 extends Node3D
 ## Lights its surfaces by an asset, and follows Godot's lights.
 ##
-## The node stands where the asset's origin is, turned and scaled alike. A light of energy 1 gives a white diffuse surface what Godot's
-## own light gives it: π times its linear color as irradiance, from an omni or spot light at 1 m.
+## The node marks the asset's origin, rotation and scale. A light of energy 1 lights a white diffuse surface as Godot's
+## own light does: π times its linear color as irradiance, at 1 m from an omni or spot light.
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
-const RADIUS := 1e-4  # meters: no receiver is nearer to a lamp, as in Godot
+const RADIUS := 1e-4  # meters: least distance of a receiver from a light, as in Godot
 const SKY_WIDTH := 32
-const NO_CONE := Vector2(3.0, 4.0)  # past every 1 - cos: a point light
+const NO_CONE := Vector2(3.0, 4.0)  # above every 1 - cos: a point light
 
 @export var asset: SrbfAsset
-## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children where none are named.
+## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children by default.
 @export var surfaces: Array[Node]
-## Those to follow; all of the scene where none are named.
+## Lights to follow; all of the scene by default.
 @export var lights: Array[Light3D]
-## A panorama to light by, as Godot's PanoramaSky takes it; it is averaged down to 32 texels of width. Bytes are sRGB.
+## An environment map, as in Godot's PanoramaSkyMaterial; it is averaged down to 32 texels of width. Bytes are sRGB.
 @export var sky: Texture2D
 @export var sky_energy := 1.0
-## How many omni and spot lights a shader has room for.
+## Most omni and spot lights of a shader.
 @export_range(1, 64) var most_point_lights := 4
-## Eigen maps: weigh directional lights by the table, as omni and spot lights are, where they move every frame.
+## Eigen maps: read directional lights' weights from the table of omni and spot lights; faster, for lights that move every frame.
 @export var suns_by_table := false
 ## For canvas items, in stops.
 @export var exposure := 0.0
 
 var _materials: Array[ShaderMaterial] = []
 var _weights: ImageTexture
-var _sky_weights: PackedVector4Array
-var _sky_of := []
+var _environment_weights: PackedVector4Array
+var _environment_of := []
 var _last := []
 
 
@@ -38,7 +38,7 @@ func _ready() -> void:
 		apply()
 
 
-## Give the surfaces their materials: again after another asset or other surfaces were set.
+## Give the surfaces their materials; call it again after a change of asset or surfaces.
 func apply() -> void:
 	_materials.clear()
 	_last = []
@@ -55,7 +55,7 @@ func apply() -> void:
 			surface.material_override = made.spatial
 
 
-## The materials in use: the albedo of meshes is theirs.
+## The materials in use, which hold the albedo of meshes.
 func materials() -> Array[ShaderMaterial]:
 	return _materials
 
@@ -77,7 +77,7 @@ func _process(_delta: float) -> void:
 	if now == _last:
 		return
 	_last = now
-	_set_far(found, asset_from_godot)
+	_set_distant_lights(found, asset_from_godot)
 	_set_point_lights(found, asset_from_godot)
 	for material in _materials:
 		material.set_shader_parameter("srbf_asset_from_world", asset_from_godot)
@@ -85,7 +85,7 @@ func _process(_delta: float) -> void:
 		material.set_shader_parameter("srbf_encode", not get_viewport().use_hdr_2d)
 
 
-func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
+func _set_distant_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 	var directions := PackedVector3Array()
 	var colors := PackedVector3Array()
 	for light in found:
@@ -94,9 +94,9 @@ func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 			colors.append(irradiance(light))
 	var sums := asset.weights(directions, colors, suns_by_table)
 	if sky:
-		_follow_sky(asset_from_godot)
+		_update_environment(asset_from_godot)
 		for i in sums.size():
-			sums[i] += _sky_weights[i] * sky_energy
+			sums[i] += _environment_weights[i] * sky_energy
 	if asset.method == "relighting-map":
 		_give("srbf_weights", sums)
 		return
@@ -108,12 +108,12 @@ func _set_far(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 		_weights.update(image)
 
 
-## The sky's weights cost more than all others, and change with the sky alone.
-func _follow_sky(asset_from_godot: Transform3D) -> void:
+## An environment map's weights are the slowest, and change only with it.
+func _update_environment(asset_from_godot: Transform3D) -> void:
 	var now := [asset, sky, asset_from_godot.basis]
-	if now == _sky_of:
+	if now == _environment_of:
 		return
-	_sky_of = now
+	_environment_of = now
 	var image := sky.get_image().duplicate() as Image
 	if image.is_compressed():
 		image.decompress()
@@ -125,12 +125,12 @@ func _follow_sky(asset_from_godot: Transform3D) -> void:
 				image.set_pixel(column, row, image.get_pixel(column, row).srgb_to_linear())
 	while image.get_width() > SKY_WIDTH and image.get_height() > 1:
 		image.shrink_x2()
-	_sky_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
+	_environment_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
 
 
 func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 	var point_lights := PackedVector4Array()
-	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # of the asset's meters a meter of Godot's
+	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # the asset's meters per meter of Godot's
 	for light in found:
 		if light is DirectionalLight3D or not asset.position:
 			continue
@@ -151,7 +151,7 @@ func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> 
 	_give("srbf_point_lights", point_lights)
 
 
-## What a light gives a surface that faces it, of an omni or spot light at 1 m: linear, in Godot's unit times π.
+## A light's irradiance on a surface that faces it, at 1 m from an omni or spot light: linear, Godot's unit times π.
 static func irradiance(light: Light3D) -> Vector3:
 	var color := light.light_color.srgb_to_linear()
 	var sign := -1.0 if light.light_negative else 1.0

@@ -6,8 +6,8 @@ using UnityEngine;
 namespace Srbf
 {
     /// <summary>
-    /// Imports an exported asset by its .srbf file, which stands beside asset.json and the images: they are read here and not by Unity's texture
-    /// importer, so that nothing is resized, compressed, turned over or taken for sRGB.
+    /// Imports an exported asset by its .srbf file, which lies beside asset.json and the images. It reads the images itself instead of Unity's
+    /// texture importer, so that nothing is resized, compressed, flipped or treated as sRGB.
     /// </summary>
     [ScriptedImporter(1, "srbf")]
     public sealed class SrbfImporter : ScriptedImporter
@@ -53,7 +53,7 @@ namespace Srbf
             int levels = blocks == null ? 1 : blocks.Levels;
             var layers = new Texture2DArray(manifest.Width, manifest.Height, manifest.LayerFiles.Length, FormatOf(blocks), levels, true)
             {
-                // A scalar means something else in the next cluster: its planes are never mixed by the sampler.
+                // A component has another meaning in another cluster: the sampler must not mix its layers.
                 filterMode = manifest.ClusterFile != null ? FilterMode.Point : levels > 1 ? FilterMode.Trilinear : FilterMode.Bilinear,
                 wrapMode = TextureWrapMode.Clamp,
             };
@@ -62,7 +62,7 @@ namespace Srbf
                 for (int level = 0; blocks != null && level < levels; level++) layers.SetPixelData(blocks.Data(i, level), level, i);
                 if (blocks == null) layers.SetPixelData(Halves(SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])).Rgba()), 0, i);
             }
-            layers.Apply(false);  // kept readable: the imported asset is written from the host's copy
+            layers.Apply(false);  // readable, since the imported asset is written from the host's copy
             return layers;
         }
 
@@ -77,7 +77,7 @@ namespace Srbf
             }
         }
 
-        /// <summary>Rows go up as they are: the image's top becomes v = 0, and the shader turns v over.</summary>
+        /// <summary>Rows are uploaded in order: the image's top becomes v = 0, and the shader flips v.</summary>
         static Texture2D Texture(SrbfImage image, TextureFormat format, FilterMode filter)
         {
             var texture = new Texture2D(image.Width, image.Height, format, false, true) { filterMode = filter, wrapMode = TextureWrapMode.Clamp };

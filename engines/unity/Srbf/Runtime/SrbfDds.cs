@@ -12,7 +12,7 @@ namespace Srbf
         public int Width, Height, Layers, Levels, Format;
         byte[] file;
 
-        /// <summary>The array in a file's bytes; FormatException where they are another kind, or cut short.</summary>
+        /// <summary>The array in a file's bytes; FormatException on another kind of file, or one cut short.</summary>
         public static SrbfDds Read(byte[] file, string path)
         {
             if (file.Length < Header || file[0] != 'D' || file[1] != 'D' || file[2] != 'S' || BitConverter.ToInt32(file, 84) != 0x30315844)
@@ -33,7 +33,7 @@ namespace Srbf
             return found;
         }
 
-        /// <summary>A layer's level as it lies in GPU memory, row 0 the image's top.</summary>
+        /// <summary>A layer's level in GPU layout, row 0 the image's top.</summary>
         public byte[] Data(int layer, int level)
         {
             var data = new byte[Bytes(level)];

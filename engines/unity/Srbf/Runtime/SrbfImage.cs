@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// EXR and PNG files as numbers, row 0 at the top, without Unity's texture importer: it would turn rows over, compress and resize.
+// EXR and PNG files as numbers, row 0 at the top, without Unity's texture importer, which would flip, compress and resize them.
 using System;
 using System.Collections.Generic;
 using System.IO;
@@ -12,16 +12,16 @@ namespace Srbf
     {
         public int Width, Height, Channels;
         public bool Half;       // all channels were half floats
-        public float[] Values;  // rows from the top, Channels a texel: R, RGB or RGBA
+        public float[] Values;  // rows from the top, Channels per texel: R, RGB or RGBA
 
-        /// <summary>An EXR or PNG file by its name's end. FormatException where it is another kind than the exporter writes.</summary>
+        /// <summary>An EXR or PNG file, by its extension. FormatException on kinds that the exporter does not write.</summary>
         public static SrbfImage Read(string path)
         {
             byte[] file = File.ReadAllBytes(path);
             return path.EndsWith(".png", StringComparison.OrdinalIgnoreCase) ? Png(file, path) : Exr(file, path);
         }
 
-        /// <summary>Four channels a texel, the missing ones 0, alpha 1: what a GPU texture holds.</summary>
+        /// <summary>Four channels per texel for a GPU texture: missing ones are 0, alpha 1.</summary>
         public float[] Rgba()
         {
             var rgba = new float[Width * Height * 4];
@@ -87,7 +87,7 @@ namespace Srbf
             return image;
         }
 
-        /// <summary>Where a channel of the file, which are in alphabetical order, stands in a texel.</summary>
+        /// <summary>Index in a texel of a channel of the file; the file's are in alphabetical order.</summary>
         static int Channel(List<string> names, int c)
         {
             int wanted = Array.IndexOf(new[] { "R", "G", "B", "A" }, names[c]);
@@ -99,7 +99,7 @@ namespace Srbf
             if (file.Length < 33 || file[1] != 'P' || file[2] != 'N' || file[3] != 'G') throw new FormatException("expected a PNG file at " + path);
             int width = BigEndian(file, 16), height = BigEndian(file, 20);
             int channels = Array.IndexOf(new[] { 0, 4, 2, 6 }, (int)file[25]) + 1;
-            if (file[24] != 8 || channels == 0 || file[28] != 0) throw new FormatException("expected 8 bits a channel, not interlaced, without a palette in " + path);
+            if (file[24] != 8 || channels == 0 || file[28] != 0) throw new FormatException("expected 8 bits per channel, not interlaced, without a palette in " + path);
             var packed = new MemoryStream();
             for (int at = 8; at + 8 < file.Length; at += 12 + BigEndian(file, at))
                 if (Encoding.ASCII.GetString(file, at + 4, 4) == "IDAT") packed.Write(file, at + 8, BigEndian(file, at));
@@ -142,7 +142,7 @@ namespace Srbf
             return data;
         }
 
-        /// <summary>What EXR's ZIP does before it compresses, undone: differences, and the two halves interleaved.</summary>
+        /// <summary>Undo what EXR's ZIP does before compression: differences, and two interleaved halves.</summary>
         static byte[] Unpredicted(byte[] data)
         {
             for (int i = 1; i < data.Length; i++) data[i] = (byte)(data[i - 1] + data[i] - 128);
@@ -168,7 +168,7 @@ namespace Srbf
             return (float)((half & 0x8000) == 0 ? size : -size);
         }
 
-        /// <summary>The nearest half float, ties to even; past its range infinite.</summary>
+        /// <summary>The nearest half float, ties to even; infinite beyond its range.</summary>
         public static ushort ToHalf(float value)
         {
             int bits = BitConverter.ToInt32(BitConverter.GetBytes(value), 0);

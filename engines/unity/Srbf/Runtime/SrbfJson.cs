@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A small JSON reader: JsonUtility knows no nested arrays, and asset.json has them. Objects become dictionaries, numbers doubles.
+// A small JSON reader, since JsonUtility reads no nested arrays and asset.json has them. Objects become dictionaries, numbers doubles.
 using System;
 using System.Collections.Generic;
 using System.Globalization;

@@ -10,12 +10,12 @@ namespace Srbf
         public string Method, Quantity, Transport;
         public int Width, Height, Scalars, Clusters, TableSize;
         public string[] LayerFiles;
-        public double[] Centers;           // of the maps' Gaussians, or of the light functions': 3 a center
-        public double[] Spreads;           // one for relighting maps, one a light function for planes
+        public double[] Centers;           // of the maps' Gaussians, or of the light functions': 3 per center
+        public double[] Spreads;           // one for relighting maps, one per light function for coefficient maps
         public double[] AssetFromWorld;    // row-major 4 x 4
         public string TableFile, CoefficientsFile, ClusterFile, AmbientFile;
 
-        /// <summary>Read asset.json's text; FormatException that says what was expected and found.</summary>
+        /// <summary>Read asset.json's text; FormatException with what was expected and found.</summary>
         public static SrbfManifest Read(string text)
         {
             var json = SrbfJson.Parse(text) as Dictionary<string, object>;
@@ -53,7 +53,7 @@ namespace Srbf
             return manifest;
         }
 
-        /// <summary>All numbers of a list, lists in it laid out one after another.</summary>
+        /// <summary>All numbers of a list, nested lists flattened.</summary>
         public static double[] Numbers(object value)
         {
             var found = new List<double>();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What relighting computes on the host, without a line of Unity in it: axes, light functions, weights. Doubles; meters, radians.
+// Relighting on the host, without Unity types: axes, light functions, weights. Doubles; meters, radians.
 using System;
 using System.Collections.Generic;
 
@@ -30,7 +30,7 @@ namespace Srbf
     public static class SrbfMath
     {
         /// <summary>
-        /// The asset's frame (Blender's: right-handed, z up) from Unity's (left-handed, y up), as FBX and glTF files of Blender are imported:
+        /// The asset's frame (Blender's: right-handed, z up) from Unity's (left-handed, y up), as Blender's FBX and glTF files are imported:
         /// Unity's x is Blender's -x, its y Blender's z, its z Blender's -y.
         /// </summary>
         public static Vector AssetFromUnity(Vector v) { return new Vector(-v.X, -v.Z, v.Y); }
@@ -40,7 +40,7 @@ namespace Srbf
         /// <summary>Row-major 4 x 4 of AssetFromUnity, to be multiplied from the left on Unity's matrices.</summary>
         public static readonly double[] Axes = { -1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1 };
 
-        /// <summary>R at a cosine from the asset's table: entry j at -1 + 2 j / (n - 1), mixed as the shader does.</summary>
+        /// <summary>R at a cosine from the asset's table: entry j at -1 + 2 j / (n - 1), interpolated as in the shader.</summary>
         public static double Weight(float[] table, double cosine)
         {
             double place = (Math.Min(1, Math.Max(-1, cosine)) + 1) * 0.5 * (table.Length - 1);
@@ -48,7 +48,7 @@ namespace Srbf
             return table[j] + (table[j + 1] - table[j]) * (place - j);
         }
 
-        /// <summary>The R table from its end, and what the next entry has more, 0 in the last: what the shader reads by one fetch.</summary>
+        /// <summary>The R table from its end, with the difference to the next entry, 0 in the last: the shader reads both in one fetch.</summary>
         public static float[] Pairs(float[] table)
         {
             var pairs = new float[2 * table.Length];
@@ -61,7 +61,7 @@ namespace Srbf
             return pairs;
         }
 
-        /// <summary>The sum over far lights of color times R_i, RGBA a map with A = 1: what _SrbfWeights holds.</summary>
+        /// <summary>The sum over distant lights of color times R_i, RGBA per map with A = 1: the content of _SrbfWeights.</summary>
         public static float[] MapWeights(double[] centers, float[] table, IList<DistantLight> lights)
         {
             int count = centers.Length / 3;
@@ -76,7 +76,7 @@ namespace Srbf
         }
 
         /// <summary>
-        /// The sum over far lights of color times w_f(L), RGBA a function with A = 1: a row of (scalars + 1) texels a cluster.
+        /// The sum over distant lights of color times w_f(L), RGBA per function with A = 1: a row of (components + 1) texels per cluster.
         /// w_f(L) is the sum over b of coefficients[f, b] exp(-acos(L.Q_b)^2 / (2 spread_f^2)).
         /// </summary>
         public static float[] PlaneWeights(double[] centers, double[] spreads, float[] coefficients, IList<DistantLight> lights)
@@ -118,8 +118,8 @@ namespace Srbf
         public static double Versine(double halfAngle) { return 2 * Math.Sin(halfAngle / 2) * Math.Sin(halfAngle / 2); }
 
         /// <summary>
-        /// Sixteen floats of a lamp in the asset's frame, as srbfUnpackPointLight takes them: its color becomes the irradiance at 1 m. Angles are
-        /// Unity's, whole and in degrees; below 0 for a point light.
+        /// Sixteen floats of a point light in the asset's frame, as srbfUnpackPointLight takes them: its color becomes the irradiance at 1 m.
+        /// Angles are Unity's full cone angles in degrees; below 0 for a light without a cone.
         /// </summary>
         public static float[] PackedPointLight(Vector place, Vector color, Vector axis, double a0, double radius, bool linear, double innerDegrees, double outerDegrees)
         {

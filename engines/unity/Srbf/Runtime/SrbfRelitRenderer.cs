@@ -5,8 +5,8 @@ using UnityEngine;
 namespace Srbf
 {
     /// <summary>
-    /// Follows Unity's lights and tells a renderer's material the weights of the frame. Directional lights cost one weight a map together;
-    /// the first eight point and spot lights a weight a map and pixel each. Areas, cookies, ranges and skies are not looked at.
+    /// Follows Unity's lights and sets the frame's weights in a renderer's material. All directional lights together cost one weight per map;
+    /// each of the first eight point and spot lights costs one weight per map and pixel. Area lights, cookies, ranges and skies are ignored.
     /// </summary>
     [ExecuteAlways]
     [RequireComponent(typeof(Renderer))]
@@ -15,15 +15,15 @@ namespace Srbf
         public const int MostPointLights = 8;  // SRBF_POINT_LIGHTS of SrbfAsset.hlsl
 
         public SrbfAsset asset;
-        [Tooltip("The imported scene's root, whose space is Blender's world turned to Unity's axes; none: Unity's world.")]
+        [Tooltip("The imported scene's root, whose space is Blender's world in Unity's axes; none: Unity's world.")]
         public Transform root;
         [Tooltip("The lights to follow; none: all that are enabled in the scene.")]
         public Light[] lights;
-        [Tooltip("Distance in meters at which a lamp gives its color.")]
+        [Tooltip("Distance in meters at which a point light's irradiance equals its color.")]
         public float falloffDistance = 1;
         [Tooltip("a0/|L| instead of its square.")]
         public bool linearFalloff;
-        [Tooltip("Metres; a receiver counts as no nearer to a lamp than this.")]
+        [Tooltip("Meters: least distance of a receiver from a point light.")]
         public float pointLightRadius = 0.05f;
 
         readonly List<DistantLight> far = new List<DistantLight>();

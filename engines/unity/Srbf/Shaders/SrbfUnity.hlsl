@@ -19,16 +19,16 @@ float4 _SrbfWeights[SRBF_K];
 Texture2D _SrbfWeightRows;
 #endif
 float4x4 _SrbfAssetFromWorld;
-float4 _SrbfPointLights[4 * SRBF_POINT_LIGHTS];  // four a lamp, as srbfUnpackPointLight takes them, in the asset's frame
+float4 _SrbfPointLights[4 * SRBF_POINT_LIGHTS];  // four per light, as srbfUnpackPointLight takes them, in the asset's frame
 float _SrbfPointLightCount;
 
 // The light that leaves a white surface, in Unity's units: a white Lambert surface that faces a light of intensity 1 gives 1.
-// uv: the lightmap's, v upwards as Unity has it; worldPosition: absolute, meters. In fragment shaders: it takes derivatives.
+// uv: the lightmap's, v upwards as in Unity; worldPosition: absolute, meters. Only in fragment shaders: it takes derivatives.
 float3 SrbfRelitFrom(Texture2DArray layers, SamplerState layersSampler, float2 uv, float3 worldPosition)
 {
     float2 place = float2(uv.x, 1.0 - uv.y);
     float3 receiver = mul(_SrbfAssetFromWorld, float4(worldPosition, 1.0)).xyz;
-#ifndef SRBF_CLUSTERED  // a cluster's scalars mean nothing in a coarser level
+#ifndef SRBF_CLUSTERED  // clusters have no mip levels
     float2 size = float2(srbfTextureSize(layers).xy);
     float level = srbfMipLevel(ddx(place) * size, ddy(place) * size);
 #endif
@@ -61,7 +61,7 @@ void SrbfRelight_half(float2 UV, float3 WorldPosition, out float3 Relit)
 }
 
 #ifdef UNITY_TEXTURE_INCLUDED  // where UnityTexture2DArray is known: in Shader Graph, not in the built-in pipeline
-// The same with a texture array and a sampler of the graph's own, by another reference than _SrbfLayers: name SrbfRelightFrom.
+// The same with the graph's own texture array and sampler, under another reference than _SrbfLayers: name SrbfRelightFrom.
 void SrbfRelightFrom_float(UnityTexture2DArray Layers, UnitySamplerState LayersSampler, float2 UV, float3 WorldPosition, out float3 Relit)
 {
     Relit = SrbfRelitFrom(Layers.tex, LayersSampler.samplerstate, UV, WorldPosition);

@@ -1,19 +1,20 @@
 /** An asset's numbers as nodes: textures, constant arrays, and the arrays that change with the lights. */
 import { Matrix4, Vector4 } from "three";
-import { int, ivec2, texture, textureLoad, uniform, uniformArray } from "three/tsl";
+import * as tsl from "three/tsl";
 import type { Asset } from "../../asset";
 import { SrbfError } from "../../errors";
 import { packedPointLights } from "../../point_light";
-import { type FrameValues, paddedCenters } from "../../shader";
+import type { NodeKit } from "../../methods/node_kit";
+import { constantVectors, type FrameValues } from "../../shader";
 import type { Filter, SrbfTextures } from "../textures";
-import { POINT_LIGHT_ROWS, type N, texelAt } from "./nodes";
+import * as pack from "./nodes";
+import { type N, POINT_LIGHT_ROWS, texelAt } from "./nodes";
+
+const { If, int, ivec2, Loop, texture, textureLoad, uniform, uniformArray } = tsl;
 
 export class NodeInputs {
-  readonly scale: N;
-  readonly bias: N;
-  readonly centers?: N;
-  /** vec4 a map, of relighting maps. */
-  readonly weights?: N;
+  /** Uniform arrays of vec4, by name. */
+  private readonly arrays: Record<string, N>;
   readonly pointLights: N;
   readonly pointLightCount: N = uniform(0, "int");
   readonly assetFromScene: N = uniform(new Matrix4());
@@ -26,13 +27,10 @@ export class NodeInputs {
     private readonly filter: Filter,
     private readonly maxPointLights: number,
   ) {
-    this.scale = uniformArray(vectors(asset.scale), "vec4");
-    this.bias = uniformArray(vectors(asset.bias), "vec4");
-    this.weightVectors = asset.basis.kind === "gaussian" ? vectors(new Float32Array(4 * asset.layers.count)) : [];
-    if (asset.basis.kind === "gaussian") {
-      this.weights = uniformArray(this.weightVectors, "vec4");
-      this.centers = uniformArray(vectors(paddedCenters(asset)), "vec4");
-    }
+    this.arrays = Object.fromEntries(Object.entries(constantVectors(asset)).map(([name, numbers]) => [name, uniformArray(vectors(numbers), "vec4")]));
+    const { kind, width } = asset.tables.weights;
+    this.weightVectors = kind === "uniform" ? vectors(new Float32Array(4 * width)) : [];
+    if (kind === "uniform") this.arrays.srbfWeights = uniformArray(this.weightVectors, "vec4");
     this.pointLightVectors = Array.from({ length: POINT_LIGHT_ROWS * maxPointLights }, () => new Vector4());
     this.pointLights = uniformArray(this.pointLightVectors, "vec4");
   }
@@ -44,9 +42,29 @@ export class NodeInputs {
     return (texture(this.textures.layers, uv) as N).depth(i).level(int(0));
   }
 
-  /** As `layer`, decoded. */
-  decoded(uv: N, i: N): N {
-    return this.layer(uv, i).mul(this.scale.element(i)).add(this.bias.element(i));
+  /** What the asset's method builds its sum from. */
+  get kit(): NodeKit {
+    return {
+      tsl: tsl as Record<string, N>,
+      pack,
+      layers: this.asset.layers.count,
+      decoded: (uv, i) => this.layer(uv, i).mul(this.arrays.srbfScale.element(i)).add(this.arrays.srbfBias.element(i)),
+      vectors: (name) => this.arrays[name],
+      texture: (name) => (name === "srbfWeights" ? this.textures.weights : this.textures.tables[name]),
+      texelAt: (uv) => pack.texelAt(uv, this.asset.manifest.width, this.asset.manifest.height),
+      each,
+      addPointLights: (sum, receiver, response) => this.addPointLights(sum, receiver, response),
+    };
+  }
+
+  private addPointLights(sum: N, receiver: N, response: (direction: N) => N): void {
+    each(this.pointLightCount, "l", (l) => {
+      const { light, direction } = pack.pointLightAt(this.pointLights, l, receiver);
+      const color = light.toVar();
+      If(color.length().greaterThan(0), () => {
+        sum.addAssign(color.mul(response(direction)));
+      });
+    });
   }
 
   ambient(uv: N): N {
@@ -56,10 +74,10 @@ export class NodeInputs {
     return (textureLoad(ambient, texelAt(uv, this.asset.manifest.width, this.asset.manifest.height)) as N).rgb;
   }
 
-  /** Write the numbers of a frame. @throws SrbfError on more lamps than there is room for. */
+  /** Write the numbers of one frame. @throws SrbfError on more point lights than there is room for. */
   set(frame: FrameValues): void {
     if (frame.pointLights.length > this.maxPointLights) {
-      throw new SrbfError(`expected at most ${this.maxPointLights} lamps, found ${frame.pointLights.length}; set maxPointLights when the asset is loaded`);
+      throw new SrbfError(`expected at most ${this.maxPointLights} point lights, found ${frame.pointLights.length}; set maxPointLights when the asset is loaded`);
     }
     this.weightVectors.forEach((vector, i) => vector.fromArray(frame.weights, 4 * i));
     const weights = this.textures.weights;
@@ -71,6 +89,11 @@ export class NodeInputs {
     this.pointLightVectors.forEach((vector, i) => vector.fromArray(packed, 4 * i));
     this.pointLightCount.value = frame.pointLights.length;
   }
+}
+
+function each(count: number | N, name: string, body: (i: N) => void): void {
+  const end = typeof count === "number" ? int(count) : count;
+  (Loop as N)({ start: int(0), end, type: "int", condition: "<", name }, (variables: N) => body(variables[name]));
 }
 
 function vectors(numbers: Float32Array): Vector4[] {

@@ -4,7 +4,7 @@ import { vec3, vec4 } from "three/tsl";
 import { SrbfError } from "../../errors";
 import type { N } from "./nodes";
 
-/** Adds irradiance as a light map does, in the place of the direct diffuse light that was added before. */
+/** Adds irradiance as a light map does, and removes the direct diffuse light that was added before. */
 class ReplacingIrradianceNode extends LightingNode {
   constructor(private readonly light: N) {
     super();

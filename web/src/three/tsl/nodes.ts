@@ -1,10 +1,10 @@
 /**
- * The arithmetic of the shader pack in three.js' node language, which becomes WGSL or GLSL: one function for each of the pack's, of the same name.
- * Nodes are built by their text-less methods, so that no shader is kept twice.
+ * The arithmetic of the shader pack in three.js' node language, which becomes WGSL or GLSL: one function for each of the pack's, by the same name.
+ * Nodes are built by method calls, so that no shader text is kept twice.
  */
 import * as tsl from "three/tsl";
 
-/** A node, or what becomes one: three's types of nodes know no clamped integers, and change with every release. */
+/** A node, or a value that becomes one: three's own node types lack clamped integers and change with every release. */
 export type N = any;
 
 const { Fn, abs, clamp, dot, float, floor, int, ivec2, length, max, min, mix, select, textureLoad, vec2, vec3 } = tsl as Record<string, N>;
@@ -63,10 +63,10 @@ function lookup(table: N, size: number, columns: number, index: N, place: N): N 
   return mix(mix(fetch(0, 0), fetch(1, 0), fraction.x), mix(fetch(0, 1), fetch(1, 1), fraction.x), fraction.y);
 }
 
-/** Where lamps lie in their uniform array: four vec4 each, as `packedPointLights` writes them. */
+/** vec4 per point light in their uniform array, as `packedPointLights` writes them. */
 export const POINT_LIGHT_ROWS = 4;
 
-/** A lamp's strength times its color, and the unit direction to it, at a receiver (meters, the asset's frame). */
+/** A point light's strength times its color, and the unit direction to it, at a receiver (meters, the asset's frame). */
 export function pointLightAt(pointLights: N, pointLight: N, receiver: N): { light: N; direction: N } {
   const row = (i: number) => pointLights.element(pointLight.mul(POINT_LIGHT_ROWS).add(i));
   const [place, low, color, axis] = [0, 1, 2, 3].map(row);

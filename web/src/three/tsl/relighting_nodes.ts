@@ -5,10 +5,11 @@ import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
 import { checkCompression } from "../../compression";
 import { SrbfError } from "../../errors";
+import { receiversFrom } from "../../manifest";
 import { needPositions } from "../../shader";
 import type { TargetOptions } from "../lightmap_pass";
 import type { MaterialOptions } from "../material";
-import { SceneAsset } from "../scene_asset";
+import { SceneAsset, sourceOf } from "../scene_asset";
 import { SrbfTextures } from "../textures";
 import { NodeInputs } from "./inputs";
 import { applyLight } from "./material";
@@ -16,13 +17,13 @@ import { type N, texelAt } from "./nodes";
 import { relit } from "./relit";
 
 export interface RelightingNodesOptions extends TargetOptions {
-  /** As of `SrbfRelightingMap`. */
+  /** As in `SrbfRelightingMap`. */
   source?: "maps" | "lightmap";
-  /** Room for point and spot lights; their number may change without compiling anew. */
+  /** Room for point and spot lights; their number may change without recompiling. */
   maxPointLights?: number;
 }
 
-/** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once a frame. */
+/** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once per frame. */
 export class SrbfRelightingNodes extends SceneAsset {
   readonly textures: SrbfTextures;
   readonly source: "maps" | "lightmap";
@@ -32,14 +33,10 @@ export class SrbfRelightingNodes extends SceneAsset {
   private readonly quad?: QuadMesh;
   private drawn = "";
 
-  /** @throws SrbfError on `source: "maps"` for a clustered eigen map. */
+  /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingNodesOptions = {}) {
     super(asset);
-    const clustered = asset.manifest.method === "clustered-eigen-map";
-    this.source = options.source ?? (clustered ? "lightmap" : "maps");
-    if (clustered && this.source === "maps") {
-      throw new SrbfError('expected source "lightmap" for a clustered eigen map, found "maps": its planes must not be filtered across clusters');
-    }
+    this.source = sourceOf(asset, options.source);
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
     this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16);
@@ -58,12 +55,11 @@ export class SrbfRelightingNodes extends SceneAsset {
   light(options: MaterialOptions = {}): N {
     const uv = placeOf(options);
     if (this.target) return (texture(this.target.texture, uv) as N).rgb;
-    const kind = this.asset.manifest.source?.receiver?.kind;
-    const receivers = options.receivers ?? (kind === "view" ? "map" : "vertex");
+    const receivers = options.receivers ?? receiversFrom(this.asset.manifest);
     return relit(this.inputs, uv, receivers === "map" ? this.mapped(uv) : this.inputs.assetFromScene.mul(vec4(positionWorld as N, 1)).xyz);
   }
 
-  /** How much of a view is there, a float node; none where it fills its picture, and of a lightmap. */
+  /** A view's coverage, a float node; undefined where it fills its picture, and for lightmaps. */
   alpha(options: MaterialOptions = {}): N | undefined {
     const { alpha } = this.textures;
     return alpha && (texture(alpha, placeOf(options)) as N).r;
@@ -78,9 +74,9 @@ export class SrbfRelightingNodes extends SceneAsset {
   }
 
   /**
-   * Bring the nodes, and the lightmap where there is one, to the lights as they are now. The renderer is needed for `source: "lightmap"`.
+   * Update the nodes, and the lightmap where there is one, to the current lights. The renderer is needed for `source: "lightmap"`.
    *
-   * @throws SrbfError on lamps where the asset has no positions for them, and on more lamps than `maxPointLights`.
+   * @throws SrbfError on point lights where the asset has no positions, and on more than `maxPointLights` of them.
    */
   update(renderer?: Renderer): void {
     const frame = this.frame();

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Facts of the scene that a bake needs before it is planned: objects, sizes, free places for lights."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+
+from blender_bake import point_grid, unwrap, vertices
+from blender_bake.frame import Frame
+from blender_bake.ipc import Events
+from blender_bake.receiver_objects import meshes_of, prepare, world_area
+
+ROUNDS = 4  # of laying out a layer for the size that the one before needs: its gutter shrinks as the size grows
+
+
+def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, frame: Frame) -> dict[str, Any]:
+    """The facts for `question`, which may have several of these keys.
+
+    collections: names            -> `objects`: the receivers in them, in order of name
+    vertices: receiver            -> `width`, `height`: of the image that lists the receiver's vertices
+    texels_per_meter: density D, receiver -> `side`: texels per side, D sqrt(area in the world / area of the UV layer), not rounded;
+        `world_area` (m2), `uv_area` (of the unit square)
+    frame: true                   -> `frame`: the aspect of the camera's picture in the scene's own render settings, see `Frame.record`
+    points: {spacing, box, random, seed} -> `points`: free places for point lights, see `point_grid.free_points`
+    """
+    found: dict[str, Any] = {}
+    if question.get("collections"):
+        found["objects"] = list(dict.fromkeys(name for c in question["collections"] for name in meshes_of(scene, c, events)))
+    if question.get("vertices"):
+        counts = [len(obj.data.vertices) for obj in prepare(scene, [question["vertices"]["object"]])]
+        found["width"], found["height"] = vertices.image_size(sum(counts))
+    if question.get("texels_per_meter"):
+        found |= _size_by_density(scene, question["receiver"], question["texels_per_meter"], events)
+    if question.get("frame"):
+        found["frame"] = frame.record()
+    if question.get("points"):
+        found["points"] = point_grid.free_points(scene, question["points"])
+    return found
+
+
+class Silent:
+    """Drops warnings that were given before."""
+
+    def warn(self, message: str) -> None:
+        """Do nothing."""
+
+
+def _size_by_density(scene: bpy.types.Scene, wanted: dict[str, Any], density: float, events: Events) -> dict[str, Any]:
+    objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
+    world = sum(world_area(obj) for obj in objects)
+    side = density * math.sqrt(world)  # as if the layer were full
+    before = [{layer.name for layer in obj.data.uv_layers} for obj in objects]
+    for i in range(ROUNDS):
+        for obj, names in zip(objects, before, strict=True):
+            for name in [layer.name for layer in obj.data.uv_layers if layer.name not in names]:
+                obj.data.uv_layers.remove(obj.data.uv_layers[name])
+        texels = max(1, math.ceil(side))
+        layers, made = unwrap.choose_layers(
+            objects, wanted.get("uv_layer"), texels, wanted.get("unwrap", "smart"), events if i == 0 else Silent()
+        )
+        area = sum(unwrap.uv_area(obj.data, layer) for obj, layer in zip(objects, layers, strict=True))
+        side = density * math.sqrt(world / area)
+        if not made:
+            break
+    return {"side": side, "world_area": world, "uv_area": area}

@@ -1,0 +1,37 @@
+"""What a worker's receiver is asked to render: the message that host and worker exchange for every image."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from srbf.bake.settings import PlannedLight
+
+Rendered = Literal["response", "direct", "denoised"]
+
+
+@dataclass(frozen=True)
+class RenderRequest:
+    """A light's images with `samples` samples per texel of one `seed`.
+
+    light: None for the scene's own light alone (the ambient image).
+    region: flat indices of the receivers to render, row by row from the top; None: all. A worker refuses a region that it cannot render.
+    channels: which images. `response`, all of the light; `direct`, its direct diffuse part, of the same seed; `denoised`, the response
+    without its noise, biased.
+    """
+
+    light: PlannedLight | None
+    samples: int
+    seed: int
+    region: tuple[int, ...] | None = None
+    channels: tuple[Rendered, ...] = ("response",)
+
+    def message(self) -> dict[str, Any]:
+        """As JSON, one line to the worker. It replies with one event: the light's index, and a file for each of `channels`."""
+        return {
+            "light": None if self.light is None else {"index": self.light.index, **self.light.placed()},
+            "samples": self.samples,
+            "seed": self.seed,
+            "region": None if self.region is None else list(self.region),
+            "channels": list(self.channels),
+        }

@@ -1,0 +1,69 @@
+"""One light of a capture: where it is, its role, and the image rendered or photographed under it alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from srbf.errors import InputError, ManifestError
+
+LightKind = Literal["directional", "point"]
+Role = Literal["train", "validation", "holdout"]
+ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
+UNIT_TOLERANCE = 1e-3  # of a manifest's directions
+
+
+@dataclass(frozen=True)
+class CapturedLight:
+    """One illuminant of a capture and the image of the receivers' responses to it.
+
+    `place` of a directional light, of unit irradiance, is the unit direction towards it; of a point light, of unit irradiance at 1 m and
+    inverse-square fall-off, its position in meters. `direct`, of an indirect capture, is the image of the direct diffuse light
+    that `file` lacks. `region`: which receivers `file` holds, as the file of a mask or as flat indices (row by row from the top);
+    None: all of them.
+    """
+
+    place: tuple[float, float, float]
+    role: Role
+    file: str
+    direct: str | None = None
+    kind: LightKind = "directional"
+    region: str | tuple[int, ...] | None = None
+
+    @staticmethod
+    def of_manifest(entry: Mapping[str, Any], where: str) -> CapturedLight:
+        """From a checked entry of capture.json; ManifestError, naming the light as `where`, for a direction of another length than 1."""
+        kind: LightKind = entry["kind"]
+        place = np.asarray(entry["direction" if kind == "directional" else "position"], np.float64)
+        if kind == "directional":
+            length = float(np.linalg.norm(place))
+            if not abs(length - 1) <= UNIT_TOLERANCE:
+                raise ManifestError(f"expected a unit direction of {where}, found length {length:.4g}; normalize it")
+            place = place / length
+        x, y, z = place.tolist()
+        region = entry.get("region")
+        indices = tuple(region) if isinstance(region, list) else region
+        return CapturedLight((x, y, z), entry["role"], entry["file"], entry.get("direct"), kind, indices)
+
+    @property
+    def direction(self) -> tuple[float, float, float]:
+        """Unit vector towards the light; InputError for a point light, which has none."""
+        if self.kind != "directional":
+            raise InputError(f"expected a directional light, found a point light ({self.file}), which has no direction of its own")
+        return self.place
+
+    @property
+    def position(self) -> tuple[float, float, float]:
+        """Position of a point light, m; InputError for a directional one."""
+        if self.kind != "point":
+            raise InputError(f"expected a point light, found a directional one ({self.file}), which has no position")
+        return self.place
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files that the light names, relative to the capture's folder."""
+        named = (self.file, self.direct, self.region if isinstance(self.region, str) else None)
+        return tuple(name for name in named if name is not None)

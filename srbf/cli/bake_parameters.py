@@ -1,0 +1,234 @@
+"""Parameters of `srbf bake`, by panels of its help: scene, lights, quality, farm, safety."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from srbf.bake.shard import Shard
+from srbf.cli.values import (
+    AUTO_OR_ANGLE,
+    AUTO_OR_COUNT,
+    COUNT,
+    COUNT_OR_NONE,
+    POSITIVE,
+    Parsed,
+    Size,
+    duration,
+    size,
+)
+
+SCENE, LIGHTS, QUALITY, FARM, SAFETY = "Scene", "Lights", "Quality", "Farm", "Safety"
+
+Scene = Annotated[Path, typer.Argument(metavar="SCENE", help="The .blend; it is not changed, and nothing in it runs.", show_default=False)]
+SceneName = Annotated[
+    str | None,
+    typer.Option(
+        "--scene",
+        metavar="NAME",
+        help="Which scene of the .blend; default: the one it was saved in.",
+        show_default=False,
+        rich_help_panel=SCENE,
+    ),
+]
+Receivers = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="RECEIVER",
+        help="lightmap:OBJECT, vertices:OBJECT or view[:CAMERA]. Repeat it for more: lightmaps share an atlas, others go to OUTPUT/NAME.",
+        show_default=False,
+        rich_help_panel=SCENE,
+    ),
+]
+Collections = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="Every renderable mesh of a collection into the atlas.", show_default=False, rich_help_panel=SCENE),
+]
+Separate = Annotated[bool, typer.Option("--separate", help="A lightmap each instead of one atlas, in OUTPUT/NAME.", rich_help_panel=SCENE)]
+UvLayer = Annotated[
+    str | None,
+    typer.Option(metavar="NAME", help="UV layer of a lightmap; default: the active one.", show_default=False, rich_help_panel=SCENE),
+]
+UnwrapBy = Annotated[
+    Literal["smart", "lightmap-pack", "keep"],
+    typer.Option(help="How a UV layer is made where none fits; keep: refuse.", rich_help_panel=SCENE),
+]
+NoCastShadow = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="OBJECT",
+        help="An object that light passes, such as the ceiling of a closed room. Repeats.",
+        show_default=False,
+        rich_help_panel=SCENE,
+    ),
+]
+KeepSceneLights = Annotated[
+    bool, typer.Option("--keep-scene-lights", help="The scene's own lights and world become ambient light.", rich_help_panel=SCENE)
+]
+
+Lights = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT, help="Hammersley directions to fit.", rich_help_panel=LIGHTS)]
+DomainOfLights = Annotated[
+    Literal["sphere", "hemisphere"],
+    typer.Option(help="Where the light comes from; hemisphere: from above the ground.", rich_help_panel=LIGHTS),
+]
+LightList = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="A .lp file of directions to fit, instead of --lights.", show_default=False, rich_help_panel=LIGHTS),
+]
+LightSet = Annotated[
+    str | None,
+    typer.Option(
+        metavar="point:SPACING",
+        help="Point lights that fill a box, so many meters apart, instead of --lights.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+LightBounds = Annotated[
+    str | None,
+    typer.Option(
+        metavar="BOX",
+        help="x0,y0,z0,x1,y1,z1 of --light-set, m; default: all that renders.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+SunAngle = Annotated[
+    Any,
+    typer.Option(
+        metavar="RADIANS",
+        parser=AUTO_OR_ANGLE,
+        help="Angular diameter of the light; auto: the mean light spacing.",
+        rich_help_panel=LIGHTS,
+    ),
+]
+TransportOf = Annotated[
+    Literal["combined", "indirect"],
+    typer.Option(help="All light, or all but the light's direct diffuse part.", rich_help_panel=LIGHTS),
+]
+ValidationLights = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT_OR_NONE, help="Validation lights.", rich_help_panel=LIGHTS)]
+HoldoutLights = Annotated[
+    int,
+    typer.Option(metavar="COUNT", parser=COUNT_OR_NONE, help="Held-out lights, for the reported error alone.", rich_help_panel=LIGHTS),
+]
+
+SizeOf = Annotated[
+    Size | None,
+    typer.Option(
+        metavar="PIXELS",
+        parser=size,
+        help="Texels, WxH, or N for NxN. Default: 256x256; of a view, 256 on the longer side of its camera's frame.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+TexelsPerMeter = Annotated[
+    float | None,
+    typer.Option(
+        metavar="NUMBER",
+        parser=POSITIVE,
+        help="Mean density of a lightmap, which decides its size.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+Samples = Annotated[
+    Any,
+    typer.Option(
+        metavar="COUNT",
+        parser=AUTO_OR_COUNT,
+        help="Samples per texel of each fitted light; auto: until the error stops improving. Default 2, with --time-limit no limit.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+TimeLimit = Annotated[
+    Any,
+    typer.Option(
+        metavar="DURATION",
+        parser=duration,
+        help="Stop after so much time: 90s, 30m, 8h. The same command adds more samples.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+HoldoutSamples = Annotated[
+    int,
+    typer.Option(metavar="COUNT", parser=COUNT, help="Samples per texel of validation, holdout and ambient.", rich_help_panel=QUALITY),
+]
+Denoise = Annotated[bool, typer.Option("--denoise", help="Denoise a view's fitted images by OpenImageDenoise.", rich_help_panel=QUALITY)]
+QuantityOf = Annotated[
+    Literal["radiance", "irradiance"] | None,
+    typer.Option(help="Default: irradiance of a lightmap, radiance of a view.", show_default=False, rich_help_panel=QUALITY),
+]
+Seed = Annotated[int, typer.Option(metavar="NUMBER", parser=COUNT_OR_NONE, help="Random seed.", rich_help_panel=QUALITY)]
+
+Workers = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT, help="Blender processes at a time.", rich_help_panel=FARM)]
+LightsPerWorker = Annotated[
+    int,
+    typer.Option(metavar="COUNT", parser=COUNT, help="Lights after which a Blender process is replaced.", rich_help_panel=FARM),
+]
+WorkerTimeout = Annotated[
+    float | None,
+    typer.Option(
+        metavar="SECONDS",
+        parser=POSITIVE,
+        help="Time after which a silent Blender is replaced; default: learned from the lights before.",
+        show_default=False,
+        rich_help_panel=FARM,
+    ),
+]
+DaskScheduler = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Address of a dask scheduler, tcp://HOST:8786, whose workers render; they see the same folders.",
+        show_default=False,
+        rich_help_panel=FARM,
+    ),
+]
+ShardOf = Annotated[
+    Shard | None,
+    typer.Option(
+        metavar="I/N",
+        parser=Parsed(Shard.parse),
+        help="Bake all passes of the I-th of N shards alone, once `prepare` has been; a bake without it then finishes.",
+        show_default=False,
+        rich_help_panel=FARM,
+    ),
+]
+FarmOf = Annotated[
+    Literal["openjd"] | None,
+    typer.Option(
+        help="Bake nothing: write a render farm's job into -o, an Open Job Description bundle.",
+        show_default=False,
+        rich_help_panel=FARM,
+    ),
+]
+FarmTasks = Annotated[
+    int | None,
+    typer.Option(
+        metavar="COUNT",
+        parser=COUNT,
+        help="Tasks of the farm's bake; default: one for 32 lights.",
+        show_default=False,
+        rich_help_panel=FARM,
+    ),
+]
+
+KeepAccumulation = Annotated[
+    bool,
+    typer.Option(
+        "--keep-accumulation",
+        help="Keep what --samples can later add to; --time-limit and --samples auto do.",
+        rich_help_panel=SAFETY,
+    ),
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print receiver, lights, disk and time; bake nothing.", rich_help_panel=SAFETY)]
+Overwrite = Annotated[bool, typer.Option("--force", help="Replace an output that exists.", rich_help_panel=SAFETY)]
+Restart = Annotated[
+    bool, typer.Option("--restart", help="Drop a half-done capture of other settings and begin again.", rich_help_panel=SAFETY)
+]
+JsonProgress = Annotated[bool, typer.Option("--json-progress", help="Progress as JSON lines on stderr: done, total, what, seconds_left.")]

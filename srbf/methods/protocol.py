@@ -1,0 +1,184 @@
+"""What every method offers: settings, a fit, and what an asset of it can be asked.
+
+A method is a frozen dataclass of its settings in one module of this folder, which ends with `METHOD = TheClass`. `srbf.registry` finds
+it by name; the command line builds its flags from its fields; manifests are checked against `schemas/methods/STEM.schema.json`; shaders
+are in `glsl/methods/STEM*.glsl`. To add a method, add these files.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset, AssetReader
+from srbf.capture import Capture, OnImage
+from srbf.encode.row_blocks import SolveRows
+from srbf.encode.uv_seams import Stitch
+from srbf.errors import InputError
+from srbf.io.image import Encoding
+from srbf.lights import Light
+
+if TYPE_CHECKING:
+    from srbf.gl.passes import Passes
+
+
+MOST_POINT_LIGHTS = 8  # that srbfAssetLights takes at once
+
+
+def setting(default: Any, help: str, *, flag: str | None = None, words: tuple[str, ...] = ()) -> Any:
+    """A field of a method's settings that the command line offers: `help`, a `flag` that is not its name, `words` besides a number."""
+    return field(default=default, metadata={"help": help, "flag": flag, "words": words})
+
+
+@dataclass(frozen=True)
+class FitRun:
+    """What a fit reports to, and what does parts of its work.
+
+    `progress(done, total)` counts images. `on_image(row, image)` sees every train image once as it is read, in any thread. `stitch` closes
+    the seams of the UV layer. `solve_rows` has blocks of rows solved elsewhere, where the method can; `on_image` sees none then.
+    """
+
+    progress: Callable[[int, int], None] = lambda done, total: None
+    on_image: OnImage = lambda row, image: None
+    stitch: Stitch | None = None
+    solve_rows: SolveRows | None = None
+
+
+QUIET = FitRun()
+
+
+@dataclass(frozen=True, eq=False)
+class ShaderParts:
+    """What a shader of one asset needs of its method, beside the pack's `methods/STEM.glsl` and `methods/STEM_lights.glsl`.
+
+    `functions`: GLSL text of srbfAssetDirectional, srbfAssetPoint and srbfAssetLights, which name what is the asset's own. `defines` are
+    counts. `arrays`: name -> (the define that counts its rows, (n, 4) values). `stages`: prefix of the pack's stage files.
+    """
+
+    functions: str
+    defines: dict[str, int]
+    arrays: dict[str, tuple[str, ndarray]]
+    stages: str
+
+
+class Method(ABC):
+    """One way of compressing light transport. Class methods are of an asset, whatever its settings were."""
+
+    name: ClassVar[str]  # in manifests and on the command line; with underscores the stem of its files
+    order: ClassVar[int]  # of listings, the simplest first
+    layers: ClassVar[str]  # key of asset.json that lists the stored layers
+    channels: ClassVar[int]  # of a layer
+    tables: ClassVar[dict[str, str]]  # what it looks up: key of asset.json -> file
+    domains: ClassVar[tuple[str, ...]] = ("directions",)
+    receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices")
+    implied_by: ClassVar[tuple[str, ...]] = ()  # settings that choose the method where none is named
+    rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
+    has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
+    filterable: ClassVar[bool] = True  # layers may be filtered, and have mip levels
+
+    @classmethod
+    def stem(cls) -> str:
+        """Of its files in every layer."""
+        return cls.name.replace("-", "_")
+
+    @classmethod
+    def settings(cls) -> tuple[str, ...]:
+        """Names of its settings."""
+        return tuple(entry.name for entry in fields(cls))  # type: ignore[arg-type]
+
+    @abstractmethod
+    def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
+        """The asset of a capture. InputError where the settings do not suit it; numerical trouble is data in `source.fit`."""
+
+    def caution(self, capture: Capture) -> str | None:
+        """What to say of settings that suit the capture badly."""
+        return None
+
+    def on_sample(self, ratio: float) -> Method:
+        """The settings for a trial on a sample of the texels, of which the capture has `ratio` times as many."""
+        return self
+
+    @classmethod
+    def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[Method]:
+        """What a choice within `size` bytes per texel tries, fewest light functions first; `numbers` were captured per texel."""
+        return ()
+
+    @classmethod
+    def compared(cls) -> tuple[Method, ...]:
+        """What a report compares."""
+        return ()
+
+    @classmethod
+    @abstractmethod
+    def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
+        """Its tables from the files of an asset; ManifestError or ImageError, in one line, where they do not fit the manifest."""
+
+    @classmethod
+    @abstractmethod
+    def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        """The sum over lights of the asset's frame, before the clamp and without ambient: linear in every light's color."""
+
+    @classmethod
+    @abstractmethod
+    def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b d"]) -> Float32[ndarray, "b H W 3"]:
+        """`linear_response` to a white light at each of many coordinates of the light domain, in the asset's frame."""
+
+    @classmethod
+    @abstractmethod
+    def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
+        """One weight per map or light function, and color, of all lights that every receiver sees at the same coordinates."""
+
+    @classmethod
+    @abstractmethod
+    def numbers_per_texel(cls, asset: Asset) -> int:
+        """How many numbers an asset keeps per texel."""
+
+    @classmethod
+    def family(cls, asset: Asset) -> str:
+        """The curve of error against bytes that an asset is on."""
+        return cls.name.replace("-", " ")
+
+    @classmethod
+    @abstractmethod
+    def label(cls, asset: Asset) -> str:
+        """What tells an asset of the family from others: how many numbers it keeps."""
+
+    @classmethod
+    @abstractmethod
+    def describe(cls, asset: Asset) -> Mapping[str, Any]:
+        """What `srbf info` says of the asset's model."""
+
+    @classmethod
+    def summary(cls, asset: Asset) -> str:
+        """One line on a fit that has ended."""
+        return cls.label(asset)
+
+    @classmethod
+    def rounding_functions(cls, asset: Asset) -> Float64[ndarray, "M K"] | None:
+        """Functions over the domain through whose sums alone the layers are seen, so that they are rounded together; None: each alone."""
+        return None
+
+    @classmethod
+    def reducible_from(cls, asset: Asset) -> int | None:
+        """How many maps or components the asset has of which `reduced` keeps fewer; None where it cannot."""
+        return None
+
+    @classmethod
+    def reduced(cls, asset: Asset, manifest: dict[str, Any], count: int, encoding: Encoding) -> Asset:
+        """An asset of fewer layers, without the capture; `manifest` is its asset.json, still with the layers and tables of before."""
+        raise NotImplementedError(cls.name)
+
+    @classmethod
+    def gl_passes(cls) -> type[Passes]:
+        """The passes that draw it."""
+        raise InputError(f"expected an asset that a shader relights, found a {cls.name} one; relight it by numpy")
+
+    @classmethod
+    def shader_parts(cls, asset: Asset, pairs: bool = False) -> ShaderParts:
+        """What exports need; `pairs`: relighting maps find the R table as values and differences. InputError without a shader."""
+        raise InputError(f"expected an asset that a shader relights, found a {cls.name} one; export it as exr")

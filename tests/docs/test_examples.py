@@ -1,0 +1,48 @@
+"""The examples in the docstrings of the public functions, run as doctests on a small capture and an asset of it."""
+
+from __future__ import annotations
+
+import doctest
+import inspect
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_captures import write_capture
+
+import srbf
+
+PUBLIC = [srbf, *(getattr(srbf, name) for name in srbf.__all__ if not name.endswith("Error") and name != "Light")]
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """What the examples may name besides srbf's own names: `capture`, `asset`, `np` and an empty `folder`."""
+    folder = tmp_path_factory.mktemp("examples")
+    slopes = np.random.default_rng(0).normal(size=(6, 8, 3, 3))
+    position = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0), [0.0]), axis=-1)[:, :, 0].astype(np.float32)
+    capture = write_capture(folder / "capture", lambda d: np.maximum(1 + slopes @ d, 0), lights=40, position=position)
+    asset = srbf.fit(capture, k=9)
+    asset.save(folder / "asset")
+    return {**{name: getattr(srbf, name) for name in srbf.__all__}, "np": np, "capture": capture, "asset": asset, "folder": folder}
+
+
+@pytest.mark.parametrize("member", PUBLIC, ids=lambda member: getattr(member, "__name__", str(member)))
+def test_examples_run(member: object, known: dict[str, object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    found = doctest.DocTestFinder(recurse=not inspect.ismodule(member)).find(member, getattr(member, "__name__", "srbf"), globs=dict(known))
+    for test in found:
+        runner.run(test)
+    assert runner.failures == 0
+
+
+def test_every_public_function_has_an_example() -> None:
+    functions = [member for member in PUBLIC if inspect.isfunction(member)]
+    assert functions and [f.__name__ for f in functions if ">>> " not in (f.__doc__ or "")] == []
+
+
+def test_names_are_imported_when_used() -> None:
+    assert set(srbf.__all__) <= set(dir(srbf)) and srbf.fit.__module__ == "srbf.fitting.options"
+    with pytest.raises(AttributeError, match="no attribute 'fti'"):
+        srbf.fti  # noqa: B018
