@@ -23,7 +23,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parent.parent / "srbf"
-if os.environ.get("SRBF_CHECK_ANNOTATIONS"):
+CHECKS_ANNOTATIONS = bool(os.environ.get("SRBF_CHECK_ANNOTATIONS"))
+if CHECKS_ANNOTATIONS:
     # Before srbf is first imported: shapes and dtypes of every annotated function are checked in all tests of this process, at a quarter
     # to a third more time. Not the commands: typer reads their annotations its own way.
     from jaxtyping import install_import_hook
@@ -40,6 +41,11 @@ from srbf.asset import Asset  # noqa: E402
 from srbf.capture import Capture  # noqa: E402
 
 OTHER_LANGUAGES = ("web/", "viewer/", "export/test_translation", "export/test_unity", "export/test_unreal")  # below tests/
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if CHECKS_ANNOTATIONS:
+        config.addinivalue_line("filterwarnings", "ignore:Method pygltflib:DeprecationWarning")  # annotations that are not ours
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

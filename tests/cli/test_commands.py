@@ -77,7 +77,7 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
     assert "holdout" in ok("evaluate", asset, capture.folder)
     shown = dict(line.split(maxsplit=1) for line in ok("info", asset).splitlines())
-    assert (shown["method"], shown["k"], shown["width"], shown["height"]) == ("relighting-map", "9", "14", "10")
+    assert [shown[name] for name in ("format", "method", "k", "width", "height")] == ["srbf-asset", "relighting-map", "9", "14", "10"]
 
 
 def test_point_lights_have_their_former_key_too(asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

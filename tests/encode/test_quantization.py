@@ -56,6 +56,7 @@ def test_functions_that_do_not_overlap_round_each_byte_alone() -> None:
     error = np.abs(restored(stored, scale, bias) - values)
     inside = (stored > 0) & (stored < 255)
     assert (error <= 0.501 * scale[:, None, None] / 255)[inside].all()
+    assert (stored.min(axis=(1, 2)) == 0).all() and (stored.max(axis=(1, 2)) == 255).all()  # no part of the range is idle
 
 
 def test_a_constant_layer_is_exact(functions: np.ndarray) -> None:

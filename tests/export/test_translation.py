@@ -66,6 +66,11 @@ def make(make_asset: Callable[..., Asset], make_planes: Callable[..., Asset]) ->
     return asset_of
 
 
+def test_the_library_is_what_the_packs_readme_lists() -> None:
+    readme = (shader_root() / "README.md").read_text()
+    assert library_paths() == sorted(re.findall(r"^\| `(\w+/\w+\.glsl)` \|", readme, re.MULTILINE))
+
+
 @pytest.mark.parametrize("path", library_paths())
 def test_every_file_of_the_pack_compiles_as_hlsl(path: str) -> None:
     assert spirv.compile_hlsl(COUNTS + hlsl.include([path]) + ENTRY).startswith(SPIRV)

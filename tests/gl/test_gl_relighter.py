@@ -201,8 +201,8 @@ def test_ambient_is_added_after_the_clamp(context: Any, make_asset: Callable[...
 
 def test_lights_add_up_before_the_clamp(context: Any, make_asset: Callable[..., Asset]) -> None:
     """One light of response -2, another of +3: together 1, not 3."""
-    coefficients = np.empty((7, 4, 5, 3), np.float32)
-    asset = make_asset(7, height=4, width=5, coefficients=coefficients * 0)
+    coefficients = np.zeros((7, 4, 5, 3), np.float32)
+    asset = make_asset(7, height=4, width=5, coefficients=coefficients)
     basis = asset.basis
     asset.stored[...] = np.linalg.solve(basis.evaluate(basis.centers), [-2, 3, 0, 0, 0, 0, 0])[:, None, None, None]
     lights = [DirectionalLight(tuple(basis.centers[i])) for i in (0, 1)]  # type: ignore[arg-type]
