@@ -30,7 +30,7 @@ from srbf.gl.uniforms import packed_point_lights, padded
 from srbf.light_domain import Directions
 from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods import projected_weights
-from srbf.relighting.relighter import PASSES
+from srbf.registry import method_named
 from srbf.sphere import point_set
 
 LIGHTS = 400  # of a capture, which sets the density of the light functions
@@ -113,10 +113,10 @@ class Bench:
                 raise SystemExit(f"expected room for the layers of {name} at {side} x {side}, found none on this device; use fewer --sides")
             weights = projected_weights(asset, SUN)
             for by_formula in (False, True) if formula and name == MAPS else (False,):
-                passes = PASSES[asset.method](asset, programs, textures, limits, by_formula)
+                passes = method_named(asset.method).gl_passes()(asset, programs, textures, limits, by_formula)
                 shown = f"{name}, formula" if by_formula else name
                 if not by_formula:
-                    self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.far(weights, None)
+                    self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.distant(weights, None)
                 for count in counts:
                     self.draws[shown, f"{count} lights"] = lambda passes=passes, none=0 * weights, count=count: passes.point_lights(
                         POINT_LIGHTS[:count], none, None

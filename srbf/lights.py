@@ -177,6 +177,7 @@ class EnvironmentLight:
 
 
 Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight
+"""A light of any kind, as `relight` takes them."""
 
 SPOT_SOFTNESS_MIN = 1e-6  # in cosine: an edge of inner = outer stays a step without dividing by zero
 

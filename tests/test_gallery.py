@@ -93,7 +93,7 @@ def test_pictures_are_there_and_the_clip_moves(gallery: Gallery) -> None:
 def test_figures_of_the_page_are_those_of_an_evaluation(gallery: Gallery) -> None:
     page = gallery.docs.with_suffix(".md").read_text(encoding="utf-8")
     capture = Capture.open(gallery.out / SCENE / "capture")
-    for folder, name in (("asset-25-maps", "25 maps of all light"), ("asset", "best of 16 bytes")):
+    for folder, name in (("asset-25-maps", "25 maps of combined light"), ("asset", "best of 16 bytes")):
         error = evaluate(Asset.open(gallery.out / SCENE / folder), capture)["holdout"]
         (row,) = re.findall(rf"^\| {name}.*$", page, re.MULTILINE)
         assert row.endswith(f"| {error['psnr']:.2f} dB | {error['relative_rmse']:.3f} |")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 from srbf.asset import Asset
@@ -99,7 +99,12 @@ def check_settings(method: str | None, settings: dict[str, Any]) -> str:
         check_budget(settings.get("budget"), settings.get("psnr"))
     else:
         _check_known(name, settings, method_named(name).settings())
-        method_named(name)(**settings)
+        chosen = method_named(name)
+        for entry in fields(chosen):  # type: ignore[arg-type]
+            value, words = settings.get(entry.name), entry.metadata.get("words", ())
+            if words and isinstance(value, str) and value not in words:
+                raise InputError(f"expected `{entry.name}` {', '.join(words)} or a number for method {name}, found {value}")
+        chosen(**settings)
     return name
 
 

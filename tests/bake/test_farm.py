@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from faults import contents
+from made_captures import write_capture
 from test_resume import wait_for_lights
 
 from srbf.asset import Asset
@@ -30,10 +31,12 @@ from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import Response, Task, WorkerPoolSettings
 from srbf.capture import Capture
-from srbf.cli.fit import fit
 from srbf.compute.dask_client import Cluster, ClusterError, checked
 from srbf.errors import BakeError, InputError
 from srbf.evaluation.errors_by_role import evaluate
+from srbf.fitting.options import encode
+from srbf.methods import FitRun
+from srbf.methods.eigen_map import EigenMap
 
 pytest.importorskip("distributed")
 
@@ -244,8 +247,9 @@ def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatc
         checked("localhost:8786")
     with pytest.raises(ClusterError, match="expected a dask scheduler at tcp://127.0.0.1:9"), Cluster("tcp://127.0.0.1:9"):
         pass
+    elsewhere = FitRun(solve_rows=lambda *given: pytest.fail("another method has no independent rows"))
     with pytest.raises(InputError, match="relighting-map.*eigen-map"):
-        fit(tmp_path, tmp_path / "asset", method="eigen-map", dask="tcp://x:1")
+        encode(EigenMap(), write_capture(tmp_path / "capture", lambda d: np.ones((2, 2, 3)), lights=12), elsewhere)
     for flags in (["--shard", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--shard", "1/2", "--force"]):
         words = srbf("bake", tmp_path / "scene.blend", "-o", tmp_path / "x", "--receiver", "view", *flags)
         refused = subprocess.run(words, capture_output=True, text=True)

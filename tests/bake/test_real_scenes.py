@@ -372,7 +372,7 @@ def test_the_command_bakes_cameras_into_folders_of_their_own(scene, tmp_path: Pa
     for name in ("Straight", "Flat"):
         assert Capture.open(tmp_path / "two" / name).manifest["receiver"] == {"kind": "view", "camera": name}
     missing = srbf("bake", scene("views"), "-o", tmp_path / "none", *QUICK)
-    assert missing.exit_code == 1 and "--receiver" in missing.output
+    assert missing.exit_code == 2 and "--receiver" in missing.output
 
 
 def test_the_commands_take_vertices_as_any_other_receiver(scene, tmp_path: Path) -> None:
