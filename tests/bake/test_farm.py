@@ -253,7 +253,7 @@ def test_what_a_farm_cannot_do_is_refused_in_one_line(tmp_path: Path, monkeypatc
     for flags in (["--shard", "1/2", "--dask", "tcp://x:1"], ["--dask", "tcp://x:1", "--workers", "2"], ["--shard", "1/2", "--force"]):
         words = srbf("bake", tmp_path / "scene.blend", "-o", tmp_path / "x", "--receiver", "view", *flags)
         refused = subprocess.run(words, capture_output=True, text=True)
-        assert refused.returncode == 1 and len(refused.stderr.strip().splitlines()) == 1 and not (tmp_path / "x").exists()
+        assert refused.returncode == 2 and len(refused.stderr.strip().splitlines()) == 1 and not (tmp_path / "x").exists()
 
 
 def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
