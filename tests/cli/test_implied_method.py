@@ -25,6 +25,7 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Capture:
     return write_capture(tmp_path_factory.mktemp("made") / "capture", lambda d: np.full((6, 8, 3), max(0, d[2])) * [1, 0.5, 0.25])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("flags", "method"),
     [

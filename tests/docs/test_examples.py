@@ -19,6 +19,7 @@ from srbf.bake.settings import BakeSettings, Receiver
 from srbf.export import export
 from srbf.relighting.relighter import relight
 
+pytestmark = pytest.mark.slow  # fits and relights for every example
 ROOT = Path(__file__).parents[2]
 BAKING = (Bake, BakeSettings, Receiver)
 LIGHTS = (lights.attenuation, lights.environment_samples, lights.light_vectors, lights.moved, lights.spot_cone)

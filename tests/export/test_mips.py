@@ -75,6 +75,7 @@ def test_a_level_relit_is_the_picture_filtered(method: str, make_asset: Callable
             np.testing.assert_allclose(response[area > 1e-9], mean[area > 1e-9], atol=FLOAT32 * np.abs(picture[coverage > 0]).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["half", "uint8", "bc7"])
 def test_chart_edges_of_the_file(form: str, make_asset: Callable[..., Asset], tmp_path: Path) -> None:
     """The written levels against the filtered pictures, at texels that are partly covered; outside, each is its nearest covered one."""
