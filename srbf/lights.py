@@ -157,7 +157,7 @@ class EnvironmentLight:
 
     Examples
     --------
-    >>> overcast = EnvironmentLight(np.full((16, 32, 3), 0.5))
+    >>> overcast = EnvironmentLight(np.full((16, 32, 3), 0.5, np.float32))
     >>> relight(asset, [overcast]).shape
     (6, 8, 3)
     """
