@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 
 from srbf.basis.gaussian import GaussianBasis, spread_of, weight
-from srbf.capture import COVERED, MANIFEST, Capture
+from srbf.capture import COVERED, Capture
 from srbf.encode.light_function_fit import dense_centers, functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.weighted_rows import LightSpace
 from srbf.importing.photographs import LightListImport
 from srbf.light_domain import Directions
 from srbf.methods.relighting_map import RelightingMap
+from srbf.receiver_images import MANIFEST
 from srbf.solve.pca import principal_axes
 from srbf.solve.ridge import RidgePath
 from srbf.sphere import domain_of, mean_spacing, normalize

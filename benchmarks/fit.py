@@ -21,10 +21,11 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO as oiio
 
-from srbf.capture import MANIFEST, Capture
+from srbf.capture import Capture
 from srbf.compute.threads import cores
 from srbf.io import files
 from srbf.io.image import write_image
+from srbf.receiver_images import MANIFEST
 from srbf.sphere import normalize, point_set
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -21,7 +21,7 @@ from typing import get_args
 import numpy as np
 
 from srbf.asset import Asset, layer_entries
-from srbf.capture import COVERED, MANIFEST, Capture, Quantity
+from srbf.capture import COVERED, Capture
 from srbf.captured_light import Role
 from srbf.encode.quantization import quantize
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram
@@ -33,6 +33,7 @@ from srbf.io.image import Encoding, write_image
 from srbf.methods.clustered_eigen_map import TEXELS_PER_CLUSTER, ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
+from srbf.receiver_images import MANIFEST, Quantity
 from srbf.sphere import domain_of, normalize, point_set
 
 Method = RelightingMap | EigenMap | ClusteredEigenMap

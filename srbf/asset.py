@@ -15,12 +15,14 @@ from srbf.asset_reader import ASSET_MANIFEST, AssetReader, read_layers
 from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
-from srbf.capture import COVERED, Quantity, check_version
+from srbf.capture import COVERED
 from srbf.errors import InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers.texture_array import level_bytes, level_size
 from srbf.io.image import Encoding, write_images
+from srbf.receiver_images import Quantity
 from srbf.registry import method_named
+from srbf.schemas import check_version
 from srbf.sphere import Domain
 
 if TYPE_CHECKING:

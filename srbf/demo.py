@@ -13,7 +13,7 @@ from typing import Literal
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
-from srbf.capture import Capture, Quantity
+from srbf.capture import Capture
 from srbf.errors import BakeError, InputError, MissingLibraryError, OutputExistsError
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
 from srbf.export.scene_mesh import write_scene_mesh
@@ -21,6 +21,7 @@ from srbf.fitting.auto_method import within_budget
 from srbf.io import files
 from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
+from srbf.receiver_images import Quantity
 from srbf.report import write_report
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from srbf import asset as assets
-from srbf import capture as captures
+from srbf import receiver_images
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.captured_light import ROLES
@@ -19,7 +19,7 @@ UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
 
 def describe(path: Path) -> dict[str, Any]:
     """Facts of the folder at `path`; ManifestError where it is neither, ImageError where a file of it is damaged."""
-    if (path / captures.MANIFEST).is_file():
+    if (path / receiver_images.MANIFEST).is_file():
         return describe_capture(Capture.open(path))
     if (path / assets.MANIFEST).is_file():
         return describe_asset(Asset.open(path), path)

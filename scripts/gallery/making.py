@@ -18,7 +18,7 @@ from scripts.gallery.steps import Steps
 from srbf.asset import Asset
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings
-from srbf.capture import COVERED, MANIFEST, Capture
+from srbf.capture import COVERED, Capture
 from srbf.demo import build_scene, scene_script
 from srbf.errors import OutputExistsError
 from srbf.evaluation.errors_by_role import evaluate
@@ -28,6 +28,7 @@ from srbf.fitting.options import encode, method_for
 from srbf.importing.photographs import LightListImport
 from srbf.io import files
 from srbf.methods.relighting_map import RelightingMap
+from srbf.receiver_images import MANIFEST
 
 FITTING = ("methods/*", "solve/*", "basis/*", "encode/*", "fitting/*")
 MEASURING = ("evaluation/*", "relighting/*", "visibility/*")

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.settings import BakeSettings, Receiver, captures_of
-from srbf.capture import Transport
+from srbf.receiver_images import Transport
 from srbf.relighting.direct_light import Direct
 
 Vector = tuple[float, float, float]

@@ -16,10 +16,10 @@ from srbf.bake.accumulation import ACCUMULATION
 from srbf.bake.former_folder import FORMER, adopt
 from srbf.bake.images import PREPARED, SCENE_FILE, SEAMS
 from srbf.bake.shard import Shard
-from srbf.capture import MANIFEST
 from srbf.channels import CHANNELS, file_name
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
 from srbf.io import files
+from srbf.receiver_images import MANIFEST
 
 STATE = "bake.json"  # exists while a bake is unfinished: its settings
 LOG = "bake.log"

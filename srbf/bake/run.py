@@ -27,9 +27,10 @@ from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_ligh
 from srbf.bake.shard import Shard
 from srbf.bake.worker import Worker
 from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, WorkerPool, WorkerPoolSettings
-from srbf.capture import MANIFEST, Capture
+from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.io import files
+from srbf.receiver_images import MANIFEST
 
 if TYPE_CHECKING:
     from srbf.bake.dask_workers import DaskWorkerPool

@@ -14,9 +14,9 @@ from srbf.bake.folder import STATE
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
-from srbf.capture import MANIFEST
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
+from srbf.receiver_images import MANIFEST
 
 MULTIPLE = 4  # texels that a side computed from a density is rounded up to: block compression needs it
 

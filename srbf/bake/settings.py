@@ -12,10 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from srbf.bake.point_lights import PointGrid
-from srbf.capture import Quantity, Transport
 from srbf.captured_light import LightKind, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
+from srbf.receiver_images import Quantity, Transport
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 Kind = Literal["lightmap", "vertices", "view"]

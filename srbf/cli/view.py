@@ -41,7 +41,7 @@ def view(
     browser: Annotated[bool, typer.Option(help="Open the page, or print its address only.")] = True,
 ) -> None:
     """Show an asset in the browser and move its lights; Ctrl-C ends it."""
-    from srbf.capture import MANIFEST as CAPTURE_MANIFEST
+    from srbf.receiver_images import MANIFEST as CAPTURE_MANIFEST
     from srbf.viewer.contents import contents_of
 
     assets = [folder for folder in folders if not (folder / CAPTURE_MANIFEST).is_file()]

@@ -16,7 +16,6 @@ from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.model_selection import MAX_SPREAD, MIN_SPREAD, Rule, TexelSample
 from srbf.light_domain import LightDomain
 from srbf.solve.kernel_ridge import KernelPath
-from srbf.sphere import mean_spacing
 
 SPREADS = (0.5, 0.7, 1.0, 1.42, 2.0, 2.8, 4.0)  # light spacings
 NARROW, WIDE = (0.5, 0.7, 1.0), (1.42, 2.0, 2.8)  # of kernels of two spreads
@@ -59,7 +58,7 @@ def choose_functions(
     held_out = sample.held_out()
     rule: Rule = "validation" if held_out.validated else "leave-one-light-out"
     usual = _usual_kernel(sample, centers)
-    kernels = list(_candidates(sample.coordinates, sample.train, centers, spread, ridge is not None))
+    kernels = list(_candidates(sample, centers, spread, ridge is not None))
     found: list[list[tuple[float, FunctionModel]]] = [[] for _ in kernels]
 
     def work(i: int) -> None:
@@ -83,13 +82,9 @@ def choose_functions(
 
 
 def _usual_kernel(sample: TexelSample, centers: Float64[ndarray, "B 3"]) -> LightKernel:
-    spacing, least = _spacing(sample.coordinates[: sample.train]), max(MIN_SPREAD, narrowest(centers))
+    spacing, least = sample.domain.spacing(sample.coordinates[: sample.train]), max(MIN_SPREAD, narrowest(centers))
     narrow, wide = (float(np.clip(factor * spacing, least, MAX_SPREAD)) for factor in USUAL)
     return LightKernel(narrow, wide, USUAL_SHARE)
-
-
-def _spacing(lights: Float64[ndarray, "L 3"]) -> float:
-    return mean_spacing(lights) if len(lights) > 1 else 1.0
 
 
 def functions_through(
@@ -117,14 +112,14 @@ def fit_functions(
 
 
 def _candidates(
-    directions: Float64[ndarray, "M 3"], train: int, centers: Float64[ndarray, "B 3"], spread: float | None, plain: bool
+    sample: TexelSample, centers: Float64[ndarray, "B 3"], spread: float | None, plain: bool
 ) -> Iterator[tuple[LightKernel, Float64[ndarray, "M L"]]]:
     """Kernels, with their values between all lights and the train lights; `plain` ones have a single spread."""
-    lights = directions[:train]
+    directions, lights = sample.coordinates, sample.coordinates[: sample.train]
     if spread is not None:
         yield LightKernel(spread), kernel_of_spread(spread, directions, lights, centers)
         return
-    spacing = _spacing(lights)
+    spacing = sample.domain.spacing(lights)
     least = max(MIN_SPREAD, narrowest(centers))
     computed = {}
     for factor in SPREADS:

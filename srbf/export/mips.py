@@ -12,6 +12,7 @@ from srbf.asset import Asset
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.io.containers.texture_array import level_size
+from srbf.methods import method_of
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -78,7 +79,7 @@ def levels_without_bleeding(asset: Asset) -> int:
     never read another; 1 where neighboring texels are not neighbors on the surface (vertices) or differ in meaning (clusters).
     """
     kind = asset.receiver.get("kind")
-    if "cluster_index" in asset.tables or kind == "vertices":
+    if not method_of(asset).filterable or kind == "vertices":
         return 1
     levels = max(asset.width, asset.height).bit_length()
     gap = chart_gap(coverage_of(asset))

@@ -13,12 +13,13 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 from srbf.bake.worker import Worker
-from srbf.capture import MANIFEST, Capture
+from srbf.capture import Capture
 from srbf.errors import BakeError, InputError, ManifestError, OutputExistsError
 from srbf.export.gltf_surface import mean_thickness, surface
 from srbf.io import files
 from srbf.io.glb import Glb
 from srbf.io.image import write_picture
+from srbf.receiver_images import MANIFEST
 
 SUFFIX = ".glb"
 Z_UP_TO_Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion x, y, z, w: -90 degrees about x

@@ -22,6 +22,7 @@ from srbf.io.containers import write_texture_array
 from srbf.io.containers.blocks import BlockFormat
 from srbf.io.containers.dds_header import TexelFormat
 from srbf.io.containers.texture_array import TextureArray
+from srbf.methods import method_of
 
 MOST_LAYERS = 2048  # of a texture array in Vulkan, Direct3D and WebGL; WebGPU guarantees 256
 WEBGPU_LAYERS = 256
@@ -106,11 +107,11 @@ def _levels(asset: Asset, settings: Settings) -> tuple[int, list[str]]:
     most = max(asset.width, asset.height).bit_length()
     if settings.levels == "auto":
         clustered = "no mip levels: components of different clusters have no mean; relight to a texture and filter that"
-        return clean, [clustered] if "cluster_index" in asset.tables else []
+        return clean, [] if method_of(asset).filterable else [clustered]
     if not 0 <= settings.levels <= most:
         raise InputError(f"expected 0 to {most} mip levels of {asset.width}x{asset.height} texels, found `levels={settings.levels}`")
     levels = max(1, settings.levels)
-    if levels > 1 and "cluster_index" in asset.tables:
+    if levels > 1 and not method_of(asset).filterable:
         raise InputError(
             "expected no mip levels of a clustered eigen map, whose components differ in meaning between clusters, found "
             f"`levels={levels}`; relight it to a texture and let the GPU filter that"

@@ -14,6 +14,7 @@ from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.io import files
+from srbf.methods import method_of
 
 DATA = "images"
 SCRIPT = "import_srbf.py"
@@ -78,7 +79,7 @@ def custom_node(asset: Asset, name: str) -> dict[str, Any]:
         "inputs": ["Layers", *textures, "UV", "WorldPosition", *LIGHTS],
         "textures": {key: f"{DATA}/{file}" for key, file in textures.items()},
         "layers": [f"{DATA}/{entry['file']}" for entry in asset.layers],
-        "filtered": not clustered,
+        "filtered": method_of(asset).filterable,
         "lights": {key: list(value) for key, value in LIGHTS.items()},
         "code": "\n".join(code),
     }

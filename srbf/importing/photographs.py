@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 import srbf
-from srbf.capture import MANIFEST, Quantity
 from srbf.captured_light import LightKind, Role
 from srbf.errors import ImageError, InputError
 from srbf.importing.image_pairing import paired
@@ -18,6 +17,7 @@ from srbf.importing.light_list import LightListEntry, below_the_horizon
 from srbf.importing.pictures import Picture, Transfer, read_picture, said_once
 from srbf.io import files
 from srbf.io.image import HALF_MAX, write_image
+from srbf.receiver_images import MANIFEST, Quantity
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, get_args
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.light_domain.protocol import LightDomain
@@ -164,9 +164,6 @@ class Directions(LightDomain):
     @staticmethod
     def nearest(coordinates: Float64[ndarray, "n 3"], among: Float64[ndarray, "L 3"]) -> Int[ndarray, " n"]:
         return (coordinates @ among.T).argmax(axis=1)
-
-    def covers(self, coordinates: Float64[ndarray, "n 3"]) -> Bool[ndarray, " n"]:
-        return np.full(len(coordinates), True) if self.region == "sphere" else coordinates[:, 2] > 0
 
     def paths(self, frames: int, count: int | None = None) -> Iterator[tuple[str, Float64[ndarray, "f 3"]]]:
         """Great circles of even speed; `count` of them, by default 3 arcs over the zenith or 2 whole circles.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.lights import Light, PointLight
 
 if TYPE_CHECKING:
@@ -101,10 +101,6 @@ class LightDomain(ABC):
     @abstractmethod
     def nearest(coordinates: Float64[ndarray, "n d"], among: Float64[ndarray, "L d"]) -> Int[ndarray, " n"]:
         """Which of `among` is closest to each."""
-
-    @abstractmethod
-    def covers(self, coordinates: Float64[ndarray, "n d"]) -> Bool[ndarray, " n"]:
-        """Which coordinates are inside the domain."""
 
     @abstractmethod
     def paths(self, frames: int) -> Iterator[tuple[str, Float64[ndarray, "f d"]]]:

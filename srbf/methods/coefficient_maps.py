@@ -41,7 +41,6 @@ class CoefficientMaps(Method):
     """A method whose assets hold components and light functions; where there are clusters of texels, each has functions of its own."""
 
     layers: ClassVar[str] = "planes"
-    channels: ClassVar[int] = CHANNELS
     tables: ClassVar[dict[str, str]] = {"light_coefficients": "light_coefficients.exr", "w_table": "w_table.exr"}
     functions_text: ClassVar[str]  # GLSL of an asset's own functions
 

@@ -73,14 +73,13 @@ class Method(ABC):
     name: ClassVar[str]  # in manifests and on the command line; with underscores the stem of its files
     order: ClassVar[int]  # of listings, the simplest first
     layers: ClassVar[str]  # key of asset.json that lists the stored layers
-    channels: ClassVar[int]  # of a layer
     tables: ClassVar[dict[str, str]]  # what it looks up: key of asset.json -> file
     domains: ClassVar[tuple[str, ...]] = ("directions",)
     receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices")
     implied_by: ClassVar[tuple[str, ...]] = ()  # settings that choose the method where none is named
     rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
-    filterable: ClassVar[bool] = True  # layers may be filtered, and have mip levels
+    filterable: ClassVar[bool] = True  # layers mean the same at neighboring texels: they may be filtered, and have mip levels
 
     @classmethod
     def stem(cls) -> str:

@@ -106,7 +106,6 @@ class RelightingMap(Method):
     name: ClassVar[str] = "relighting-map"
     order: ClassVar[int] = 1
     layers: ClassVar[str] = "maps"
-    channels: ClassVar[int] = 3
     tables: ClassVar[dict[str, str]] = {"r_table": "r_table.exr"}
     implied_by: ClassVar[tuple[str, ...]] = ("k", "basis", "centers")
     rows_are_independent: ClassVar[bool] = True

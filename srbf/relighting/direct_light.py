@@ -14,6 +14,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
+from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, moved
 from srbf.visibility.embree import has_embree
 from srbf.visibility.rays import RayTracer
@@ -75,7 +76,7 @@ class Added:
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
         """The responses to white lights from world-space `directions`, 0 where none is added."""
-        return 0.0 if self._light is None else self._light.directional(directions @ _rotation(self._frame).T)
+        return 0.0 if self._light is None else self._light.directional(Directions.moved(directions, self._frame))
 
     def notes(self, lights: Sequence[Light]) -> list[str]:
         """What is to be said of `lights`: what was added, and what was not."""
@@ -85,8 +86,3 @@ class Added:
         if any(isinstance(light, EnvironmentLight) for light in lights):
             lines.append("an environment's direct light is not added: the picture holds only what it reflects on")
         return lines
-
-
-def _rotation(matrix: Float64[ndarray, "4 4"]) -> Float64[ndarray, "3 3"]:
-    linear = matrix[:3, :3]
-    return linear / np.cbrt(abs(np.linalg.det(linear)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from importlib import resources
+from pathlib import Path
 from typing import Any, Literal
 
 from srbf.errors import ManifestError, MissingLibraryError
@@ -69,3 +70,12 @@ def _of_kind(error: Any) -> list[Any]:
     for cause in error.context:
         alternatives.setdefault(cause.schema_path[0], []).append(cause)
     return next((causes for causes in alternatives.values() if not any(list(cause.path) == ["kind"] for cause in causes)), [])
+
+
+def check_version(manifest: dict[str, Any], expected: str, path: Path) -> None:
+    """ManifestError where a manifest has another format, or a version not known to this srbf."""
+    found = manifest.get("format")
+    if found != expected:
+        raise ManifestError(f"expected format {expected!r} in {path}, found {found!r}")
+    if manifest.get("version") != 1:
+        raise ManifestError(f"expected version 1 in {path}, found {manifest.get('version')!r}; a newer srbf may read it")

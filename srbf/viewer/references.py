@@ -12,6 +12,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io.image import write_image
+from srbf.light_domain import domain_of_asset, domain_of_capture
 
 CACHED_IMAGES = 32
 
@@ -26,7 +27,9 @@ class References:
 
     def check(self, asset: Asset) -> None:
         """InputError if the capture and the asset are not comparable."""
-        self.capture.require_directional("the viewer's comparison")
+        captured, fitted = domain_of_capture(self.capture).kind, domain_of_asset(asset.manifest).kind
+        if captured != fitted:
+            raise InputError(f"expected a capture in the asset's light domain, {fitted}, found {captured}; leave it out")
         ours = (asset.width, asset.height, asset.quantity, asset.transport)
         theirs = (self.capture.width, self.capture.height, self.capture.quantity, self.capture.transport)
         if ours != theirs:

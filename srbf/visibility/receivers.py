@@ -10,9 +10,10 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
-from srbf.capture import Capture, Quantity
+from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io.scene_glb import Triangles, read_triangles
+from srbf.receiver_images import Quantity
 
 SAME_SURFACE_COS = 0.9  # of the normals of two neighbors that lie on one smooth surface
 OFF_PLANE = 0.2  # of their distance, the largest distance of a neighbor from the tangent plane

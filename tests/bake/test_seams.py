@@ -11,11 +11,11 @@ import pytest
 from srbf.bake.job import base_job
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.bake.worker import Worker
-from srbf.capture import Quantity
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import encode
 from srbf.methods.eigen_map import EigenMap
 from srbf.methods.relighting_map import RelightingMap
+from srbf.receiver_images import Quantity
 
 pytestmark = pytest.mark.blender
 

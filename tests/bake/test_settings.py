@@ -16,9 +16,9 @@ from srbf.bake.openjd import arguments
 from srbf.bake.run import Bake
 from srbf.bake.scene_query import size_of_begun, with_frame
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
-from srbf.capture import MANIFEST
 from srbf.cli.values import AUTO_OR_ANGLE
 from srbf.errors import InputError
+from srbf.receiver_images import MANIFEST
 from srbf.sphere import point_set
 
 

@@ -89,7 +89,7 @@ def tall(make_capture, height: int = 8 * STRIP + 5, **images: np.ndarray) -> Cap
 def test_a_sample_reads_strips_alone_and_equals_the_images(make_capture, monkeypatch: pytest.MonkeyPatch) -> None:
     capture = tall(make_capture)
     read: list = []
-    import srbf.capture as module
+    import srbf.receiver_images as module
 
     whole_reader = module.read_stored
 
