@@ -13,6 +13,7 @@ import numpy as np
 
 from srbf.capture import COVERED, Capture
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, psnr
+from srbf.light_domain import light_of
 from srbf.relighting.direct_light import Added
 
 
@@ -30,7 +31,7 @@ def main(folders: list[str]) -> None:
             with Added(capture, way) as added:
                 for index in capture.indices("holdout"):
                     started = time.perf_counter()
-                    direct = np.asarray(added.directional(capture.directions([index]))).reshape(capture.height, capture.width, 3)
+                    direct = added.response([light_of(capture.lights[index])])
                     seconds.append(time.perf_counter() - started)
                     relit = np.maximum(capture.image(index) + direct, 0)[covered]
                     difference = relit - np.maximum(combined.image(index), 0)[covered]

@@ -2,7 +2,8 @@
 
 `--sides 1024 4096`: texels per side; `--screen`: frames per second of a lightmapped surface that fills 1920 x 1080; `--formula`: point
 lights also by formula. Assets have random half floats, since values do not change the time: 25 relighting maps, eigen maps of 28 and 16
-components, 64 clusters of 8 components. All draw into one RGBA32F target, blended. Milliseconds are medians of alternating runs, with the
+components, 64 clusters of 8 components, and of 12 for named lights: there 1, 4 and 16 lights include making their weights, all that they
+cost. All draw into one RGBA32F target, blended. Milliseconds are medians of alternating runs, with the
 weights of distant lights projected beforehand; `host` is the CPU time of that. GB/s: the texel data over the time, against copying a
 buffer on the same device, counting reads and writes.
 """
@@ -28,7 +29,7 @@ from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import packed_point_lights, padded
 from srbf.light_domain import Directions
-from srbf.lights import DirectionalLight, Light, PointLight
+from srbf.lights import DirectionalLight, Light, NamedLight, PointLight
 from srbf.methods import projected_weights
 from srbf.registry import method_named
 from srbf.sphere import point_set
@@ -41,9 +42,11 @@ METHODS: dict[str, dict[str, int]] = {
     "eigen map, 28 components": {"components": 28},
     "eigen map, 16 components": {"components": 16},
     "clustered, 64 x 8 components": {"clusters": 64, "components": 8},
+    "named lights, 64 x 12 components": {"clusters": 64, "components": 12, "names": 24},
 }
 MINIMAL = "minimal sum of 25 layers"
 SUN: list[Light] = [DirectionalLight((0.3, 0.2, 0.9), (1.0, 0.9, 0.7))]
+NAMED: list[Light] = [NamedLight(f"light {i}", (0.9, 1.0, 0.8)) for i in range(24)]
 POINT_LIGHTS = [PointLight((0.2 + 0.05 * i, 0.1 - 0.07 * i, 0.7), (0.9, 1.0, 0.8)) for i in range(16)]
 Clock = Callable[[], float]
 PATCH = 16  # texels per side of a patch in one cluster
@@ -64,7 +67,7 @@ void main() {
 """
 
 
-def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0) -> Asset:
+def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0, names: int = 0) -> Asset:
     """Random layers over a plane, in half floats."""
     rng = np.random.default_rng(0)
     layers, channels = (k, 3) if k else (-(-components // 4), 4)
@@ -94,7 +97,16 @@ def make_asset(side: int, k: int = 0, components: int = 0, clusters: int = 0) ->
         manifest["clusters"] = clusters
         patches = rng.integers(0, clusters, (-(-side // PATCH), -(-side // PATCH))).astype(np.uint8)
         tables["cluster_index"] = np.ascontiguousarray(patches.repeat(PATCH, axis=0).repeat(PATCH, axis=1)[:side, :side])
+    if names:
+        manifest |= {"method": "light-mix", "light_domain": "named", "lights": [{"name": light.name} for light in NAMED[:names]]}  # type: ignore[union-attr]
+        manifest["light_values"] = {"lights": names, "scale": 1.0}
+        tables = {"cluster_index": tables["cluster_index"], "light_values": rng.normal(size=(count, names, 3)).astype(np.float16)}
     return Asset(manifest, stored, scale, bias, tables, images)
+
+
+def distant_of(asset: Asset) -> list[Light]:
+    """The lights whose weights are projected."""
+    return NAMED[:1] if asset.method == "light-mix" else SUN
 
 
 class Bench:
@@ -111,13 +123,18 @@ class Bench:
             textures.layers()
             if context.error == "GL_OUT_OF_MEMORY":
                 raise SystemExit(f"expected room for the layers of {name} at {side} x {side}, found none on this device; use fewer --sides")
-            weights = projected_weights(asset, SUN)
+            weights = projected_weights(asset, distant_of(asset))
             for by_formula in (False, True) if formula and name == MAPS else (False,):
                 passes = method_named(asset.method).gl_passes()(asset, programs, textures, limits, by_formula)
                 shown = f"{name}, formula" if by_formula else name
                 if not by_formula:
                     self.draws[shown, "directional"] = lambda passes=passes, weights=weights: passes.distant(weights, None)
                 for count in counts:
+                    if asset.method == "light-mix":
+                        self.draws[shown, f"{count} lights"] = lambda passes=passes, asset=asset, count=count: passes.distant(
+                            projected_weights(asset, NAMED[:count]), None
+                        )
+                        continue
                     self.draws[shown, f"{count} lights"] = lambda passes=passes, none=0 * weights, count=count: passes.point_lights(
                         POINT_LIGHTS[:count], none, None
                     )
@@ -188,7 +205,7 @@ def host_times(assets: dict[str, Asset], runs: int) -> dict[str, float]:
 
     def fold(asset: Asset) -> float:
         started = time.perf_counter()
-        projected_weights(asset, SUN)
+        projected_weights(asset, distant_of(asset))
         return time.perf_counter() - started
 
     return medians({name: lambda asset=asset: fold(asset) for name, asset in assets.items()}, runs)
@@ -224,7 +241,8 @@ def screen(context: Any, runs: int, counts: list[int], side: int = 1024) -> None
         square = np.array([[-1, -1], [1, -1], [1, 1], [-1, -1], [1, 1], [-1, 1]], np.float32)
         corners = context.buffer(np.column_stack([square, np.zeros(6), 0.5 * square + 0.5]).astype(np.float32))
         draws: dict[tuple[str, int], Callable[[], float]] = {}
-        for name, shape in METHODS.items():
+        directional = {name: shape for name, shape in METHODS.items() if "names" not in shape}
+        for name, shape in directional.items():
             asset = make_asset(side, **shape)
             textures = AssetTextures(context, asset, Limits.of(context), resources)
             for count in counts:
@@ -241,7 +259,7 @@ def screen(context: Any, runs: int, counts: list[int], side: int = 1024) -> None
 
                 draws[name, count] = draw
         took = medians(draws, runs)
-        for name in METHODS:
+        for name in directional:
             print(f"{name:<50}" + "".join(f"{1e3 / took[name, count]:>15.1f}" for count in counts))
         target.release()
         corners.release()

@@ -50,6 +50,9 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     (rad), no_shadow (names of objects), coverage_samples;
     channels: names of the receiver's images to send first (see `channels`);
     ambient: a request without a light, or null; rendered only where the scene may emit;
+    lit_by: {kind: own}, suns and point lights of ours; {kind: named, groups}, the scene's own lights; {kind: cloud | patches, file}, point
+    lights, and patches of the surfaces (see `emissive_patches`);
+    viewers: unit directions that radiance is rendered toward where a request asks for it, or null;
     requests, serve: requests (see `RenderRequest`) in the job, and whether more come on stdin;
     transmittances, probes: where `transport` is indirect, the transmittances of translucent materials, by name; if null, fitted under
     the lights `probes`, and sent with the scene's triangles.
@@ -59,6 +62,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     from blender_bake.frame import Frame
     from blender_bake.light import SoleLight
     from blender_bake.lightmap import LightmapReceiver
+    from blender_bake.named_lights import NamedLights
     from blender_bake.request import RenderRequest
     from blender_bake.vertices import VertexReceiver
     from blender_bake.view import ViewReceiver
@@ -68,7 +72,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     frame = Frame.of(scene)
     scenes.configure(scene)
     if "query" in job:
-        events.emit("facts", **scene_query.facts(scene, job["query"], events, frame))
+        events.emit("facts", **scene_query.facts(scene, job["query"], events, frame, job["scratch"]))
         return
     if "mesh" in job:
         events.emit("mesh", **scene_mesh.response(scene, job))
@@ -76,7 +80,9 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
     left_out = [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if kind is ViewReceiver else ())]
     no_shadow.let_light_through(scene, job["no_shadow"])
-    own_light = scenes.OwnLight(scene)
+    lit_by = job["lit_by"]
+    named = NamedLights(scene, lit_by["groups"]) if lit_by["kind"] == "named" else None
+    own_light = None if named else scenes.OwnLight(scene)
     apart = job["transport"] == "indirect"
     if apart:
         scene_file.show_as_rendered(scene)
@@ -91,18 +97,19 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     for name, array in receiver.channels(job["channels"]).items():
         send(name, array, time.perf_counter())
     ambient = None
-    if job["ambient"] and (job["keep_scene_lights"] or emission.may_shine()):
+    if own_light is not None and job["ambient"] and (job["keep_scene_lights"] or emission.may_shine()):
         ambient = RenderRequest.of(job["ambient"])
         started = time.perf_counter()
         if job["keep_scene_lights"]:
             own_light.restore()
         send("ambient", ambient.render(receiver)["response"], started)
         own_light.off()
-    emission.switch_off()
+    if named is None:
+        emission.switch_off()
     if ambient is not None:
         started = time.perf_counter()
         send("residual", ambient.render(receiver)["response"], started)
-    light = SoleLight(scene, job["sun_angle"], by_shadow_rays_alone=bool(job["no_shadow"]))
+    light = SoleLight(scene, job["sun_angle"], bool(job["no_shadow"]), named, lit_by.get("file"))
     switch = None
     if apart:
         if names := translucency.cut_out(scene):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The only light of a light image: a sun of unit irradiance, or a point light of unit irradiance at one meter."""
+"""The only light of a light image: a sun or a point light of ours, of unit irradiance (at one meter), or one of the scene's own."""
 
 from __future__ import annotations
 
@@ -9,13 +9,27 @@ from typing import Any
 import bpy
 from mathutils import Vector
 
+from blender_bake.named_lights import NamedLights
+
 POINT_WATTS = 4 * math.pi  # a point light of P watts gives the irradiance P / (4 pi d^2) at d meters
 
 
 class SoleLight:
-    """A sun and a point light of our own, at most one of them on."""
+    """The light that shines: a sun or a point light of our own, one of the scene's `named` lights, or a patch of the surfaces.
 
-    def __init__(self, scene: bpy.types.Scene, sun_angle: float, by_shadow_rays_alone: bool = False) -> None:
+    by_shadow_rays_alone: the sun's disc is not met by bounced rays. patches: the file of `EmissivePatches`, read when one is asked for.
+    """
+
+    def __init__(
+        self,
+        scene: bpy.types.Scene,
+        sun_angle: float,
+        by_shadow_rays_alone: bool = False,
+        named: NamedLights | None = None,
+        patches: str | None = None,
+    ) -> None:
+        self._scene, self._named, self._file = scene, named, patches
+        self._patches: Any = None
         self._sun = _point_light(scene, "SUN")
         self._sun.data.angle = sun_angle
         if by_shadow_rays_alone:  # bounced rays may not reach it
@@ -24,7 +38,10 @@ class SoleLight:
         self._point.data.shadow_soft_size = 0.0
 
     def aim(self, light: dict[str, Any] | None) -> None:
-        """Turn on `light` {kind: directional, direction} (towards the light, unit) or {kind: point, position} (m); None: no light."""
+        """Turn on `light` alone; None: no light.
+
+        {kind: directional, direction} (towards the light, unit), {kind: point, position} (m), {kind: named, name}, {kind: patch, patch}.
+        """
         light = {"kind": None} if light is None else light
         kind = light["kind"]
         self._sun.data.energy = 1.0 if kind == "directional" else 0.0
@@ -34,6 +51,14 @@ class SoleLight:
             self._sun.rotation_quaternion = Vector(light["direction"]).to_track_quat("Z", "Y")
         elif kind == "point":
             self._point.location = light["position"]
+        if self._named is not None:
+            self._named.aim(light["name"] if kind == "named" else None)
+        if kind == "patch" and self._patches is None and self._file is not None:
+            from blender_bake.emissive_patches import EmissivePatches
+
+            self._patches = EmissivePatches(self._scene, self._file)
+        if self._patches is not None:
+            self._patches.aim(light["patch"] if kind == "patch" else None)
 
 
 def _point_light(scene: bpy.types.Scene, kind: str) -> bpy.types.Object:

@@ -16,6 +16,7 @@ from blender_bake.receiver_objects import prepare, select
 from blender_bake.request import RenderRequest
 from blender_bake.seam_edges import seam_edges
 from blender_bake.translucency import Switch, switched
+from blender_bake.viewers import Viewers
 
 NOT_DIFFUSE = 1e-3  # albedo below which a slot is not diffuse: Cycles divides irradiance by it
 NORMAL_OFFSET = 1e-5  # Blender stores normals as n / 2 + 1/2 + this
@@ -25,7 +26,7 @@ class LightmapReceiver:
     """Mesh objects, their modifiers applied, whose texels share one atlas; arrays are (H, W, C) float32, row 0 at the top."""
 
     kind = "lightmap"
-    renders = frozenset({"response", "direct"})
+    renders = frozenset({"response", "direct", "indirect"})
 
     def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
@@ -33,6 +34,10 @@ class LightmapReceiver:
         self._irradiance = job["quantity"] == "irradiance"
         scene.render.bake.view_from = "ABOVE_SURFACE"
         self._height, self._width = job["height"], job["width"]
+        self._apart = job["transport"] == "indirect"
+        self._viewers = Viewers(scene, job["viewers"]) if job.get("viewers") else None
+        if self._viewers is not None:
+            self.renders |= {"toward"}
         wanted = job["receiver"]
         self._objects = prepare(scene, wanted.get("objects") or [wanted["object"]])
         for obj in self._objects:
@@ -114,13 +119,17 @@ class LightmapReceiver:
         return seams[None] if len(seams) else None
 
     def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
-        """`response` and `direct` of the same seed: one is exactly part of the other. See `RenderRequest`."""
+        """`response`, `direct` and `indirect` of the same seed: one is exactly part of the other. See `RenderRequest`."""
         images = {}
         if "response" in request.channels:
             images["response"] = self.response(request.samples, request.seed)
         if "direct" in request.channels:
             with switched(switch):
                 images["direct"] = self.direct(request.samples, request.seed)
+        if "indirect" in request.channels:
+            images["indirect"] = self.indirect(request.samples, request.seed, switch)
+        if "toward" in request.channels:
+            images["toward"] = self.toward(request.samples, request.seed, switch)
         return images
 
     def response(self, samples: int, seed: int) -> np.ndarray:
@@ -135,6 +144,23 @@ class LightmapReceiver:
         parts = {"DIRECT"} if self._irradiance else {"DIRECT", "COLOR"}
         scale = math.pi if self._irradiance else 1.0
         return self._light("DIFFUSE", samples, seed, parts) * np.float32(scale)
+
+    def indirect(self, samples: int, seed: int, switch: Switch | None) -> np.ndarray:
+        """What `direct` lacks of the response. Without translucent materials, irradiance takes one bake, not two."""
+        if self._irradiance and not switch:
+            return self._light("DIFFUSE", samples, seed, {"INDIRECT"}) * np.float32(math.pi)
+        whole = self.response(samples, seed)
+        with switched(switch):
+            return whole - self.direct(samples, seed)
+
+    def toward(self, samples: int, seed: int, switch: Switch | None) -> np.ndarray:
+        """(H, W, 3 S): the radiance toward each viewer; of an indirect capture without the direct diffuse light, as seen from above."""
+        assert self._viewers is not None
+        views = self._viewers.images(lambda own: self.response(samples, own), seed)
+        if self._apart:
+            with switched(switch):
+                views -= np.tile(self.direct(samples, seed), views.shape[2] // 3)
+        return views
 
     def _light(self, kind: str, samples: int, seed: int, parts: set[str]) -> np.ndarray:
         return self._bake(kind, self._objects, samples, seed, spread=True, pass_filter=parts)[:, :, :3]
@@ -195,7 +221,7 @@ class LightmapReceiver:
             for i, albedo in unwrap.slot_maximum(obj, self._layers[obj.name], self._albedo).items():
                 if albedo < NOT_DIFFUSE:
                     names.append(repr(slots[i]))
-                    obj.material_slots[i].material = materials.lambert((1, 1, 1))
+                    obj.material_slots[i].material = materials.whitened(obj.material_slots[i].material)
                     materials.add_target(obj.material_slots[i].material, self._image)
         if names:
             self._events.warn(

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import bpy
 
+from blender_bake.emission_switch import emits
+
 
 def bakeable_slots(obj: bpy.types.Object, image: bpy.types.Image) -> None:
     """Give every slot of `obj` a material of its own with `image` as the active node, which a bake writes to.
@@ -33,6 +35,25 @@ def lambert(color: tuple[float, float, float]) -> bpy.types.Material:
     diffuse = nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (*color, 1)
     links.new(diffuse.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return material
+
+
+def whitened(material: bpy.types.Material | None) -> bpy.types.Material:
+    """White Lambert in place of a material that has no diffuse reflection, beside it where it emits: its light goes on to shine.
+
+    The material is the receiver's own, and changed. Emission that is switched off later is so here, too.
+    """
+    if material is None or not emits(material):
+        return lambert((1, 1, 1))
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    surface = material.node_tree.get_output_node("CYCLES").inputs["Surface"]
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
+    both = nodes.new("ShaderNodeAddShader")
+    links.new(diffuse.outputs["BSDF"], both.inputs[0])
+    if surface.links:
+        links.new(surface.links[0].from_socket, both.inputs[1])
+    links.new(both.outputs["Shader"], surface)
     return material
 
 

@@ -39,7 +39,8 @@ class RenderRequest:
     """What `srbf.bake.request.RenderRequest` sends.
 
     light: {index, kind, direction | position}, or None for the scene's own light alone. region: flat indices of the receivers to render,
-    None for all. channels: `response`, all light; `direct`, its direct diffuse part, of the same seed; `denoised`, the response denoised.
+    None for all. channels: `response`, all light; `direct`, its direct diffuse part, of the same seed; `denoised`, the response denoised;
+    `toward`, (H, W, 3 S): the radiance toward each of the job's viewers.
     """
 
     light: dict[str, Any] | None

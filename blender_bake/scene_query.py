@@ -4,19 +4,21 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import bpy
 
-from blender_bake import point_grid, unwrap, vertices
+from blender_bake import free_places, point_grid, surfaces, unwrap, vertices
 from blender_bake.frame import Frame
-from blender_bake.ipc import Events
+from blender_bake.ipc import Events, hand_over
+from blender_bake.named_lights import NamedLights
 from blender_bake.receiver_objects import meshes_of, prepare, world_area
 
 ROUNDS = 4  # of laying out a layer for the size that the one before needs: its gutter shrinks as the size grows
 
 
-def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, frame: Frame) -> dict[str, Any]:
+def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, frame: Frame, scratch: str) -> dict[str, Any]:
     """The facts for `question`, which may have several of these keys.
 
     collections: names            -> `objects`: the receivers in them, in order of name
@@ -25,6 +27,10 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
         `world_area` (m2), `uv_area` (of the unit square)
     frame: true                   -> `frame`: the aspect of the camera's picture in the scene's own render settings, see `Frame.record`
     points: {spacing, box, random, seed} -> `points`: free places for point lights, see `point_grid.free_points`
+    named: {groups}               -> `named`: [{name, objects}], see `NamedLights.entries`
+    places                        -> `places`: see `free_places.places`
+    surfaces: {cells}             -> `files` in `scratch`: `corners` (T, 3, 3) and `albedo` (T, 3) of all surfaces in fragments no longer
+        than a cell, if they were `cells` cells; `occluders` (U, 3, 3), the triangles that block light
     """
     found: dict[str, Any] = {}
     if question.get("collections"):
@@ -36,9 +42,22 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
         found |= _size_by_density(scene, question["receiver"], question["texels_per_meter"], events)
     if question.get("frame"):
         found["frame"] = frame.record()
+    if question.get("named"):
+        found["named"] = NamedLights(scene, question["named"]["groups"]).entries()
+    if question.get("places"):
+        found["places"] = free_places.places(scene, question["places"])
+        for line in found["places"].pop("warnings"):
+            events.warn(line)
     if question.get("points"):
         found["points"] = point_grid.free_points(scene, question["points"])
+    if question.get("surfaces"):  # the last: it hides all objects
+        found["files"] = _surfaces(scene, question["surfaces"]["cells"], Path(scratch), events)
     return found
+
+
+def _surfaces(scene: bpy.types.Scene, cells: int, scratch: Path, events: Events) -> dict[str, str]:
+    found = surfaces.fragments(scene, math.sqrt(surfaces.area(scene) / cells), events)
+    return {name: hand_over(scratch, name, found[name]) for name in ("corners", "albedo", "occluders")}
 
 
 class Silent:

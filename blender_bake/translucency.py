@@ -94,16 +94,19 @@ def switched(switch: Switch | None) -> Iterator[None]:
 
 def find(scene: bpy.types.Scene) -> list[Translucent]:
     """The scene's materials that let shadow rays through, in order of name, each given a switch."""
+    return [Translucent(material) for material in passing(scene)]
+
+
+def passing(scene: bpy.types.Scene) -> list[bpy.types.Material]:
+    """The scene's materials that let shadow rays through, in order of name."""
     used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
     used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}  # of instances
-    return [Translucent(m) for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
+    return [m for m in sorted(used, key=lambda m: m.name) if m.use_nodes and m.node_tree and _passes(m)]
 
 
 def cut_out(scene: bpy.types.Scene) -> list[str]:
     """Names of materials whose transparency depends on a texture or an attribute, such as leaves on cards: their outline is lost."""
-    used = {slot.material for obj in scene.objects if not obj.hide_render for slot in obj.material_slots if slot.material}
-    used |= {m for mesh in bpy.data.meshes for m in mesh.materials if m}
-    return sorted(m.name for m in used if m.use_nodes and m.node_tree and _passes(m) and _varies(m.node_tree))
+    return [material.name for material in passing(scene) if _varies(material.node_tree)]
 
 
 def fit_transmittances(

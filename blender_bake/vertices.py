@@ -15,6 +15,7 @@ from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
 from blender_bake.request import RenderRequest
 from blender_bake.translucency import Switch
+from blender_bake.viewers import Viewers
 
 NOT_DIFFUSE = 1e-3
 ATTRIBUTE = "srbf bake"
@@ -36,7 +37,7 @@ class VertexReceiver:
     """
 
     kind = "vertices"
-    renders = frozenset({"response"})
+    renders = frozenset({"response", "direct", "indirect"})
 
     def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
@@ -64,6 +65,10 @@ class VertexReceiver:
         mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
         mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
         select([self._object])
+        self._apart = job["transport"] == "indirect"
+        self._viewers = Viewers(scene, job["viewers"]) if job.get("viewers") else None
+        if self._viewers is not None:
+            self.renders |= {"toward"}
         self._corners = np.empty(len(mesh.loops), np.int32)  # (C,) vertex of each corner
         mesh.loops.foreach_get("vertex_index", self._corners)
         self._angles = corner_angles(mesh, self._object.matrix_world)
@@ -111,8 +116,10 @@ class VertexReceiver:
         return world_normals.of_mesh(normals.reshape(-1, 3), np.array(self._object.matrix_world)[:3, :3])
 
     def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
-        """The `response`; see `RenderRequest`."""
-        return {"response": self.response(request.samples, request.seed)}
+        """The `response`, its `direct` part, or the `indirect` one; see `RenderRequest`."""
+        samples, seed = request.samples, request.seed
+        make = {"response": self.response, "direct": self.direct, "indirect": self.indirect, "toward": self.toward}
+        return {name: make[name](samples, seed) for name in request.channels}
 
     def response(self, samples: int, seed: int) -> np.ndarray:
         """Irradiance E = pi x Cycles' DIFFUSE without color, or radiance seen from straight above each face."""
@@ -122,6 +129,29 @@ class VertexReceiver:
             every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
             corners = self._bake("COMBINED", samples, seed, pass_filter=every)
         return self._image(self._of_vertices(corners))
+
+    def direct(self, samples: int, seed: int) -> np.ndarray:
+        """The direct diffuse light alone, in the units of `response`."""
+        parts, scale = ({"DIRECT"}, math.pi) if self._irradiance else ({"DIRECT", "COLOR"}, 1.0)
+        return self._image(self._of_vertices(self._bake("DIFFUSE", samples, seed, pass_filter=parts) * np.float32(scale)))
+
+    def indirect(self, samples: int, seed: int) -> np.ndarray:
+        """The response without the direct diffuse light, in its units."""
+        if self._irradiance:
+            corners = self._bake("DIFFUSE", samples, seed, pass_filter={"INDIRECT"}) * np.float32(math.pi)
+        else:
+            every = {"DIRECT", "INDIRECT", "DIFFUSE", "GLOSSY", "TRANSMISSION", "EMIT"}
+            corners = self._bake("COMBINED", samples, seed, pass_filter=every)
+            corners = corners - self._bake("DIFFUSE", samples, seed, pass_filter={"DIRECT", "COLOR"})
+        return self._image(self._of_vertices(corners))
+
+    def toward(self, samples: int, seed: int) -> np.ndarray:
+        """(H, W, 3 S): the radiance toward each viewer; of an indirect capture without the direct diffuse light, as seen from above."""
+        assert self._viewers is not None
+        views = self._viewers.images(lambda own: self.response(samples, own), seed)
+        if self._apart:  # a point light's direct light has no noise at a point
+            views -= np.tile(self.direct(samples, seed), views.shape[2] // 3)
+        return views
 
     def _of_vertices(self, corners: np.ndarray) -> np.ndarray:
         """(V, 3) means over each vertex's valid corners (C, 3), by angle."""
@@ -164,7 +194,7 @@ class VertexReceiver:
             for i in np.unique(of_corners):
                 if albedo[of_corners == i].max() < NOT_DIFFUSE:
                     names.append(repr(slots[i].material.name if slots[i].material else "(none)"))
-                    slots[i].material = materials.lambert((1, 1, 1))
+                    slots[i].material = materials.whitened(slots[i].material.copy() if slots[i].material else None)
             if names:
                 self._events.warn(f"nothing is diffuse in {', '.join(names)}: its irradiance is taken on a white Lambert surface instead")
                 albedo = self._bake("DIFFUSE", 1, 0, pass_filter={"COLOR"})

@@ -27,7 +27,7 @@ class ViewReceiver:
     """The pixels of one camera; arrays are (H, W, C) float32, row 0 at the top, unpremultiplied."""
 
     kind = "view"
-    renders = frozenset({"response", "direct", "denoised"})
+    renders = frozenset({"response", "direct", "indirect", "denoised"})
 
     def __init__(self, scene: bpy.types.Scene, job: dict[str, Any], events: Events) -> None:
         self._scene = scene
@@ -117,20 +117,22 @@ class ViewReceiver:
         return self._centers
 
     def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
-        """`response`, `direct` and `denoised`, see `RenderRequest`: of one render where nothing is translucent, else of two."""
+        """`response`, `direct`, `indirect` and `denoised`, see `RenderRequest`: of one render where nothing is translucent, else of two."""
         samples, seed = request.samples, request.seed
         images = {}
-        if {"response", "denoised"} & set(request.channels):
+        if {"response", "denoised", "indirect"} & set(request.channels):
             response = self.response(samples, seed)
             images = {"response": response, "denoised": response}
             if "denoised" in request.channels:
                 images["denoised"] = self.denoised(response)
-        if "direct" in request.channels:
+        if {"direct", "indirect"} & set(request.channels):
             if images and not switch:
                 images["direct"] = self._direct_of(self._last)
             else:
                 with switched(switch):
                     images["direct"] = self.direct(samples, seed)
+        if "indirect" in request.channels:
+            images["indirect"] = images["response"] - images["direct"]
         return {name: images[name] for name in request.channels}
 
     def response(self, samples: int, seed: int) -> np.ndarray:

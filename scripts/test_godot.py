@@ -1,7 +1,8 @@
 """Compare Godot's pixels with numpy's, on both renderers, in the chroot that scripts/godot-chroot makes; exits 1 if they differ.
 
-Every method, as a picture (canvas) and on a mesh (spatial), lit by Godot's own directional, omni and spot lights. CI does not run it.
-    python scripts/test_godot.py [--keep]
+Every method, as a picture (canvas) and on a mesh (spatial), lit by Godot's own directional, omni and spot lights; mixes of named lights; a
+light cloud by its table of places. CI does not run it.
+    python scripts/test_godot.py [--keep] [--only WORD]
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +23,20 @@ import numpy as np
 from numpy import ndarray
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
 
+from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform  # noqa: E402
 from made_assets import build_asset, build_planes  # noqa: E402
+from made_tables import KINDS, by_places, linear, made  # noqa: E402
 
 from srbf.asset import Asset  # noqa: E402
 from srbf.export.godot import write  # noqa: E402
 from srbf.export.settings import PLAIN, Settings  # noqa: E402
 from srbf.io.image import decode_srgb, encode_srgb  # noqa: E402
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation  # noqa: E402
-from srbf.methods import relight  # noqa: E402
+from srbf.light_geometry import attenuation  # noqa: E402
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight  # noqa: E402
+from srbf.methods import in_asset_frame, relight  # noqa: E402
+from srbf.methods.over_lights import finish  # noqa: E402
 
 RENDERERS = {
     "gl_compatibility": ["--rendering-method", "gl_compatibility", "--rendering-driver", "opengl3"],
@@ -41,79 +46,9 @@ HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may 
 STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's
 FLOAT_ERROR = 1e-4  # single precision, of sums whose terms reach 10
 BYTE_STEP = 1.5 / 255
-RANGE = 20.0  # meters: where Godot's own omni and spot lights end
 FAR = 1e6  # meters
 SECONDS = 300  # of one Godot
 
-Z_UP = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], np.float64)  # Godot's (x, y, z) to (x, -z, y)
-COLOR = (0.9, 0.5, 0.7)  # as Godot's inspector shows it: sRGB
-STRAIGHT = np.eye(4)
-ASKEW = np.array([[0, 0, 1.25, 0.3], [1.25, 0, 0, -0.1], [0, 1.25, 0, 0.2], [0, 0, 0, 1]], np.float64)  # turned, scaled and moved
-TIPPED = np.array([[0.6, -0.8, 0, 0], [0.8, 0.6, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])  # its horizon differs from the environment's
-PLACE = np.array([0.4, 1.3, -0.2])
-TOWARDS = np.array([0.3, 0.8, 0.4]) / np.linalg.norm([0.3, 0.8, 0.4])
-
-
-@dataclass(frozen=True)
-class Lit:
-    """A light as the properties of a Godot node, and its documented meaning in Godot's frame."""
-
-    node: dict[str, Any]
-    direction: ndarray
-    position: ndarray
-    energy: float
-    decay: float = 1.0
-    spot: tuple[float, float] | None = None  # half-angle (rad), exponent of its edge
-
-    def light(self) -> Light:
-        """The same light in srbf, in the world frame, z up."""
-        color = tuple((np.pi * self.energy * decode_srgb(np.array(COLOR))).tolist())
-        towards, place = Z_UP[:3, :3] @ self.direction, tuple(Z_UP[:3, :3] @ self.position)
-        falloff = "inverse-square" if self.decay >= 1.5 else "linear"
-        if self.node["kind"] == "DirectionalLight3D":
-            return DirectionalLight(tuple(towards), color)
-        if self.spot is None:
-            return PointLight(place, color, falloff=falloff)
-        outer, exponent = self.spot
-        share = max(0.0, 2 * 0.5 ** (1 / exponent) - 1)
-        inner = float(np.arccos(1 - share * (1 - np.cos(outer))))
-        return SpotLight(place, color, falloff=falloff, direction=tuple(-towards), inner=inner, outer=outer)
-
-
-def node(kind: str, energy: float, **properties: float) -> dict[str, Any]:
-    across = np.cross([0.3, 1.0, 0.2], TOWARDS)
-    across /= np.linalg.norm(across)
-    frame = np.eye(4)
-    frame[:3] = np.stack([across, np.cross(TOWARDS, across), TOWARDS, PLACE], axis=1)
-    color = "Color({}, {}, {}, 1)".format(*COLOR)
-    numbers = {name: repr(float(value)) for name, value in {"light_energy": energy, **properties}.items()}
-    return {"kind": kind, "transform": transform(frame), "light_color": color, **numbers}
-
-
-def transform(matrix: ndarray) -> str:
-    return "Transform3D({})".format(", ".join(repr(float(v)) for v in [*matrix[:3, :3].ravel(), *matrix[:3, 3]]))
-
-
-SUN = Lit(node("DirectionalLight3D", 0.3), TOWARDS, PLACE, 0.3)
-OMNI = Lit(node("OmniLight3D", 0.5, omni_range=RANGE), TOWARDS, PLACE, 0.5)
-SQUARED = Lit(node("OmniLight3D", 0.4, omni_range=RANGE, omni_attenuation=2), TOWARDS, PLACE, 0.4, 2.0)
-SPOT = Lit(
-    node("SpotLight3D", 0.7, spot_range=RANGE, spot_angle=50, spot_attenuation=2, spot_angle_attenuation=2),
-    TOWARDS,
-    PLACE,
-    0.7,
-    2.0,
-    (np.radians(50), 2.0),
-)
-LIGHTS = {
-    "directional": [SUN],
-    "point": [OMNI],
-    "squared": [SQUARED],
-    "spot": [SPOT],
-    "all": [SUN, OMNI, SPOT],
-    "by table": [SUN],
-    "environment": [SUN],
-}
 ENVIRONMENT = (
     np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
 )  # a panorama in Godot's layout, which starts at x = 0, -z forward
@@ -141,10 +76,13 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
         "eigen map, bc7, mips": lambda: build_planes(9, None, "float", 12, 16),
         "clustered eigen map, half": lambda: build_planes(9, 5, "half", ambient=True),
         "clustered eigen map, uint8": lambda: build_planes(6, 4, "uint8"),
+        **{kind: lambda kind=kind: made(kind, "uint8" if kind == "light-mix" else "half") for kind in KINDS},  # type: ignore[misc]
+        "named-maps, bc7, mips": lambda: made("named-maps", "float", height=12, width=16),
     }
     for name, make in makers.items():
         asset = make()
-        asset.manifest["quantity"] = "irradiance" if asset.method == "eigen-map" else "radiance"
+        asset.images.pop("coverage", None)  # a picture's alpha, which the background would show through
+        asset.manifest["quantity"] = "irradiance" if asset.method in ("eigen-map", "light-cloud") else "radiance"
         if name.endswith("uint8"):
             asset.manifest["asset_from_world"] = [[0, 1.5, 0, 0.2], [-1.5, 0, 0, 0.1], [0, 0, 1.5, -0.3], [0, 0, 0, 1]]
         else:
@@ -156,7 +94,10 @@ def assets() -> Iterator[tuple[str, Asset, Settings]]:
 
 def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
     """The jobs of godot_compare.gd: name, mode, whether the viewport is linear, transform of the asset, lights."""
-    every = [name for name in LIGHTS if name not in ("by table", "environment")]
+    if "light_domain" in asset.manifest:
+        yield from jobs_of_weights(asset)
+        return
+    every = [name for name in LIGHTS if name not in ("by table", "environment", "mix", "inside")]
     for name in every:
         placed = ASKEW if name == "all" else STRAIGHT
         yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
@@ -173,6 +114,16 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
             yield {"name": name, "mode": "white", "hdr": True, "placed": STRAIGHT}
 
 
+def jobs_of_weights(asset: Asset) -> Iterator[dict[str, Any]]:
+    """The jobs of assets whose lights are all in the weights."""
+    names = ("mix",) if asset.manifest["light_domain"] == "named" else ("squared", "spot", "inside")
+    for name in names:
+        for placed in (STRAIGHT, ASKEW):
+            yield {"name": name, "mode": "canvas", "hdr": True, "placed": placed}
+    if np.array_equal(asset.asset_from_world, np.eye(4)):
+        yield {"name": names[0], "mode": "spatial", "hdr": True, "placed": STRAIGHT}
+
+
 def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
     """The result of srbf.methods.relight; for irradiance, the radiance of a white surface."""
     world_from_asset = Z_UP @ job["placed"] @ np.linalg.inv(Z_UP)
@@ -183,7 +134,14 @@ def expected(asset: Asset, job: dict[str, Any]) -> ndarray:
         lights.append(
             EnvironmentLight(np.roll(ENVIRONMENT, 4, axis=1), (ENVIRONMENT_ENERGY,) * 3)
         )  # this layout starts a quarter turn later
-    picture = far_point_light(instance, SUN) if job.get("by_table") else relight(instance, lights)
+    if job["name"] == "mix":
+        named = {name: MIX.get(name, (1.0, (1.0, 1.0, 1.0))) for name in (entry["name"] for entry in asset.manifest["lights"])}
+        lights = [NamedLight(name, tuple((value * decode_srgb(np.array(color))).tolist())) for name, (value, color) in named.items()]
+    if asset.manifest.get("light_domain") == "cloud":
+        inside = [light for light in in_asset_frame(instance, lights) if isinstance(light, PointLight)]
+        picture = finish(asset, linear(asset, by_places(asset, inside)))
+    else:
+        picture = far_point_light(instance, SUN) if job.get("by_table") else relight(instance, lights)
     if asset.quantity == "irradiance":
         picture = picture / np.pi
     if asset.transport == "indirect" and job["mode"] == "spatial":
@@ -247,6 +205,7 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
             **{key: job[key] for key in ("name", "mode", "hdr")},
             "sky": ENVIRONMENT.ravel().tolist() if job["name"] == "environment" else None,  # words: ok
             "by_table": job.get("by_table", False),
+            "mix": MIX if job["name"] == "mix" else {},
             "transform": transform(job["placed"]),
             "lights": [lit.node for lit in LIGHTS[job["name"]]],
             "camera": transform(camera),
@@ -288,12 +247,13 @@ def say(line: str) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", action="store_true", help="leave the projects in the chroot's /tmp")
-    keep = parser.parse_args().keep
+    parser.add_argument("--only", default="", metavar="WORD", help="only assets with this word in their title")
+    arguments = parser.parse_args()
     chroot = Path(os.environ.get("SRBF_GODOT_CHROOT", Path.home() / ".cache" / "srbf" / "godot")).resolve()
     if not (chroot / "srbf-ready").exists():
         sys.exit(f"expected a chroot with Godot at {chroot}, found none; scripts/godot-chroot makes it, or set SRBF_GODOT_CHROOT")
     say(f"{'asset':28}{'renderer':18}{'mode':9}{'target':7}{'lights':13}{'largest':>7}{'error':>11}{'/ bound':>7}")
-    missed = sum(compare(title, asset, settings, chroot, keep) for title, asset, settings in assets())
+    missed = sum(compare(title, asset, settings, chroot, arguments.keep) for title, asset, settings in assets() if arguments.only in title)
     if missed:
         sys.exit(f"{missed} pictures differ from numpy's by more than the bound")
     say("all within the bound")

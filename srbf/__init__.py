@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from srbf.fitting.options import fit
     from srbf.importing.photographs import LightListImport
     from srbf.io.image import read_image, write_image
-    from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+    from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
     from srbf.methods.clustered_eigen_map import ClusteredEigenMap
     from srbf.methods.eigen_map import EigenMap
     from srbf.methods.relighting_map import RelightingMap
@@ -41,7 +41,16 @@ _MODULES = {
     "srbf.fitting.options": ("fit",),
     "srbf.importing.photographs": ("LightListImport",),
     "srbf.io.image": ("read_image", "write_image"),
-    "srbf.lights": ("DirectionalLight", "EnvironmentLight", "Light", "PointLight", "SpotLight"),
+    "srbf.lights": (
+        "AreaLight",
+        "DirectionalLight",
+        "EnvironmentLight",
+        "Light",
+        "NamedLight",
+        "PointLight",
+        "SphereLight",
+        "SpotLight",
+    ),
     "srbf.methods.clustered_eigen_map": ("ClusteredEigenMap",),
     "srbf.methods.eigen_map": ("EigenMap",),
     "srbf.methods.relighting_map": ("RelightingMap",),
@@ -52,6 +61,7 @@ _MODULES = {
 _PLACES = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
+    "AreaLight",
     "Asset",
     "BakeError",
     "Capture",
@@ -65,10 +75,12 @@ __all__ = [
     "LightListImport",
     "ManifestError",
     "MissingLibraryError",
+    "NamedLight",
     "OutputExistsError",
     "PointLight",
     "RelightingMap",
     "Relighter",
+    "SphereLight",
     "SpotLight",
     "SrbfError",
     "evaluate",

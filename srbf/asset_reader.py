@@ -54,6 +54,14 @@ class AssetReader:
             raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
         return pixels
 
+    def rows(self, name: str, rows: int, channels: int) -> np.ndarray:
+        """A table of the manifest's key `name` with `rows` rows of any length, (rows, n, channels) float32."""
+        file = self.manifest[name]["file"]
+        pixels = self._pixels(file, channels)
+        if len(pixels) != rows:
+            raise ImageError(f"expected {rows} rows in {self.folder / file}, found {len(pixels)}")
+        return pixels
+
     def texture(self, name: str) -> TextureArray:
         texture = read_texture_array(self._checked(name))
         expected = (self.manifest["width"], self.manifest["height"])

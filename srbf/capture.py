@@ -86,14 +86,19 @@ class Capture(ReceiverImages):
         lights = [CapturedLight.of_manifest(entry, f"light {i} in {path}") for i, entry in enumerate(manifest["lights"])]
         texels = manifest["width"] * manifest["height"]
         for i, light in enumerate(lights):
-            if light.kind != lights[0].kind:
+            if light.kind != lights[0].kind and (light.kind != "point" or light.role == "train"):
                 raise ManifestError(
-                    f"expected lights of one kind in {path}, found {lights[0].kind} and {light.kind} lights; split them into two captures"
+                    f"expected lights of one kind in {path}, and point lights that measure them, found {lights[0].kind} and {light.kind} "
+                    "lights; split them into two captures"
                 )
             if isinstance(light.region, tuple) and max(light.region) >= texels:
                 raise ManifestError(f"expected receivers below {texels} in the region of light {i} in {path}, found {max(light.region)}")
             for name in light.files:
                 files.inside(folder, name, path)
+        terms = (manifest["harmonics"]["order"] + 1) ** 2 if "harmonics" in manifest else 0
+        for i, light in enumerate(lights):
+            if len(light.harmonics) != terms:
+                raise ManifestError(f"expected {terms} images of harmonics of light {i} in {path}, found {len(light.harmonics)}")
         named = [file for _, file in channels_of(manifest, str(path)).values()]
         for name in [*named, *(manifest[key] for key in ("scene", "seams") if key in manifest)]:
             files.inside(folder, name, path)
@@ -101,7 +106,7 @@ class Capture(ReceiverImages):
 
     @property
     def kind(self) -> LightKind:
-        """The kind of all its lights."""
+        """The kind of its train lights, which are listed first; the lights that measure a fit may be point lights whatever it is."""
         return self.lights[0].kind if self.lights else "directional"
 
     def require_directional(self, what: str) -> None:
@@ -112,7 +117,11 @@ class Capture(ReceiverImages):
     @property
     def has_direct(self) -> bool:
         """Whether every light has a direct image, so that the combined response can be computed."""
-        return all(light.direct is not None for light in self.lights)
+        return self.has_direct_of(ROLES)
+
+    def has_direct_of(self, roles: Sequence[Role]) -> bool:
+        """Whether every light of the roles has a direct image."""
+        return all(light.direct is not None for light in self.lights if light.role in roles)
 
     def combined(self) -> Capture:
         """The same capture with the direct light added to every image; itself where it is combined.
@@ -212,6 +221,38 @@ class Capture(ReceiverImages):
         """
         chosen = self.lights if indices is None else [self.lights[i] for i in indices]
         return np.array([light.position for light in chosen], np.float64).reshape(-1, 3)
+
+    @property
+    def gloss(self) -> int | None:
+        """Order of the spherical harmonics of the viewer's direction; None where radiance was captured toward one viewer alone."""
+        return self.manifest["harmonics"]["order"] if "harmonics" in self.manifest else None
+
+    def harmonics(self, index: int) -> Float32[ndarray, "K H W 3"]:
+        """Coefficients of the radiance toward any viewer under one light, see `srbf.basis.exitant_harmonics`.
+
+        Parameters
+        ----------
+        index
+            Of the light, from 0.
+
+        Returns
+        -------
+        ndarray
+            (K, H, W, 3) float32, K = (order + 1)^2; (0, H, W, 3) where the capture has none.
+
+        Raises
+        ------
+        ImageError
+            As of `image`.
+        """
+        images = [self._read_rows(file, None).astype(np.float32) for file in self.lights[index].harmonics]
+        return np.array(images, np.float32).reshape(-1, self.height, self.width, 3)
+
+    def of_harmonics(self) -> Capture:
+        """A capture whose lights are the harmonics of this one's, light by light, K of each: T of K L columns."""
+        lights = (replace(light, file=file, direct=None, harmonics=()) for light in self.lights for file in light.harmonics)
+        manifest = {key: value for key, value in self.manifest.items() if key not in ("harmonics", "direct")}
+        return Capture(self.folder, manifest, tuple(lights))
 
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:
         """The receivers' responses to one light: a column of T.

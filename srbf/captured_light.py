@@ -10,10 +10,13 @@ import numpy as np
 
 from srbf.errors import InputError, ManifestError
 
-LightKind = Literal["directional", "point"]
+LightKind = Literal["directional", "point", "named", "patch"]
 Role = Literal["train", "validation", "holdout"]
 ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
 UNIT_TOLERANCE = 1e-3  # of a manifest's directions
+
+
+NOWHERE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -21,9 +24,11 @@ class CapturedLight:
     """One illuminant of a capture and the image of the receivers' responses to it.
 
     `place` of a directional light, of unit irradiance, is the unit direction towards it; of a point light, of unit irradiance at 1 m and
-    inverse-square fall-off, its position in meters. `direct`, of an indirect capture, is the image of the direct diffuse light
-    that `file` lacks. `region`: which receivers `file` holds, as the file of a mask or as flat indices (row by row from the top);
-    None: all of them.
+    inverse-square fall-off, its position in meters; others have none, and 0 there. A named light is one of the scene's own, `name`, as
+    the scene has it set: its `objects` shine. A patch is a part of the surfaces that reflects irradiance 1, by its number `patch`.
+    `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
+    `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
+    as the file of a mask or as flat indices (row by row from the top); None: all of them.
     """
 
     place: tuple[float, float, float]
@@ -32,12 +37,16 @@ class CapturedLight:
     direct: str | None = None
     kind: LightKind = "directional"
     region: str | tuple[int, ...] | None = None
+    name: str | None = None
+    objects: tuple[str, ...] = ()
+    patch: int | None = None
+    harmonics: tuple[str, ...] = ()
 
     @staticmethod
     def of_manifest(entry: Mapping[str, Any], where: str) -> CapturedLight:
         """From a checked entry of capture.json; ManifestError, naming the light as `where`, for a direction of another length than 1."""
         kind: LightKind = entry["kind"]
-        place = np.asarray(entry["direction" if kind == "directional" else "position"], np.float64)
+        place = np.asarray(entry.get("direction" if kind == "directional" else "position", NOWHERE), np.float64)
         if kind == "directional":
             length = float(np.linalg.norm(place))
             if not abs(length - 1) <= UNIT_TOLERANCE:
@@ -45,25 +54,35 @@ class CapturedLight:
             place = place / length
         x, y, z = place.tolist()
         region = entry.get("region")
-        indices = tuple(region) if isinstance(region, list) else region
-        return CapturedLight((x, y, z), entry["role"], entry["file"], entry.get("direct"), kind, indices)
+        return CapturedLight(
+            (x, y, z),
+            entry["role"],
+            entry["file"],
+            entry.get("direct"),
+            kind,
+            tuple(region) if isinstance(region, list) else region,
+            entry.get("name"),
+            tuple(entry.get("objects", ())),
+            entry.get("patch"),
+            tuple(entry.get("harmonics", ())),
+        )
 
     @property
     def direction(self) -> tuple[float, float, float]:
         """Unit vector towards the light; InputError for a point light, which has none."""
         if self.kind != "directional":
-            raise InputError(f"expected a directional light, found a point light ({self.file}), which has no direction of its own")
+            raise InputError(f"expected a directional light, found a {self.kind} light ({self.file}), which has no direction of its own")
         return self.place
 
     @property
     def position(self) -> tuple[float, float, float]:
         """Position of a point light, m; InputError for a directional one."""
         if self.kind != "point":
-            raise InputError(f"expected a point light, found a directional one ({self.file}), which has no position")
+            raise InputError(f"expected a point light, found a {self.kind} one ({self.file}), which has no position")
         return self.place
 
     @property
     def files(self) -> tuple[str, ...]:
         """All files that the light names, relative to the capture's folder."""
-        named = (self.file, self.direct, self.region if isinstance(self.region, str) else None)
+        named = (self.file, self.direct, self.region if isinstance(self.region, str) else None, *self.harmonics)
         return tuple(name for name in named if name is not None)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from srbf import asset as assets
 from srbf import receiver_images
@@ -12,9 +16,12 @@ from srbf.capture import Capture
 from srbf.captured_light import ROLES
 from srbf.errors import ManifestError
 from srbf.io.image import size_of
+from srbf.light_domain import domain_of_asset
 from srbf.methods import method_of
 
 UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
+OF_PATCHES = ("point", "spot", "area", "sphere", "directional", "environment")  # light kinds that patches can express
+OF_PLACES = ("point", "sphere")  # those that a kernel over captured point lights can
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -42,12 +49,28 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
         "lights": {role: len(capture.indices(role)) for role in ROLES},
         **_samples(capture),
         **({"unfinished": True} if (capture.folder / UNFINISHED).is_file() else {}),
-        **(
-            {"light_kind": capture.kind, "fitted_by": "none of the methods: they fit directional lights"} if capture.kind == "point" else {}
-        ),
+        **_kinds(capture),
         **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
         "disk_bytes": folder_bytes(capture.folder),
     }
+
+
+def _kinds(capture: Capture) -> dict[str, Any]:
+    """What lights other than directional ones are, and where: kinds, names, free space (m), patches and their cells."""
+    if capture.kind == "directional":
+        return {}
+    manifest = capture.manifest
+    facts: dict[str, Any] = {"light_kind": capture.kind, "light_kinds": dict(Counter(light.kind for light in capture.lights))}
+    if names := [light.name for light in capture.lights if light.name is not None]:
+        facts["names"] = names
+    if "free_places" in manifest:
+        facts["free_space"] = _box(manifest["free_places"])
+    elif capture.kind == "point":
+        facts["fitted_by"] = "none of the methods: they fit directional lights, named ones, and point lights with free places"
+    if "patches" in manifest:
+        facts["patches"] = manifest["patches"]["count"]
+        facts["cells"] = size_of(capture.folder / manifest["patches"]["file"])[1]
+    return facts
 
 
 def _samples(capture: Capture) -> dict[str, Any]:
@@ -75,14 +98,54 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "width": asset.width,
         "height": asset.height,
         **method_of(asset).describe(asset),
-        "domain": asset.domain,
+        **light_facts(asset),
         "encoding": asset.encoding,
         **({"levels": asset.levels} if asset.levels > 1 else {}),
-        "bytes_per_texel": asset.bytes_per_texel(),
+        "bytes_per_texel": bytes_by_light(asset),
         "resident_bytes": asset.resident_bytes(),
         "disk_bytes": folder_bytes(folder),
         "error": asset.manifest.get("error", {}),
     }
+
+
+def light_facts(asset: Asset) -> dict[str, Any]:
+    """What an asset says of its lights' domain: for directions the part of the sphere, else the kind, and what lights inside need."""
+    manifest, kind = asset.manifest, domain_of_asset(asset.manifest).kind
+    if kind == "directions":
+        return {"domain": asset.domain}
+    facts: dict[str, Any] = {"light_domain": kind}
+    if "interpolation" in manifest:
+        facts["interpolation"] = manifest["interpolation"]["kind"]
+    if manifest.get("free_places"):
+        facts["free_space"] = _box(manifest["free_places"])
+    if "cells" in asset.tables:
+        cells = asset.tables["cells"]  # (2, N, 4)
+        facts |= {"patches": int(cells[1, :, 3].max(initial=-1)) + 1, "cells": cells.shape[1]}
+    if "position_table" in manifest:
+        told = manifest["position_table"]
+        size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith("position_"))
+        facts["position_table"] = {"nodes": told["nodes"], "spacing": told["spacing"], "rank": told["rank"], "bytes": size}
+    return facts
+
+
+def bytes_by_light(asset: Asset) -> dict[str, int | float]:
+    """`Asset.bytes_per_texel` by the kinds of light that the asset's domain has: the same bytes for each."""
+    found, kind = asset.bytes_per_texel(), domain_of_asset(asset.manifest).kind
+    if kind == "directions":
+        return found
+    own = max(found.values())
+    if kind == "named":
+        return {"named": own}
+    by_kernel = asset.manifest.get("interpolation", {}).get("kind") == "kernel"
+    return dict.fromkeys(OF_PLACES if by_kernel else OF_PATCHES, own)
+
+
+def _box(places: Sequence[Sequence[float]]) -> dict[str, Any]:
+    """Corners of the box of places, m, and how many they are."""
+    points = np.array(places, np.float64).reshape(-1, 3)
+    if not len(points):
+        return {"places": 0}
+    return {"low": np.round(points.min(axis=0), 4).tolist(), "high": np.round(points.max(axis=0), 4).tolist(), "places": len(points)}
 
 
 def folder_bytes(folder: Path) -> int:

@@ -1,4 +1,4 @@
-"""Lights for relighting: directional, point, spot, environment. World frame, meters, radians, scene-linear Rec.709."""
+"""Lights for relighting: directional, point, spot, sphere, area, named, environment. World frame, meters, radians, scene-linear Rec.709."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32, Float64
+from srbf.arrays import Float32, Float64
 from srbf.errors import InputError
-from srbf.sphere import Domain, normalize
+from srbf.sphere import normalize
 
 Falloff = Literal["linear", "inverse-square"]
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
+PARALLEL = 1e-9  # sine of the angle between an area light's sides up to which they are parallel
 DEFAULT_RADIUS = 1e-4  # meters, the smallest distance counted, so that a light in a surface stays finite
 
 
@@ -87,10 +88,7 @@ class PointLight:
         object.__setattr__(self, "position", triple(self.position, "position"))
         object.__setattr__(self, "color", triple(self.color, "color"))
         for name in ("a0", "radius"):
-            value = float(getattr(self, name))
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"expected {name} above 0, found {value:g}")
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, _above_zero(getattr(self, name), name))
         if self.falloff not in get_args(Falloff):
             raise InputError(f"expected a falloff of linear, inverse-square, found {self.falloff!r}")
 
@@ -137,6 +135,124 @@ class SpotLight(PointLight):
         object.__setattr__(self, "outer", outer)
 
 
+@dataclass(frozen=True, kw_only=True)
+class SphereLight(PointLight):
+    """A glowing sphere: lights as a point light in its center, with soft shadows.
+
+    Parameters
+    ----------
+    position, color, a0, falloff
+        Of the point light in the center; the falloff is `inverse-square` unless it is said.
+    size
+        Radius of the sphere, m, above 0.
+    radius
+        As of the point light, at least `size`: inside the sphere the light is as strong as on its surface.
+
+    Raises
+    ------
+    InputError
+        On a size not above 0, and as `PointLight`.
+
+    Examples
+    --------
+    >>> globe = SphereLight((4.0, 3.0, 2.0), size=0.15)
+    >>> globe.radius, globe.falloff
+    (0.15, 'inverse-square')
+    """
+
+    size: float
+    falloff: Falloff = "inverse-square"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "size", _above_zero(self.size, "size"))
+        super().__post_init__()
+        object.__setattr__(self, "radius", max(self.radius, self.size))
+
+
+@dataclass(frozen=True)
+class AreaLight:
+    """A glowing parallelogram that shines to one side, evenly and diffusely.
+
+    E(x) = color a0^2 / A * integral of cos_l cos_x / r^2 dA: far away as a point light times the cosine at the light.
+
+    Parameters
+    ----------
+    position
+        (x, y, z) of its center, m.
+    u, v
+        Its sides as vectors of full length, m, not parallel. It shines towards u x v.
+    color
+        Irradiance at the distance `a0` straight in front, by the law that holds far away; linear Rec.709.
+    a0
+        m, above 0.
+
+    Raises
+    ------
+    InputError
+        On parallel sides, on `a0` not above 0, and on numbers that are not three or not finite.
+
+    Examples
+    --------
+    >>> panel = AreaLight((4.0, 3.0, 2.0), u=(0.6, 0, 0), v=(0, -0.6, 0))
+    >>> panel.direction, round(panel.area, 2)
+    ((0.0, 0.0, -1.0), 0.36)
+    """
+
+    position: Triple
+    u: Triple
+    v: Triple
+    color: Triple = WHITE
+    a0: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("position", "u", "v", "color"):
+            object.__setattr__(self, name, triple(getattr(self, name), name))
+        object.__setattr__(self, "a0", _above_zero(self.a0, "a0"))
+        if not self.area > PARALLEL * np.linalg.norm(self.u) * np.linalg.norm(self.v):
+            raise InputError(f"expected an area light's sides of some length and not parallel, found u {self.u}, v {self.v}")
+
+    @property
+    def area(self) -> float:
+        """In square meters."""
+        return float(np.linalg.norm(np.cross(self.u, self.v)))
+
+    @property
+    def direction(self) -> Triple:
+        """Unit vector that it shines towards."""
+        return _unit(np.cross(self.u, self.v))
+
+
+@dataclass(frozen=True)
+class NamedLight:
+    """One of the scene's own lights, by its name; only assets of named lights know it.
+
+    Parameters
+    ----------
+    name
+        As the asset lists it.
+    color
+        Intensity times color: 1 is as the scene has the light set, 0 is off.
+
+    Raises
+    ------
+    InputError
+        On an empty name, and on a color of numbers that are not three or not finite.
+
+    Examples
+    --------
+    >>> NamedLight("Window", (0.5, 0.5, 0.5)).color
+    (0.5, 0.5, 0.5)
+    """
+
+    name: str
+    color: Triple = WHITE
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name:
+            raise InputError(f"expected the name of a light, found {self.name!r}")
+        object.__setattr__(self, "color", triple(self.color, "color"))
+
+
 @dataclass(frozen=True, eq=False)
 class EnvironmentLight:
     """An equirectangular radiance map E: u = 1/2 - atan2(y, x) / 2 pi, top row towards +z.
@@ -176,64 +292,12 @@ class EnvironmentLight:
         object.__setattr__(self, "color", triple(self.color, "color"))
 
 
-Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight
+Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight
 """A light of any kind, as `relight` takes them."""
-
-SPOT_SOFTNESS_MIN = 1e-6  # in cosine: an edge of inner = outer stays a step without dividing by zero
-
-
-def attenuation(distance: Float[ndarray, "*shape"], light: PointLight) -> Float[ndarray, "*shape"]:
-    """a0/|L|, or its square, with |L| >= radius [Wong2005, fig. 10].
-
-    Parameters
-    ----------
-    distance
-        |L|, m, of any shape.
-    light
-        Gives `a0`, `falloff` and `radius`.
-
-    Returns
-    -------
-    ndarray
-        Of the same shape: the factor on the light's irradiance, 1 at the distance a0.
-
-    Examples
-    --------
-    >>> from srbf.lights import attenuation
-    >>> attenuation(np.array([1.0, 2.0, 4.0]), PointLight((0, 0, 0), a0=2.0)).tolist()
-    [2.0, 1.0, 0.5]
-    """
-    ratio = light.a0 / np.maximum(distance, light.radius)
-    return ratio if light.falloff == "linear" else ratio * ratio
-
-
-def spot_cone(cos_angle: Float[ndarray, "*shape"], cos_inner: float, cos_outer: float) -> Float[ndarray, "*shape"]:
-    """Smoothstep from 0 at the outer half-angle to 1 at the inner one, in the cosine of the angle off the spot's axis.
-
-    Parameters
-    ----------
-    cos_angle
-        Cosine of the angle off the axis, of any shape.
-    cos_inner, cos_outer
-        Cosines of the half-angles, cos_inner >= cos_outer. Where they are equal the edge is a step.
-
-    Returns
-    -------
-    ndarray
-        Of the shape of `cos_angle`, 0 to 1.
-
-    Examples
-    --------
-    >>> from srbf.lights import spot_cone
-    >>> spot_cone(np.array([1.0, 0.75, 0.5]), cos_inner=1.0, cos_outer=0.5).tolist()
-    [1.0, 0.5, 0.0]
-    """
-    t = np.clip((cos_angle - cos_outer) / max(cos_inner - cos_outer, SPOT_SOFTNESS_MIN), 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
-    """A light carried by a rigid motion and uniform scale: a0 and radius scale along, an environment map turns.
+    """A light carried by a rigid motion and uniform scale: its lengths scale along, an environment map turns, a named light stays.
 
     Parameters
     ----------
@@ -262,7 +326,7 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     ((2.0, 0.0, 1.0), 2.0)
     """
     linear = matrix[:3, :3]
-    if np.array_equal(matrix, np.eye(4)):
+    if isinstance(light, NamedLight) or np.array_equal(matrix, np.eye(4)):
         return light
     if isinstance(light, EnvironmentLight):
         return replace(light, rotation=linear / np.cbrt(np.linalg.det(linear)) @ light.rotation)
@@ -270,95 +334,15 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
         return replace(light, direction=_unit(linear @ light.direction))
     scale = float(np.cbrt(abs(np.linalg.det(linear))))
     position = triple(linear @ light.position + matrix[:3, 3], "position")
+    if isinstance(light, AreaLight):
+        u, v = triple(linear @ light.u, "u"), triple(linear @ light.v, "v")
+        return replace(light, position=position, u=u, v=v, a0=light.a0 * scale)
     changes: dict[str, Any] = {"position": position, "a0": light.a0 * scale, "radius": light.radius * scale}
     if isinstance(light, SpotLight):
         return replace(light, direction=_unit(linear @ light.direction), **changes)
+    if isinstance(light, SphereLight):
+        return replace(light, size=light.size * scale, **changes)
     return replace(light, **changes)
-
-
-def light_vectors(light: PointLight, positions: Float32[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:
-    """Unit directions to a light and its strength: attenuation times a spot's cone [Wong2005, fig. 8-10].
-
-    Parameters
-    ----------
-    light
-        A point or spot light.
-    positions
-        (..., 3) of receivers in the light's frame, m.
-
-    Returns
-    -------
-    directions
-        (..., 3) float64 from the receivers to the light; 0 where a receiver is at the light.
-    strength
-        (...) float64, the factor on the light's irradiance.
-
-    Examples
-    --------
-    >>> from srbf.lights import light_vectors
-    >>> directions, strength = light_vectors(PointLight((0.0, 0.0, 2.0)), np.zeros((1, 3), np.float32))
-    >>> directions.tolist(), strength.tolist()
-    ([[0.0, 0.0, 1.0]], [0.5])
-    """
-    vectors = np.array(light.position) - positions  # L = S - P, eq. 3
-    distance = np.linalg.norm(vectors, axis=-1)
-    unit = vectors / np.maximum(distance, 1e-30)[..., None]
-    strength = attenuation(distance, light)
-    if isinstance(light, SpotLight):
-        cos_angle = -(unit @ np.array(light.direction))
-        strength = strength * spot_cone(cos_angle, np.cos(light.inner), np.cos(light.outer))
-    return unit, strength
-
-
-def environment_samples(
-    image: Float32[ndarray, "H W 3"], domain: Domain, rotation: Float64[ndarray, "3 3"]
-) -> tuple[Float64[ndarray, "H W 3"], Float64[ndarray, "H W"]]:
-    """Directions of an equirectangular map's texel centers, and the solid angle of each texel.
-
-    On the hemisphere only directions above the horizon count. Where z stays up this is exact: a row across the horizon is cut there,
-    and its center moves to the middle of the remaining part.
-
-    Parameters
-    ----------
-    image
-        (H, W, 3), of which the size counts.
-    domain
-        `sphere` or `hemisphere`.
-    rotation
-        (3, 3): turns the directions.
-
-    Returns
-    -------
-    directions
-        (H, W, 3) float64 unit vectors in the world.
-    solid_angle
-        (H, W) float64, sr; 0 below the horizon of a hemisphere.
-
-    Examples
-    --------
-    >>> from srbf.lights import environment_samples
-    >>> _, solid_angle = environment_samples(np.zeros((8, 16, 3), np.float32), "sphere", np.eye(3))
-    >>> bool(np.isclose(solid_angle.sum(), 4 * np.pi))
-    True
-    """
-    height, width = image.shape[:2]
-    elevation = np.pi / 2 - np.arange(height + 1) * (np.pi / height)
-    upright = np.allclose(rotation[2], [0, 0, 1])
-    if domain == "hemisphere" and upright:
-        elevation = np.maximum(elevation, 0)
-    sine = np.sin(elevation)
-    center = (elevation[:-1] + elevation[1:]) / 2
-    azimuth = (0.5 - (np.arange(width) + 0.5) / width) * (2 * np.pi)
-    horizontal, vertical = np.cos(center), np.sin(center)
-    directions = np.empty((height, width, 3))
-    directions[..., 0] = horizontal[:, None] * np.cos(azimuth)
-    directions[..., 1] = horizontal[:, None] * np.sin(azimuth)
-    directions[..., 2] = vertical[:, None]
-    directions = directions @ rotation.T
-    solid_angle = np.repeat((sine[:-1] - sine[1:])[:, None] * (2 * np.pi / width), width, axis=1)
-    if domain == "hemisphere" and not upright:
-        solid_angle = np.where(directions[..., 2] > 0, solid_angle, 0)
-    return directions, solid_angle
 
 
 def triple(value: object, name: str = "a vector") -> Triple:
@@ -370,6 +354,16 @@ def triple(value: object, name: str = "a vector") -> Triple:
     if array.shape != (3,) or not np.isfinite(array).all():
         raise InputError(f"expected {name} as three finite numbers, found {value!r}")
     return (float(array[0]), float(array[1]), float(array[2]))
+
+
+def _above_zero(value: object, name: str) -> float:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"expected {name} above 0, found {value!r}") from error
+    if not (np.isfinite(number) and number > 0):
+        raise InputError(f"expected {name} above 0, found {number:g}")
+    return number
 
 
 def _unit(value: object) -> Triple:

@@ -48,6 +48,32 @@ class ReceiverImages:
     def transport(self) -> Transport:
         return self.manifest.get("transport", "combined")
 
+    def patches(self) -> Float32[ndarray, "2 N 4"]:
+        """The cells of the surfaces that patch lights emit from, in rows (x, y, z, area) and (normal, patch).
+
+        Returns
+        -------
+        ndarray
+            (2, N, 4) float32, meters and square meters.
+
+        Raises
+        ------
+        ManifestError
+            Where the capture names none.
+        ImageError
+            On a damaged file.
+        """
+        if "patches" not in self.manifest:
+            raise ManifestError(
+                f"expected patches of the surfaces in {self.folder / MANIFEST}, found none; bake a `light_set` patches or cloud"
+            )
+        path = self.folder / self.manifest["patches"]["file"]
+        image = read_image(path, 4)
+        require_finite(image, path)
+        if len(image) != 2:
+            raise ImageError(f"expected 2 rows in {path}, found {len(image)}")
+        return image
+
     def scene(self) -> bytes | None:
         """The triangles of receivers and occluders.
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from srbf.errors import InputError
-from srbf.lights import DirectionalLight, EnvironmentLight, PointLight, SpotLight, attenuation, environment_samples, moved, spot_cone
+from srbf.light_geometry import attenuation, environment_samples, light_vectors, spot_cone
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, NamedLight, PointLight, SphereLight, SpotLight, moved
 
 IDENTITY = np.eye(3)
 
@@ -26,6 +27,13 @@ def test_directions_are_normalised() -> None:
         lambda: PointLight((0, 0, 1), radius=-1),
         lambda: PointLight((0, 0, 1), falloff="cubic"),  # type: ignore[arg-type]
         lambda: SpotLight((0, 0, 1), direction=(0, 0, -1), inner=0.3, outer=0.2),
+        lambda: SphereLight((0, 0, 1), size=0),
+        lambda: SphereLight((0, 0, 1), size=float("inf")),
+        lambda: AreaLight((0, 0, 1), u=(1, 0, 0), v=(-2, 0, 0)),
+        lambda: AreaLight((0, 0, 1), u=(1, 0, 0), v=(0, 0, 0)),
+        lambda: AreaLight((0, 0, 1), u=(1, 0, 0), v=(0, 1, 0), a0=0),
+        lambda: NamedLight(""),
+        lambda: NamedLight("Window", (1, 2)),  # type: ignore[arg-type]
         lambda: EnvironmentLight(np.full((2, 4, 3), np.nan, np.float32)),
     ],
 )
@@ -74,3 +82,19 @@ def test_moved_carries_lights_along() -> None:
     assert point_light.position == pytest.approx((1, 2, 6)) and point_light.a0 == pytest.approx(4)
     spot = moved(SpotLight((0, 0, 0), direction=(1, 0, 0), inner=0.1, outer=0.2), matrix)
     assert spot.direction == pytest.approx((0, 1, 0)) and spot.inner == 0.1
+    sphere = moved(SphereLight((1, 0, 3), size=0.5, a0=2), matrix)
+    assert sphere.position == pytest.approx((1, 2, 6)) and (sphere.size, sphere.radius, sphere.a0) == pytest.approx((1, 1, 4))
+    area = moved(AreaLight((1, 0, 3), u=(1, 0, 0), v=(0, 0, 1), a0=2), matrix)
+    assert area.position == pytest.approx((1, 2, 6)) and area.a0 == pytest.approx(4)
+    assert area.u == pytest.approx((0, 2, 0)) and area.v == pytest.approx((0, 0, 2)) and area.direction == pytest.approx((1, 0, 0))
+    window = NamedLight("Window", (2, 1, 1))
+    assert moved(window, matrix) is window
+
+
+def test_a_sphere_is_its_center_from_outside_and_no_brighter_inside() -> None:
+    sphere, center = SphereLight((0, 0, 1), size=0.25, a0=2), PointLight((0, 0, 1), a0=2, falloff="inverse-square")
+    positions = np.array([[0, 0, 3], [1, 2, 0], [0, 0, 1.2]])
+    np.testing.assert_array_equal(light_vectors(sphere, positions)[0], light_vectors(center, positions)[0])
+    strength, expected = light_vectors(sphere, positions)[1], light_vectors(center, positions)[1]
+    np.testing.assert_allclose(strength[:2], expected[:2])
+    assert strength[2] == pytest.approx(2**2 / 0.25**2)

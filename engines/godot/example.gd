@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 extends Node3D
-## A point light to drag over the asset: over model.glb, a mesh through its texels, or its flat picture.
+## A point light to drag over the asset: over model.glb, a mesh through its texels, or its flat picture; named lights to switch.
 
 const HELP := "drag: move the light    wheel: raise it    Tab: %s    S: sun    arrows: turn the sun    + -: exposure of the picture"
+const NAMED_HELP := "1 to 9: switch %s    Tab: %s    + -: exposure of the picture"
 const MODEL := "res://model.glb"  # second UV layer: the asset's
 const TURN := 0.03  # radians per key press
 
@@ -21,7 +22,7 @@ func _ready() -> void:
 			_show_model()
 		else:
 			$Surface.mesh = SrbfTexelMesh.of(_asset)
-		var box := _asset.bounds()
+		var box := SrbfTexelMesh.bounds(_asset)
 		_middle = box.get_center()
 		_size = maxf(box.get_longest_axis_size(), 1e-3)
 	else:
@@ -33,6 +34,12 @@ func _ready() -> void:
 	if _asset.is_view:
 		$Sun.light_energy = 1.0
 		$Relight.exposure = 0.5
+	if _asset.position_table:
+		_light_a_room()
+	if _asset.light_table:
+		$PointLight.visible = false
+	if _asset.is_weighted():
+		$Sun.visible = false
 	$PointLight/Bulb.scale = Vector3.ONE * 0.03 * _size
 	get_viewport().size_changed.connect(_fit_picture)
 	_fit_picture()
@@ -54,7 +61,7 @@ func _unhandled_input(event: InputEvent) -> void:
 			KEY_TAB:
 				_show_picture(not _picture.visible)
 			KEY_S:
-				$Sun.visible = not $Sun.visible
+				$Sun.visible = not $Sun.visible and not _asset.is_weighted()
 			KEY_PLUS, KEY_EQUAL, KEY_KP_ADD:
 				$Relight.exposure += 0.5
 			KEY_MINUS, KEY_KP_SUBTRACT:
@@ -67,6 +74,8 @@ func _unhandled_input(event: InputEvent) -> void:
 				$Sun.rotate_object_local(Vector3.RIGHT, -TURN)
 			KEY_DOWN:
 				$Sun.rotate_object_local(Vector3.RIGHT, TURN)
+		if event.keycode >= KEY_1 and event.keycode <= KEY_9:
+			switch_light(event.keycode - KEY_1)
 
 
 ## Move the light under the mouse at constant height: over the surface's plane, or over the picture's texel.
@@ -85,6 +94,22 @@ func move_point_light(mouse: Vector2) -> void:
 		$PointLight.position = hit
 
 
+## A named light on, as the scene has it set, or off.
+func switch_light(number: int) -> void:
+	var names: PackedStringArray = $Relight.light_names()
+	if number < names.size():
+		$Relight.set_light(names[number], 0.0 if $Relight.intensities.get(names[number], 1.0) > 0.0 else 1.0)
+
+
+## Inside a scene: inverse-square, in the middle, and Godot's shadows, since the asset has bounces alone.
+func _light_a_room() -> void:
+	$PointLight.omni_attenuation = 2.0
+	$PointLight.omni_range = 4.0 * _size
+	$PointLight.light_energy = 0.04 * _size * _size
+	$PointLight.shadow_enabled = true
+	$PointLight.position = _middle
+
+
 func _show_model() -> void:
 	_model = load(MODEL).instantiate()
 	add_child(_model)
@@ -99,7 +124,8 @@ func _show_picture(flat: bool) -> void:
 	$Surface.visible = not flat
 	if _model:
 		_model.visible = not flat
-	$Canvas/Help.text = HELP % ("mesh" if flat else "picture")
+	var other := "mesh" if flat else "picture"
+	$Canvas/Help.text = NAMED_HELP % [", ".join($Relight.light_names().slice(0, 9)), other] if _asset.light_table else HELP % other
 
 
 func _fit_picture() -> void:

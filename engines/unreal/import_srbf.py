@@ -4,6 +4,7 @@
 node.json, images/ and Shaders/ must lie beside it. It copies Shaders/ into the project's folder of that name, imports the images below
 /Game/Srbf, combines the layers in a texture array, and creates a parameter collection for the lights and a material whose Custom node
 relights. `py "…/import_srbf.py" follow` then copies the level's first directional and first point or spot light into the collection.
+Named lights and light clouds have no collection: add Source/ to the project's module, and the component SrbfRelit to the mesh's actor.
 """
 
 import json
@@ -31,6 +32,14 @@ def copy_shaders():
     target.mkdir(parents=True, exist_ok=True)
     for path in (HERE / "Shaders").iterdir():
         shutil.copyfile(path, target / path.name)
+
+
+def copy_tables(name):
+    """What the component SrbfRelit reads; returns its path below Content."""
+    target = Path(unreal.Paths.convert_relative_path_to_full(unreal.Paths.project_content_dir())) / "Srbf"
+    target.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(HERE / "SrbfTables.bin", target / f"{name}.bin")
+    return f"Srbf/{name}.bin"
 
 
 def import_texture(file, folder, filtered, compression):
@@ -140,6 +149,8 @@ def make_material(node, folder, textures, collection):
 def follow_lights():
     """Copy the level's first directional light and first point or spot light into the collection's defaults."""
     node = read_node()
+    if not node["lights"]:
+        raise RuntimeError("expected an asset lit by a collection, found one of named lights or of a cloud; add the component SrbfRelit")
     folder = f"{ROOT}/{name_of(node)}"
     collection = unreal.load_asset(folder + "/Lights")
     values = dict(node["lights"])
@@ -183,9 +194,13 @@ def main():
     gray = unreal.TextureCompressionSettings.TC_GRAYSCALE
     textures = {"Layers": make_layers(node, folder, hdr)}
     for name, file in node["textures"].items():
-        textures[name] = import_texture(file, folder, name == "Ambient", {"Table": exact, "Clusters": gray}.get(name, hdr))
-    make_material(node, folder, textures, make_collection(node, folder))
-    unreal.log(f"srbf: {folder}/Relit is ready; assign it to a mesh, then run this script again with the word follow")
+        kind = {"Table": exact, "Weights": exact, "Clusters": gray}.get(name, hdr)
+        textures[name] = import_texture(file, folder, name == "Ambient", kind)
+    make_material(node, folder, textures, make_collection(node, folder) if node["lights"] else None)
+    then = "run this script again with the word follow"
+    if not node["lights"]:
+        then = f"add the component SrbfRelit to its actor, with the tables {copy_tables(name_of(node))}"
+    unreal.log(f"srbf: {folder}/Relit is ready; assign it to a mesh, then {then}")
 
 
 if __name__ == "__main__":

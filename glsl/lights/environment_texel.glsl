@@ -3,7 +3,7 @@
    use:    vec4 srbfEnvironmentTexel(ivec2 texel, ivec2 size, bool cut)
    domain: u = 1/2 - atan2(y, x) / 2 pi, row 0 towards +z; cut: what is below the map's own horizon has solid angle 0, and a row that
            straddles it is cut there, its center the middle of what is left
-   twin:   srbf.lights.environment_samples
+   twin:   srbf.light_geometry.environment_samples
    cite:   - */
 #include "lights/sine_cosine.glsl"
 

@@ -5,7 +5,7 @@
    domain: pointLights in fours as srbfUnpackPointLight takes them, the first pointLightCount of them in use; receiver in their frame,
            meters; result: how many shine there. So many entries hold, in .xyz, the unit direction (0 where the receiver coincides with
            the point light) and color times strength; the rest are 0. Lights whose cone misses the receiver are left out
-   twin:   srbf.lights.light_vectors
+   twin:   srbf.light_geometry.light_vectors
    cite:   Wong2005, fig. 8 to 10 */
 #include "lights/point_light_strength.glsl"
 #include "lights/light_direction.glsl"

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 /* srbfShadowFraction: how much of a 3 x 3 texel neighborhood is not above a receiver, by percentage-closer filtering.
    use:    float srbfShadowFraction(highp sampler2D heights, vec2 uv, float height, vec2 slope, float bias)
-   domain: heights: the nearest occluder's, along the light; slope: rise of the receiver's plane per map texel in x and in y, meters
+   domain: heights: the nearest occluder's, along the light; slope: rise of the receiver's plane per map texel in x and in y. All in meters
+           for a sun; one over meters of depth for a light inside the scene
    twin:   srbf.visibility.shadow.fraction
    cite:   Reeves1987 */
 float srbfShadowFraction(highp sampler2D heights, vec2 uv, float height, vec2 slope, float bias) {

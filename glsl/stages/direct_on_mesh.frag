@@ -7,6 +7,7 @@ precision highp int;
 precision highp sampler2D;
 
 #include "combine/direct.glsl"
+#include "shadow/rounded_share.glsl"
 #include "shadow/shadow_fraction.glsl"
 #include "shadow/shadow_place.glsl"
 
@@ -16,6 +17,7 @@ uniform sampler2D faces;    // normals of the triangles
 uniform sampler2D heights;
 uniform sampler2D transmittance;
 uniform sampler2D wallHeights;
+uniform bool walls;  // whether any of the scene is translucent
 uniform vec3 across;
 uniform vec3 up;
 uniform vec3 toLight;
@@ -25,9 +27,8 @@ uniform float weight;
 
 layout(location = 0) out vec4 response;
 
-const float STEEPEST = 64.0;   // meters per meter: a steeper receiver's plane is ignored
-const float BIAS = 0.5;        // map texels
-const float TERMINATOR = 0.1;  // cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021]
+const float STEEPEST = 64.0;  // meters per meter: a steeper receiver's plane is ignored
+const float BIAS = 0.5;       // map texels
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
@@ -35,17 +36,16 @@ void main() {
     vec4 shading = texelFetch(normals, at, 0);
     vec3 normal = shading.xyz;
     vec3 face = texelFetch(faces, at, 0).xyz;
-    float NoL = dot(normal, toLight);
-    float NgL = dot(face, toLight);
-    float lifted = clamp(NoL < TERMINATOR ? 2.0 - (NgL + NoL) / TERMINATOR : 1.0 - NgL / TERMINATOR, 0.0, 1.0);
-    lifted = shading.a == 0.0 ? 0.0 : lifted;
+    float lifted = shading.a == 0.0 ? 0.0 : srbfRoundedShare(dot(normal, toLight), dot(face, toLight));
     vec3 place = srbfShadowPlace(point.xyz + normal * (shading.a * lifted), across, up, toLight, low, extent);
     vec3 plane = mix(face, normal, lifted);
     float step = extent / float(textureSize(heights, 0).x);
     vec2 slope = clamp(-vec2(dot(plane, across), dot(plane, up)) / max(dot(plane, toLight), 1.0 / STEEPEST), -STEEPEST, STEEPEST) * step;
     float bias = BIAS * step;
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
-    float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
-    visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
+    if (walls) {
+        float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
+        visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
+    }
     response = vec4(srbfDirect(normal, toLight, visibility) * (weight * point.a), 1.0);
 }

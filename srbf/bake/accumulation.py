@@ -28,7 +28,8 @@ class Sum:
     """The sum of a light's `samples` samples, rendered in `passes` passes; arrays (H, W, 3) float32, None where not kept.
 
     whole: sum over samples of all light. direct: of an indirect capture, its direct diffuse part. squares: sum over passes of the pass's
-    samples times the square of the image that the pass alone gives; the noise of validation lights is estimated from it.
+    samples times the square of the image that the pass alone gives; the noise of validation lights is estimated from it. harmonics:
+    (H, W, 3 K), those of the radiance toward every viewer.
     """
 
     passes: int
@@ -36,15 +37,19 @@ class Sum:
     whole: Float32[ndarray, "H W 3"] | None
     direct: Float32[ndarray, "H W 3"] | None = None
     squares: Float32[ndarray, "H W 3"] | None = None
+    harmonics: Float32[ndarray, "H W M"] | None = None
 
-    def with_pass(self, samples: int, whole: ndarray, direct: ndarray | None, squares: bool) -> Sum:
-        """The sum with one more pass, of which `whole` and `direct` (H, W, 3) are the means over `samples` samples."""
+    def with_pass(
+        self, samples: int, whole: ndarray, direct: ndarray | None, squares: bool, harmonics: Float32[ndarray, "H W M"] | None = None
+    ) -> Sum:
+        """The sum with one more pass, of which `whole`, `direct` (H, W, 3) and `harmonics` are the means over `samples` samples."""
         return Sum(
             self.passes + 1,
             self.samples + samples,
             _added(self.whole, whole * np.float32(samples)),
             None if direct is None else _added(self.direct, direct * np.float32(samples)),
             _added(self.squares, (whole if direct is None else whole - direct) ** 2 * np.float32(samples)) if squares else None,
+            None if harmonics is None else _added(self.harmonics, harmonics * np.float32(samples)),
         )
 
     @property
@@ -56,6 +61,10 @@ class Sum:
     def direct_mean(self) -> Float32[ndarray, "H W 3"] | None:
         return None if self.direct is None else self.direct / np.float32(self.samples)
 
+    @property
+    def harmonics_mean(self) -> Float32[ndarray, "H W M"] | None:
+        return None if self.harmonics is None else self.harmonics / np.float32(self.samples)
+
     def noise_variance(self) -> Float32[ndarray, "H W 3"]:
         """Unbiased variance of the mean, from the differences of the passes: (sum s x^2 - (sum s x)^2 / S) / ((passes - 1) S)."""
         assert self.whole is not None and self.squares is not None and self.passes > 1
@@ -65,6 +74,7 @@ class Sum:
 
 
 NOTHING = Sum(0, 0, None)
+PARTS = ("whole", "direct", "squares", "harmonics")  # of a sum, in order
 
 
 class Accumulation:
@@ -97,13 +107,13 @@ class Accumulation:
         """The sum of `light`; an empty one where its file is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
             passes, samples = (int(n) for n in stored["counts"])
-            arrays = {name: stored[name] for name in ("whole", "direct", "squares") if name in stored}
-            return Sum(passes, samples, arrays.get("whole"), arrays.get("direct"), arrays.get("squares"))
+            arrays = [stored[name] if name in stored else None for name in PARTS]
+            return Sum(passes, samples, *arrays)
         return NOTHING
 
     def write(self, light: PlannedLight, total: Sum, keep: bool, checksum: str = "") -> None:
         """Write `total`, whose images have this `checksum`; without `keep` only its counts."""
-        arrays = {"whole": total.whole, "direct": total.direct, "squares": total.squares} if keep else {}
+        arrays = {name: getattr(total, name) for name in PARTS} if keep else {}
         with files.atomic_path(self._path(light.index)) as temporary:
             counts = np.array([total.passes, total.samples])
             np.savez(temporary, counts=counts, checksum=np.array(checksum), **{k: v for k, v in arrays.items() if v is not None})
@@ -159,6 +169,6 @@ def remove(folder: Path) -> None:
     shutil.rmtree(folder / ACCUMULATION, ignore_errors=True)
 
 
-def _added(total: ndarray | None, part: ndarray) -> Float32[ndarray, "H W 3"]:
+def _added(total: ndarray | None, part: ndarray) -> Float32[ndarray, "H W C"]:
     part = np.asarray(part, np.float32)
     return part if total is None else total + part

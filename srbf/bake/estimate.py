@@ -14,7 +14,7 @@ import numpy as np
 
 from srbf.bake.checks import bytes_needed
 from srbf.bake.job import base_job
-from srbf.bake.request import Rendered, RenderRequest
+from srbf.bake.request import RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
@@ -37,9 +37,8 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
         probe = lights[len(lights) // 3]
-        channels: tuple[Rendered, ...] = ("response", "direct") if settings.transport == "indirect" else ("response",)
         counts = (1, 1, 1 + PROBE_SAMPLES)
-        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=channels) for i, n in enumerate(counts)]
+        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=probe.parts) for i, n in enumerate(counts)]
         job = base_job(bake.scene, settings, scratch, requests)
         facts: dict[str, Any] = {}
         seconds, image_bytes = [0.0] * len(requests), 0
@@ -50,9 +49,10 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
                 elif event["event"] == "rendered":
                     seconds[event["light"]] = event["seconds"]
                     image_bytes = 0
-                    for file in event["files"].values():
-                        write_image(scratch / "probe.exr", np.clip(np.load(scratch / file), -6e4, 6e4), "half")
-                        image_bytes += (scratch / "probe.exr").stat().st_size
+                    for part, file in event["files"].items():
+                        pixels = np.clip(np.load(scratch / file), -6e4, 6e4)
+                        write_image(scratch / "probe.exr", pixels[:, :, :3], "half")
+                        image_bytes += (scratch / "probe.exr").stat().st_size * (len(probe.harmonics_files) if part == "toward" else 1)
     # The first render includes passing the scene to Cycles: the second and third give the cost of the others.
     per_sample = max(0.0, seconds[2] - seconds[1]) / PROBE_SAMPLES
     fixed = max(0.0, seconds[1] - per_sample)
@@ -64,7 +64,11 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
-    if settings.points is not None:
+    if settings.light_set is not None:
+        train_from = {"named": "lights of the scene", "cloud": "point lights in free space", "patches": "patches of the surfaces"}[
+            settings.light_set.kind
+        ]
+    elif settings.points is not None:
         train_from = f"point lights {settings.points.spacing:g} m apart"
     else:
         train_from = settings.domain if settings.light_list is None else "from the light list"

@@ -15,6 +15,7 @@ from srbf.bake import accumulation
 from srbf.bake.accumulation import ACCUMULATION
 from srbf.bake.former_folder import FORMER, adopt
 from srbf.bake.images import PREPARED, SCENE_FILE, SEAMS
+from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE
 from srbf.bake.shard import Shard
 from srbf.channels import CHANNELS, file_name
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
@@ -37,13 +38,17 @@ BEFORE_IMAGES = (
     FORMER,
     "lights",
     "direct",
+    "harmonics",
 )  # what a bake may leave that never wrote an image
 WRITTEN = (
     "lights",
     "direct",
+    "harmonics",
     *(file_name(name) for name in (*CHANNELS, SEAMS)),
     "uv.json",
     SCENE_FILE,
+    LIGHT_SET_FILE,
+    PATCHES_FILE,
     ACCUMULATION,
     FORMER,
     SCRATCH,
@@ -152,7 +157,7 @@ def is_finished(folder: Path, identity: dict[str, Any], force: bool, restart: bo
     done, begun = folder / MANIFEST, folder / STATE
     if not done.is_file() and not begun.is_file():
         others = [p for p in folder.iterdir() if p.name not in BEFORE_IMAGES and ".partial" not in p.name]
-        if others or any(any((folder / name).glob("*")) for name in ("lights", "direct")):
+        if others or any(any((folder / name).glob("*")) for name in ("lights", "direct", "harmonics")):
             raise OutputExistsError(f"expected an empty folder or a capture at {folder}, found other files; choose another")
         return False
     finished = done.is_file() and not begun.is_file()
@@ -211,7 +216,7 @@ def sweep(folder: Path) -> None:
     if log.is_file() and log.stat().st_size > LONGEST_LOG:
         log.write_bytes(log.read_bytes()[-LONGEST_LOG // 16 :])
     shutil.rmtree(folder / SCRATCH, ignore_errors=True)
-    for place in ("", "lights/", "direct/", f"{ACCUMULATION}/"):
+    for place in ("", "lights/", "direct/", "harmonics/", f"{ACCUMULATION}/"):
         for partial in folder.glob(f"{place}.*.partial*"):
             partial.unlink()
 

@@ -14,6 +14,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Int
 from srbf.bake.accumulation import ACCUMULATION, load_array, save_array
 from srbf.bake.settings import PlannedLight
+from srbf.bake.viewers import project, viewer_directions
 from srbf.channels import CHANNELS, GEOMETRY, file_name
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
@@ -45,6 +46,7 @@ class CaptureImages:
         self._residual: Float32[ndarray, "H W 3"] | None = None
         self._nearest: Int[ndarray, "H W"] | None = None
         self._size: tuple[int, ...] = (0, 0)
+        self._normals: Float32[ndarray, "H W 3"] | None = None
         self.prepared: dict[str, Any] | None = None
         path = folder / ACCUMULATION / PREPARED
         if path.is_file():
@@ -123,34 +125,67 @@ class CaptureImages:
         mean = dilate(mean, self._nearest)
         return mean if self._residual is None else mean - self._residual
 
-    def publish(self, light: PlannedLight, own: Float32[ndarray, "H W 3"], direct: Float32[ndarray, "H W 3"] | None = None) -> None:
+    def harmonics(self, light: PlannedLight, toward: Float32[ndarray, "H W N"]) -> Float32[ndarray, "H W M"]:
+        """Harmonics of the radiance toward the viewers of a light's pass; BakeError for another size."""
+        assert light.gloss is not None
+        viewers = len(viewer_directions(light.gloss))
+        if toward.shape != (*self._size, 3 * viewers):
+            raise BakeError(f"expected {viewers} viewers of light {light.index} from Blender, found {toward.shape}; see the bake's log")
+        if self._normals is None:
+            self._normals = read_image(self._folder / file_name("normal"), 3)
+        return project(toward, self._normals, light.gloss)
+
+    def publish(
+        self,
+        light: PlannedLight,
+        own: Float32[ndarray, "H W 3"],
+        direct: Float32[ndarray, "H W 3"] | None = None,
+        harmonics: Float32[ndarray, "H W M"] | None = None,
+    ) -> None:
         """Write one light's response as half floats, values beyond their range clipped with a warning.
 
-        `direct`, where given, is subtracted from it and written first, to a file of its own: a light whose image exists has both.
+        `direct`, where given, is subtracted from it and written first, to a file of its own: a light whose image exists has both. So are
+        the `harmonics`, which have no direct light.
         """
+        if harmonics is not None:
+            self._publish_harmonics(light, harmonics)
         if direct is not None:
             if not np.isfinite(direct).all():
                 raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
             direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
             own = own - direct  # as stored, so that the two add up again
             write_image(self._folder / light.direct_file, direct, "half")
-        beyond = int((np.abs(own) > HALF_MAX).sum())
-        if beyond:
-            self._say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
-            own = np.clip(own, -HALF_MAX, HALF_MAX)
-        write_image(self._folder / light.file, own, "half")
+        write_image(self._folder / light.file, self._clipped(light, own), "half")
 
-    def checksum(self, light: PlannedLight, apart: bool) -> str:
-        """Checksum of the light's images on disk, empty where one is missing; `apart`: there are two."""
-        paths = [self._folder / name for name in (light.file, *([light.direct_file] if apart else []))]
+    def _publish_harmonics(self, light: PlannedLight, harmonics: Float32[ndarray, "H W M"]) -> None:
+        every = self._clipped(light, dilate(harmonics, self._nearest))
+        for k, file in enumerate(light.harmonics_files):
+            own = every[:, :, 3 * k : 3 * k + 3]
+            if k == 0 and self._residual is not None:  # what shines still, alike toward all viewers
+                own = own - self._residual * np.float32(np.sqrt(4 * np.pi))
+            write_image(self._folder / file, own, "half")
+
+    def _clipped(self, light: PlannedLight, own: Float32[ndarray, "H W C"]) -> Float32[ndarray, "H W C"]:
+        if not np.isfinite(own).all():
+            raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
+        beyond = int((np.abs(own) > HALF_MAX).sum())
+        if not beyond:
+            return own
+        self._say(f"light {light.index}: {beyond} values past half float's {HALF_MAX:.0f} are clipped to it")
+        return np.clip(own, -HALF_MAX, HALF_MAX)
+
+    def checksum(self, light: PlannedLight) -> str:
+        """Checksum of the light's images on disk, empty where one is missing."""
+        names = (light.file, *([light.direct_file] if light.has_direct else []), *light.harmonics_files)
+        paths = [self._folder / name for name in names]
         if not all(path.is_file() for path in paths):
             return ""
         return hashlib.sha256("".join(files.sha256_of(path) for path in paths).encode()).hexdigest()
 
-    def published(self, light: PlannedLight, apart: bool) -> Float32[ndarray, "H W 3"]:
-        """The published response to a light; of an indirect capture (`apart`), the sum of its two images."""
+    def published(self, light: PlannedLight) -> Float32[ndarray, "H W 3"]:
+        """The published response to a light; the sum of its two images where its direct light is kept apart."""
         image = read_image(self._folder / light.file, 3)
-        return image + read_image(self._folder / light.direct_file, 3) if apart else image
+        return image + read_image(self._folder / light.direct_file, 3) if light.has_direct else image
 
     def _load(self, stored: dict[str, Any]) -> None:
         prepared = stored.get("prepared")

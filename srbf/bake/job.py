@@ -7,8 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from srbf.bake.images import ASKED_FOR
+from srbf.bake.light_sets import LIGHT_SET_FILE, NamedSet, PlacedLight
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
+from srbf.bake.viewers import viewer_directions
+from srbf.sphere import point_set
 
 AMBIENT_SEED = -1  # the light index of the image without a light
 COVERAGE_SAMPLES = 64
@@ -17,21 +20,37 @@ PROBES = 12  # about so many lights choose the transmittance of translucent mate
 
 def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | None, scratch: Path) -> dict[str, Any]:
     """The job of a worker that renders requests as they come; with nothing `prepared` it first sends what the receiver's images need."""
-    train = [light for light in plan_lights(settings) if light.role == "train"]
+    if settings.light_set is None:
+        train = [light.placed for light in plan_lights(settings) if light.role == "train"]
+        probes = train[:: max(1, len(train) // PROBES)]
+    else:
+        probes = [PlacedLight("directional", tuple(direction)) for direction in point_set("hammersley", PROBES, "sphere").tolist()]
     first = prepared is None
+    shines = first and not isinstance(settings.light_set, NamedSet)  # whose lights include all that emits
     return {
         **base_job(scene, settings, scratch),
         "serve": True,
         "channels": list(ASKED_FOR) if first else [],
-        "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if first else None,
-        "probes": [light.placed() for light in train[:: max(1, len(train) // PROBES)]],
+        "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if shines else None,
+        "probes": [light.json() for light in probes],
         "transmittances": None if prepared is None else prepared["transmittances"],
     }
 
 
 def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Sequence[RenderRequest] = ()) -> dict[str, Any]:
-    """A job of `requests` alone, and what every job says of scene and receiver. Keys: see `blender_bake.__main__.run`."""
+    """A job of `requests` alone, and what every job says of scene and receiver. Keys: see `blender_bake.__main__.run`.
+
+    What a light set knows of the scene goes into a file in `scratch`.
+    """
+    light_set = settings.light_set
+    lit_by: dict[str, Any] = {"kind": "own"}
+    if isinstance(light_set, NamedSet):
+        lit_by = {"kind": "named", "groups": list(light_set.groups)}
+    elif light_set is not None:
+        light_set.write(scratch / LIGHT_SET_FILE)
+        lit_by = {"kind": light_set.kind, "file": str((scratch / LIGHT_SET_FILE).resolve())}
     return {
+        "lit_by": lit_by,
         "scene": str(scene.resolve()),
         "scene_name": settings.scene,
         "receiver": settings.receiver.job(),
@@ -47,6 +66,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "channels": [],
         "ambient": None,
         "probes": [],
+        "viewers": None if settings.gloss is None else viewer_directions(settings.gloss).tolist(),
         "transmittances": None,
         "requests": [request.message() for request in requests],
     }

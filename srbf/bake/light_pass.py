@@ -25,8 +25,9 @@ def add_pass(images: CaptureImages, accumulation: Accumulation, task: Task, resp
     for image in (response.whole, response.direct):
         if image is not None:
             images.require_size(light, image)
-    total = total.with_pass(task.samples, response.whole, response.direct, task.squares)
+    harmonics = None if response.toward is None else images.harmonics(light, response.toward)
+    total = total.with_pass(task.samples, response.whole, response.direct, task.squares, harmonics)
     own = images.own_light(light, total.mean)
-    images.publish(light, own, total.direct_mean)
-    accumulation.write(light, total, task.keep, images.checksum(light, response.direct is not None))
+    images.publish(light, own, total.direct_mean, total.harmonics_mean)
+    accumulation.write(light, total, task.keep, images.checksum(light))
     return own

@@ -44,16 +44,19 @@ def capture_manifest(
         **({"receiver": receivers[0]} if len(receivers) == 1 else {"receivers": receivers}),
         "lights": [
             {
-                **light.placed(),
+                **light.placed.json(),
                 "role": light.role,
                 "file": light.file,
-                **({"direct": light.direct_file} if apart else {}),
+                **({"direct": light.direct_file} if light.has_direct else {}),
+                **({} if light.gloss is None else {"harmonics": list(light.harmonics_files)}),
                 "samples": samples,
             }
             for light, samples in lights
         ],
         **({"scene": SCENE_FILE, "direct": {"sun_angle": settings.sun_angle, **prepared["sampling"]}} if apart else {}),
+        **({} if settings.gloss is None else {"harmonics": {"order": settings.gloss}}),
         **manifest_keys(prepared["channels"]),
+        **({} if settings.light_set is None else settings.light_set.manifest()),
         **({SEAMS: file_name(SEAMS)} if prepared["seams"] else {}),
         "source": source,
     }

@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from srbf.bake.light_sets import LightSet, NamedSet
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, plan_lights
 from srbf.errors import InputError
@@ -93,13 +94,25 @@ def arguments(settings: BakeSettings) -> list[str]:
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",
         "light-bounds": None if points is None or points.box is None else ",".join(map(repr, points.box)),
+        **_light_set(settings.light_set),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
     flags += [f"--no-cast-shadow={name}" for name in settings.no_shadow]
+    flags += [f"--light-group={name}" for name in getattr(settings.light_set, "groups", ())]
     flags += ["--keep-scene-lights"] if settings.keep_scene_lights else []
     return flags + (["--denoise"] if settings.denoise else [])
+
+
+def _light_set(light_set: LightSet | None) -> dict[str, Any]:
+    if light_set is None:
+        return {}
+    if isinstance(light_set, NamedSet):
+        return {"light-set": light_set.kind}
+    box = None if light_set.box is None else ",".join(map(repr, light_set.box))
+    count = {"lights" if light_set.kind == "cloud" else "patches": light_set.count}
+    return {"light-set": light_set.kind, **count, "grid": light_set.spacing, "light-bounds": box}
 
 
 def _flags(bake: Bake) -> list[str]:

@@ -41,20 +41,13 @@ class PointGrid:
     def parse(light_set: str, light_bounds: str | None) -> PointGrid:
         """From the command line: `point:SPACING` and `x0,y0,z0,x1,y1,z1`; InputError on other words."""
         kind, _, spacing = light_set.partition(":")
-        box: Box | None = None
         try:
             meters = float(spacing)
         except ValueError:
             kind, meters = "", 0.0
         if kind != "point":
             raise InputError(f"expected `light_set` point:SPACING, the spacing in meters, found {light_set!r}")
-        if light_bounds is not None:
-            try:
-                x0, y0, z0, x1, y1, z1 = (float(word) for word in light_bounds.split(","))
-                box = (x0, y0, z0, x1, y1, z1)
-            except ValueError as error:
-                raise InputError(f"expected `light_bounds` x0,y0,z0,x1,y1,z1 in meters, found {light_bounds!r}") from error
-        return PointGrid(meters, box)
+        return PointGrid(meters, parse_box(light_bounds))
 
     def places(self, validation: int, holdout: int) -> tuple[Float64[ndarray, "L 3"], Float64[ndarray, "V 3"], Float64[ndarray, "H 3"]]:
         """(train, validation, holdout) positions, m; InputError where they are not known yet, or too few."""
@@ -67,3 +60,17 @@ class PointGrid:
         """JSON for the manifest: spacing, box, and a checksum of the positions, which the lights hold."""
         places = json.dumps([self.grid, self.random])
         return {"spacing": self.spacing, "box": self.box, "positions": hashlib.sha256(places.encode()).hexdigest()}
+
+
+def parse_box(text: str | None) -> Box | None:
+    """`x0,y0,z0,x1,y1,z1` in meters; InputError on anything else."""
+    if text is None:
+        return None
+    try:
+        x0, y0, z0, x1, y1, z1 = (float(word) for word in text.split(","))
+    except ValueError as error:
+        raise InputError(f"expected `light_bounds` x0,y0,z0,x1,y1,z1 in meters, found {text!r}") from error
+    box = (x0, y0, z0, x1, y1, z1)
+    if not (np.isfinite(box).all() and x0 <= x1 and y0 <= y1 and z0 <= z1):
+        raise InputError(f"expected a box x0,y0,z0,x1,y1,z1 with each first value the smaller, found {text!r}")
+    return box

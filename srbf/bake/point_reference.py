@@ -12,6 +12,7 @@ import numpy as np
 from srbf import methods
 from srbf.asset import Asset
 from srbf.bake.job import AMBIENT_SEED, base_job
+from srbf.bake.light_sets import PlacedLight
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, noise_seed
 from srbf.bake.worker import Worker
@@ -106,7 +107,8 @@ def _render(
     chosen = asset.manifest["source"].get("settings", {}).get("scene")
     settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
     lights = [
-        PlannedLight(i, tuple(place.tolist()), "holdout", samples, noise_seed(seed, i), "point") for i, place in enumerate(point_lights)
+        PlannedLight(i, PlacedLight("point", tuple(place.tolist())), "holdout", samples, noise_seed(seed, i))
+        for i, place in enumerate(point_lights)
     ]
     requests = [RenderRequest(light, light.samples, light.seed) for light in lights]
     images: list[np.ndarray] = []

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
-from srbf.bake.settings import PlannedLight
-
-Rendered = Literal["response", "direct", "denoised"]
+from srbf.bake.settings import PlannedLight, Rendered
 
 
 @dataclass(frozen=True)
@@ -16,8 +14,9 @@ class RenderRequest:
 
     light: None for the scene's own light alone (the ambient image).
     region: flat indices of the receivers to render, row by row from the top; None: all. A worker refuses a region that it cannot render.
-    channels: which images. `response`, all of the light; `direct`, its direct diffuse part, of the same seed; `denoised`, the response
-    without its noise, biased.
+    channels: which images. `response`, all of the light; `direct`, its direct diffuse part, of the same seed; `indirect`, the rest;
+    `denoised`, the response without its noise, biased; `toward`, the radiance toward each of the job's viewers, of an indirect capture
+    without the direct diffuse light.
     """
 
     light: PlannedLight | None
@@ -29,7 +28,7 @@ class RenderRequest:
     def message(self) -> dict[str, Any]:
         """As JSON, one line to the worker. It replies with one event: the light's index, and a file for each of `channels`."""
         return {
-            "light": None if self.light is None else {"index": self.light.index, **self.light.placed()},
+            "light": None if self.light is None else {"index": self.light.index, **self.light.placed.json()},
             "samples": self.samples,
             "seed": self.seed,
             "region": None if self.region is None else list(self.region),

@@ -21,6 +21,7 @@ from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
+from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
@@ -30,6 +31,7 @@ from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, Worker
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.io import files
+from srbf.io.image import write_image
 from srbf.receiver_images import MANIFEST
 
 if TYPE_CHECKING:
@@ -163,7 +165,8 @@ class Bake:
                 if folder.is_finished(self.folder, identity, force, restart):
                     return False
                 folder.sweep(self.folder)
-                for name in (ACCUMULATION, "lights", *(["direct"] if self.settings.transport == "indirect" else [])):
+                apart = ["direct"] if self.settings.transport == "indirect" else []
+                for name in (ACCUMULATION, "lights", *apart, *([] if self.settings.gloss is None else ["harmonics"])):
                     files.make_folder(self.folder / name)
                 files.make_folder(self.folder / SCRATCH)
                 _Passes(self, identity, reporter, shard).run()
@@ -217,7 +220,6 @@ class _Passes:
         self._images = CaptureImages(bake.folder, reporter.say)
         self._accumulation = Accumulation(bake.folder, self._lights)
         self._auto = bake.settings.samples == "auto"
-        self._apart = bake.settings.transport == "indirect"
         self._keep = bake.keeps_accumulation
         self._goal = 1 if self._auto else int(bake.settings.samples)
         self._first = FirstLights(judged, bake.settings.receiver.place, reporter.say)
@@ -246,6 +248,7 @@ class _Passes:
             else:
                 self._record(self._images.prepared["facts"]["blender"])
             self._check_lights()
+            self._write_light_set()
             try:
                 self._passes(pool)
             except KeyboardInterrupt:
@@ -297,7 +300,7 @@ class _Passes:
             return
         if self._shard is not None:
             return
-        if not self._first.lit and all(float(self._images.published(light, self._apart).max()) <= 0 for light in self._lights):
+        if not self._first.lit and all(float(self._images.published(light).max()) <= 0 for light in self._lights):
             raise self._first.black(len(self._lights))  # rendered by shards of too few lights each to check
         if self._keep:
             (self._folder / STATE).unlink()
@@ -309,12 +312,12 @@ class _Passes:
         for light in self._lights:
             if self._accumulation.passes(light) == 0:
                 continue
-            if self._images.checksum(light, self._apart) != self._accumulation.checksum(light):
+            if self._images.checksum(light) != self._accumulation.checksum(light):
                 total = self._accumulation.read(light)
                 if total.whole is None:
                     self._accumulation.forget(light)
                 else:
-                    self._images.publish(light, self._images.own_light(light, total.mean), total.direct_mean)
+                    self._images.publish(light, self._images.own_light(light, total.mean), total.direct_mean, total.harmonics_mean)
             if self._needs_squares(light) and self._accumulation.read(light).squares is None:
                 self._accumulation.forget(light)
             if self._accumulation.samples(light) < self._goal_of(light) and not self._accumulation.can_grow(light):
@@ -341,7 +344,7 @@ class _Passes:
         samples = goal - done if denoise else next_samples(light, done, goal, first)
         seed = noise_seed(self._settings.seed, light.index, level)
         keep = self._keep or done + samples < goal
-        return Task(light, samples, seed, level, self._needs_squares(light), keep, denoise, self._apart)
+        return Task(light, samples, seed, level, self._needs_squares(light), keep, denoise)
 
     def _take(self, task: Task, response: Response | RemoteResult) -> None:
         light = task.light
@@ -372,7 +375,7 @@ class _Passes:
             raise BakeError(
                 f"expected pass {task.before + 1} of light {task.light.index} in {self._folder}; do all machines see the same folder?"
             )
-        return self._images.published(task.light, self._apart) if self._first.looking else np.empty(0)
+        return self._images.published(task.light) if self._first.looking else np.empty(0)
 
     def _is_enough(self) -> bool:
         """For `samples=auto`: measure the error at this number of samples, and whether the last doubling lowered it enough."""
@@ -411,6 +414,15 @@ class _Passes:
             curve = stopping.record(self._curve)
             manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)
             files.write_json(self._folder / MANIFEST, manifest)
+
+    def _write_light_set(self) -> None:
+        """What a cloud knows of the scene: for a fit, and for a bake that goes on later."""
+        light_set = self._settings.light_set
+        if isinstance(light_set, CloudSet) and not (self._folder / LIGHT_SET_FILE).is_file():
+            assert light_set.found is not None
+            write_image(self._folder / PATCHES_FILE, light_set.found.patches.cells.image(), "float")
+            tested = self._settings.validation + self._settings.holdout
+            light_set.write(self._folder / LIGHT_SET_FILE, light_set.key(self._identity["scene_sha256"], tested, self._settings.seed))
 
     def _record(self, blender: str) -> None:
         """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""

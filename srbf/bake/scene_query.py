@@ -10,14 +10,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from srbf.bake.folder import STATE
+from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlaces, LightSet, NamedSet
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.patches import patches_of
+from srbf.visibility.surface_cells import Fragments
 
+SHOWN = 8  # names in a line
+OPEN = 0.2  # share of rays that leave the scene, from which it is called open
 MULTIPLE = 4  # texels that a side computed from a density is rounded up to: block compression needs it
 
 
@@ -31,7 +39,8 @@ def ask_scene(
     """The facts that a `question` asks of a .blend, see `blender_bake.scene_query`; needs no bake, and writes nothing.
 
     scene_name: which scene of the .blend; None: the active one. blender: an installed Blender's executable; None: this Python's bpy.
-    `say` gets a line for each warning. Raises InputError where there is no .blend, BakeError where Blender fails.
+    `say` gets a line for each warning. `arrays` of the facts are those that the worker handed over in files.
+    Raises InputError where there is no .blend, BakeError where Blender fails.
     """
     require_scene(scene)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
@@ -42,6 +51,7 @@ def ask_scene(
             for event in worker.events(say):
                 if event["event"] == "facts":
                     facts = event
+                    facts["arrays"] = {key: np.load(scratch / file) for key, file in event.get("files", {}).items()}
     if facts is None:
         raise BakeError("expected facts of the scene from Blender, found none; run again, and look at the scene if it happens twice")
     return facts
@@ -133,6 +143,61 @@ def with_free_point_lights(bake: Bake, say: Callable[[str], None] = lambda line:
     )
     known = replace(points, box=(x0, y0, z0, x1, y1, z1), grid=grid, random=free)
     return replace(bake, settings=replace(settings, points=known))
+
+
+def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -> Bake:
+    """The bake with what its light set has of the scene: names, or free places and patches; unchanged where they are known.
+
+    Those of a bake begun in its folder are kept, so that it resumes with the same lights. InputError where the scene has no light.
+    """
+    settings, light_set = bake.settings, bake.settings.light_set
+    if light_set is None or light_set.is_known:
+        return bake
+    tested = settings.validation + settings.holdout
+    if isinstance(light_set, CloudSet):
+        require_scene(bake.scene)
+        kept = light_set.read(bake.folder / LIGHT_SET_FILE, light_set.key(files.sha256_of(bake.scene), tested, settings.seed))
+        if kept.is_known:
+            return replace(bake, settings=replace(settings, light_set=kept))
+    found = _ask(bake, light_set.question(tested, settings.seed), say)
+    known: LightSet
+    if isinstance(light_set, NamedSet):
+        entries = tuple((entry["name"], tuple(entry["objects"])) for entry in found["named"])
+        if not entries:
+            raise InputError(f"expected lights in {bake.scene}, found none: no light object, no emission and a black world; add one")
+        if len(entries) > MOST_NAMES:
+            raise InputError(f"expected at most {MOST_NAMES} named lights, found {len(entries)}; gather them by `light_group`")
+        say(f"{len(entries)} named lights: {', '.join(name for name, _ in entries[:SHOWN])}{', …' if len(entries) > SHOWN else ''}")
+        known = replace(light_set, entries=entries)
+    else:
+        known = _with_places(light_set, found, settings.seed, say)
+    return replace(bake, settings=replace(settings, light_set=known))
+
+
+def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Callable[[str], None]) -> CloudSet:
+    """The set with free places and patches, from the facts of its scene."""
+    arrays, places = found["arrays"], found["places"]
+    x0, y0, z0, x1, y1, z1 = places["box"]
+    free = np.array(places["places"], np.float64).reshape(-1, 3)
+    occluders = EmbreeTriangles(arrays["occluders"])
+    patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)
+    if patches.count == 0:
+        raise InputError(
+            "expected surfaces that reflect light around the free places, found none; choose another `light_bounds`, or make them diffuse"
+        )
+    train, random = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("train", "random"))
+    lights = f"{patches.count} patches" if light_set.kind == "patches" else f"{len(train)} point lights"
+    say(
+        f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
+        f"{places['skipped']} places are in or near geometry"
+    )
+    if places.get("open_share", 0) > OPEN:
+        say(
+            f"the scene is open: {places['open_share']:.0%} of rays from the free places leave it; lights are captured in that box "
+            "alone, and distant light is not: `light_bounds` gives another box"
+        )
+    box = (x0, y0, z0, x1, y1, z1)
+    return replace(light_set, found=FoundPlaces(train, random, free, box, patches))
 
 
 def _sized(bake: Bake, width: int, height: int) -> Bake:

@@ -11,14 +11,17 @@ from typing import Any, Literal
 
 import numpy as np
 
+from srbf.bake.light_sets import LightSet, PlacedLight
 from srbf.bake.point_lights import PointGrid
-from srbf.captured_light import LightKind, Role
+from srbf.basis.exitant_harmonics import MAX_ORDER
+from srbf.captured_light import ROLES, LightKind, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
 from srbf.receiver_images import Quantity, Transport
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 Kind = Literal["lightmap", "vertices", "view"]
+Rendered = Literal["response", "direct", "indirect", "denoised", "toward"]  # images of a light that a worker renders
 Unwrap = Literal["smart", "lightmap-pack", "keep"]
 LARGEST_SIDE = 16384
 
@@ -187,12 +190,16 @@ class BakeSettings:
         `combined`, or `indirect`: direct light is kept apart.
     points
         Point lights instead of directional ones.
+    light_set
+        The scene's own lights by name, or lights inside the scene, instead of directional ones.
     no_shadow
         Names of objects that cast no shadow.
     denoise
         Denoise a view's train images.
     scene
         One of the .blend's scenes; None: the active one.
+    gloss
+        Order of the spherical harmonics that hold the radiance toward every viewer, 1 to 4; None: the radiance toward one alone.
 
     Raises
     ------
@@ -226,9 +233,11 @@ class BakeSettings:
     light_list: Path | None = None
     transport: Transport = "combined"
     points: PointGrid | None = None  # point lights instead of directional ones
+    light_set: LightSet | None = None  # named lights, or lights inside the scene
     no_shadow: tuple[str, ...] = ()  # objects that cast no shadow
     denoise: bool = False  # of a view's train images
     scene: str | None = None  # of the .blend's scenes; None: the active one
+    gloss: int | None = None  # order of the harmonics of the viewer's direction
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -249,8 +258,12 @@ class BakeSettings:
             raise InputError(f"expected a size of at most {LARGEST_SIDE} texels per side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
-        if self.transport == "indirect" and self.receiver.kind == "vertices":
+        if self.transport == "indirect" and self.receiver.kind == "vertices" and self.light_set is None:
             raise InputError("expected vertices with transport combined, found indirect: rays have no footprint to spread over at a point")
+        if self.light_set is not None:
+            self._check_light_set(self.light_set)
+        if self.gloss is not None:
+            self._check_gloss(self.gloss)
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
                 raise InputError("expected point lights without `light_list` and `sun_angle`, which belong to directional ones")
@@ -260,6 +273,29 @@ class BakeSettings:
                 raise InputError(
                     "expected `transport=combined` with point lights, found indirect: only a sun's direct light can be left out"
                 )
+
+    def _check_light_set(self, light_set: LightSet) -> None:
+        what = f"`light_set={light_set.kind}`"
+        if self.points is not None or self.light_list is not None or self.sun_angle > 0:
+            raise InputError(f"expected {what} without `light_list` and `sun_angle`, which belong to directional lights")
+        if self.samples == "auto":
+            raise InputError(f"expected a number of `samples` with {what}, found auto, which measures by fits of directional lights")
+        if self.denoise:
+            raise InputError(f"expected {what} without `denoise`, which belongs to directional lights")
+        if light_set.kind == "named" and self.keep_scene_lights:
+            raise InputError(f"expected {what} without `keep_scene_lights`: the scene's lights are what is captured")
+        if light_set.kind == "patches" and self.transport != "indirect":
+            raise InputError(f"expected `transport=indirect` with {what}, found combined: what patches reflect is indirect light")
+
+    def _check_gloss(self, order: int) -> None:
+        if not 1 <= order <= MAX_ORDER:
+            raise InputError(f"expected `gloss` of order 1 to {MAX_ORDER}, found {order}")
+        if self.light_set is None or self.light_set.kind != "cloud":
+            found = "others" if self.light_set is None else self.light_set.kind
+            raise InputError(f"expected `light_set=cloud` with `gloss`, found {found}; leave `gloss` out")
+        if self.receiver.kind == "view" or self.quantity != "radiance":
+            found = "a view, which has one viewer" if self.receiver.kind == "view" else "irradiance, which no viewer changes"
+            raise InputError(f"expected the radiance of a lightmap or of vertices with `gloss`, found {found}")
 
     def with_matched_sun(self) -> BakeSettings:
         """The settings with a sun angle of the train lights' mean spacing: penumbrae as soft as that many lights can resolve.
@@ -281,23 +317,27 @@ class BakeSettings:
         >>> few > many > 0
         True
         """
-        if self.points is not None:
-            raise InputError("expected directional lights for a matched sun, found point lights; leave `sun_angle` out")
+        if self.points is not None or self.light_set is not None:
+            found = "point lights" if self.points is not None else "others"
+            raise InputError(f"expected directional lights for a matched sun, found {found}; leave `sun_angle` out")
         train = [light.place for light in plan_lights(self) if light.role == "train"]
         return replace(self, sun_angle=min(mean_spacing(np.array(train)), float(np.pi)))
 
     def record(self) -> dict[str, Any]:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
-        record = asdict(self)
+        record = asdict(replace(self, light_set=None))
         record["receiver"] = self.receiver.record()
         record["no_shadow"] = list(self.no_shadow)
-        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None)):
+        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None), ("gloss", None)):
             if record[name] == old:
                 del record[name]  # as in captures older than these settings
-        del record["points"]
-        if self.points is not None:
+        del record["points"], record["light_set"]
+        if self.points is not None or self.light_set is not None:
             for directional in ("lights", "domain", "sun_angle", "light_list"):
                 del record[directional]
+        if self.light_set is not None:
+            record["light_set"] = self.light_set.record()
+        elif self.points is not None:
             record["points"] = self.points.record()
         elif self.light_list is not None:
             read_light_list(self.light_list)
@@ -307,14 +347,32 @@ class BakeSettings:
 
 @dataclass(frozen=True)
 class PlannedLight:
-    """A light to bake: index in the capture, unit direction or position (m), role, samples per texel, seed of its noise, kind."""
+    """A light to bake: index in the capture, what and where it is, role, samples per texel, seed of its noise.
+
+    `parts`: which images the worker renders of it, the one that the capture keeps first; `direct` is kept in a file of its own.
+    """
 
     index: int
-    place: tuple[float, float, float]
+    placed: PlacedLight
     role: Role
     samples: int
     seed: int
-    kind: LightKind = "directional"
+    parts: tuple[Rendered, ...] = ("response",)
+    gloss: int | None = None
+
+    @property
+    def place(self) -> tuple[float, float, float]:
+        """Unit direction or position (m), by which lights are spread over the time of a bake; 0 of named lights."""
+        return self.placed.place
+
+    @property
+    def kind(self) -> LightKind:
+        return self.placed.kind
+
+    @property
+    def has_direct(self) -> bool:
+        """Whether its direct light is kept apart."""
+        return "direct" in self.parts
 
     @property
     def file(self) -> str:
@@ -325,37 +383,49 @@ class PlannedLight:
         """The direct light that an indirect capture's image lacks."""
         return f"direct/{self.index:04d}.exr"
 
-    def placed(self) -> dict[str, Any]:
-        """Its kind and its direction or position, as JSON for manifest and worker."""
-        return {"kind": self.kind, ("direction" if self.kind == "directional" else "position"): list(self.place)}
+    @property
+    def harmonics_files(self) -> tuple[str, ...]:
+        """The images of its radiance's harmonics; none where it is captured toward one viewer."""
+        count = 0 if self.gloss is None else (self.gloss + 1) ** 2
+        return tuple(f"harmonics/{self.index:04d}_{k:02d}.exr" for k in range(count))
 
 
 def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
-    """Train lights (Hammersley, the light list's, or a grid of point lights), then validation and holdout: uniform random, more samples."""
-    kind: LightKind = "directional"
-    if settings.points is not None:
-        kind = "point"
-        train, validation, holdout = settings.points.places(settings.validation, settings.holdout)
+    """Train lights (Hammersley, the light list's, a grid of point lights, or those of a set), then validation and holdout: random ones."""
+    apart = settings.transport == "indirect"
+    parts: dict[Role, tuple[Rendered, ...]] = dict.fromkeys(ROLES, ("response", "direct") if apart else ("response",))
+    if settings.light_set is not None:
+        train = settings.light_set.train()
+        tested = settings.light_set.tested(settings.validation + settings.holdout)
+        validation, holdout = tested[: settings.validation], tested[settings.validation :]
+        # The direct light of train lights is of no use; that of a patch is part of what it reflects.
+        parts["train"] = ("indirect",) if apart and settings.light_set.kind != "patches" else ("response",)
+    elif settings.points is not None:
+        places = settings.points.places(settings.validation, settings.holdout)
+        train, validation, holdout = ([PlacedLight("point", tuple(place)) for place in group.tolist()] for group in places)
     else:
         if settings.light_list is not None:
-            train = np.array([entry.place for entry in read_light_list(settings.light_list)])
-            domain = domain_of(train)
+            directions = np.array([entry.place for entry in read_light_list(settings.light_list)])
+            domain = domain_of(directions)
         else:
             domain = settings.domain
-            train = point_set("hammersley", settings.lights, domain)
+            directions = point_set("hammersley", settings.lights, domain)
         rng = np.random.default_rng(settings.seed)
-        validation = random_directions(settings.validation, domain, rng)
-        holdout = random_directions(settings.holdout, domain, rng)
-    groups: list[tuple[Role, np.ndarray, int]] = [
+        random = (random_directions(count, domain, rng) for count in (settings.validation, settings.holdout))
+        groups = (directions, *random)
+        train, validation, holdout = ([PlacedLight("directional", tuple(place)) for place in group.tolist()] for group in groups)
+    if settings.gloss is not None:
+        parts = {role: (*own, "toward") for role, own in parts.items()}
+    planned: list[PlannedLight] = []
+    roles: list[tuple[Role, list[PlacedLight], int]] = [
         ("train", train, 1 if settings.samples == "auto" else settings.samples),
         ("validation", validation, settings.holdout_samples),
         ("holdout", holdout, settings.holdout_samples),
     ]
-    planned: list[PlannedLight] = []
-    for role, places, samples in groups:
-        for x, y, z in places:
+    for role, lights, samples in roles:
+        for light in lights:
             index = len(planned)
-            planned.append(PlannedLight(index, (float(x), float(y), float(z)), role, samples, noise_seed(settings.seed, index), kind))
+            planned.append(PlannedLight(index, light, role, samples, noise_seed(settings.seed, index), parts[role], settings.gloss))
     return planned
 
 

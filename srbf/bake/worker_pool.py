@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy import ndarray
 
-from srbf.bake.request import Rendered, RenderRequest
+from srbf.bake.request import RenderRequest
 from srbf.bake.settings import PlannedLight
 from srbf.bake.worker import Worker, WorkerDiedError
 from srbf.errors import BakeError
@@ -34,7 +34,7 @@ class Task:
     """One pass of a light: `samples` more of it, by their own `seed`, to what `before` passes gave.
 
     `squares`: its sum of squares is wanted too. `keep`: keep the sum, since more passes may follow. `denoise`: the response is to be
-    denoised. `direct`: its direct light is wanted too.
+    denoised.
     """
 
     light: PlannedLight
@@ -44,22 +44,25 @@ class Task:
     squares: bool = False
     keep: bool = False
     denoise: bool = False
-    direct: bool = False
 
     @property
     def request(self) -> RenderRequest:
         """What the worker is asked for."""
-        channels: tuple[Rendered, ...] = ("response", "direct") if self.direct else ("denoised",) if self.denoise else ("response",)
+        channels = ("denoised",) if self.denoise else self.light.parts
         return RenderRequest(self.light, self.samples, self.seed, channels=channels)
 
 
 @dataclass(frozen=True)
 class Response:
-    """What a worker rendered for a task, (H, W, 3) float32; `direct`: its direct light, of an indirect capture."""
+    """What a worker rendered for a task, (H, W, 3) float32; `direct`: its direct light, of an indirect capture.
+
+    `toward`, (H, W, 3 S): the radiance toward S viewers, where asked for.
+    """
 
     whole: ndarray
     direct: ndarray | None
     seconds: float
+    toward: ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -267,7 +270,7 @@ class WorkerPool:
                     )
                 slot.rendered += 1
                 images = {name: _taken(slot.scratch / file) for name, file in event["files"].items()}
-                return Response(images[wanted[0]], images.get("direct"), event["seconds"])
+                return Response(images[wanted[0]], images.get("direct"), event["seconds"], images.get("toward"))
         return None
 
     def _next(self) -> Task | None:

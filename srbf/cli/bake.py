@@ -9,10 +9,11 @@ from typing import Literal
 import typer
 
 from srbf.bake.estimate import estimate
+from srbf.bake.light_sets import parse_light_set
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
-from srbf.bake.scene_query import objects_of, with_frame, with_free_point_lights, with_size
+from srbf.bake.scene_query import objects_of, with_frame, with_free_point_lights, with_light_set, with_size
 from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
 from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import WorkerPoolSettings
@@ -43,9 +44,13 @@ def bake(
     domain: flag.DomainOfLights = "hemisphere",
     light_list: flag.LightList = None,
     light_set: flag.LightSet = None,
+    light_group: flag.LightGroups = None,
+    patches: flag.PatchCount = None,
+    grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
     transport: flag.TransportOf = "combined",
+    gloss: flag.Gloss = None,
     validation: flag.ValidationLights = 16,
     holdout: flag.HoldoutLights = 32,
     size: flag.SizeOf = None,
@@ -72,11 +77,16 @@ def bake(
     width, height = size or Size(DEFAULT_SIZE, DEFAULT_SIZE)
     with flags_alone():
         named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
-        points = None if light_set is None else PointGrid.parse(light_set, light_bounds)
+        by_grid = light_set is not None and light_set.startswith("point:")
+        points = PointGrid.parse(str(light_set), light_bounds) if by_grid else None
+        inside = None
+        if light_set is not None and not by_grid:
+            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds)
     if not (named or collection):
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
-    if light_set is None and light_bounds is not None:
-        raise typer.BadParameter("expected --light-set point:SPACING with --light-bounds, found none")
+    for name, value in (("--light-bounds", light_bounds), ("--light-group", light_group), ("--patches", patches), ("--grid", grid)):
+        if value and (light_set is None or (by_grid and name != "--light-bounds")):
+            raise typer.BadParameter(f"expected --light-set named, cloud or patches with {name}, found {light_set or 'none'}")
     pool = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
@@ -91,18 +101,20 @@ def bake(
                 validation=validation,
                 holdout=holdout,
                 holdout_samples=holdout_samples,
-                quantity=quantity or ("radiance" if one.kind == "view" else "irradiance"),
+                quantity=quantity or ("radiance" if one.kind == "view" or gloss is not None else "irradiance"),
                 seed=seed,
                 sun_angle=0.0 if sun_angle == "auto" else sun_angle,
                 keep_scene_lights=keep_scene_lights,
                 light_list=light_list,
                 transport=transport,
                 points=points,
+                light_set=inside,
                 no_shadow=tuple(no_cast_shadow or ()),
                 denoise=denoise,
                 scene=scene_name,
+                gloss=gloss,
             )
-            if sun_angle == "auto" and points is not None:
+            if sun_angle == "auto" and light_set is not None:
                 raise typer.BadParameter("expected directional lights with --sun-angle auto, found --light-set; leave one of them out")
         settings = settings.with_matched_sun() if sun_angle == "auto" else settings
         with flags_alone():
@@ -110,8 +122,8 @@ def bake(
 
     if collection:
         known = {one.name for one in named if one.kind == "lightmap"}
-        inside = objects_of(scene, collection, note, scene_name, blender)
-        named += [Receiver("lightmap", name, uv_layer, unwrap=unwrap) for name in inside if name not in known]
+        members = objects_of(scene, collection, note, scene_name, blender)
+        named += [Receiver("lightmap", name, uv_layer, unwrap=unwrap) for name in members if name not in known]
     with flags_alone():
         captures = captures_of(named, separate)
     several = len(captures) > 1 or separate
@@ -125,7 +137,7 @@ def bake(
         job = with_size(job, texels_per_meter if job.settings.receiver.kind == "lightmap" or not several else None, note)
         if size is None and job.settings.receiver.kind == "view":
             job = with_frame(job, DEFAULT_SIZE, force or restart, note)
-        job = with_free_point_lights(job, note)
+        job = with_light_set(with_free_point_lights(job, note), note)
         if farm is not None:
             write_bundle(job, job.folder, farm_tasks, force)
             note(f"wrote {job.folder / TEMPLATE}; try it by: openjd run {job.folder / TEMPLATE} -p file://{job.folder / PARAMETERS}")

@@ -68,7 +68,9 @@ KeepSceneLights = Annotated[
     bool, typer.Option("--keep-scene-lights", help="The scene's own lights and world become ambient light.", rich_help_panel=SCENE)
 ]
 
-Lights = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT, help="Hammersley directions to fit.", rich_help_panel=LIGHTS)]
+Lights = Annotated[
+    int, typer.Option(metavar="COUNT", parser=COUNT, help="Directions to fit (Hammersley), or lights of a cloud.", rich_help_panel=LIGHTS)
+]
 DomainOfLights = Annotated[
     Literal["sphere", "hemisphere"],
     typer.Option(help="Where the light comes from; hemisphere: from above the ground.", rich_help_panel=LIGHTS),
@@ -80,8 +82,34 @@ LightList = Annotated[
 LightSet = Annotated[
     str | None,
     typer.Option(
-        metavar="point:SPACING",
-        help="Point lights that fill a box, so many meters apart, instead of --lights.",
+        metavar="SET",
+        help="Other lights than directions. named: the scene's own, each by itself. cloud: --lights point lights in its free space. "
+        "patches: parts of its surfaces, for any light inside. point:SPACING: point lights that fill a box, so many meters apart.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+LightGroups = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--light-group",
+        metavar="COLLECTION",
+        help="named: the lights of a collection as one. Repeats.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+PatchCount = Annotated[
+    int | None,
+    typer.Option("--patches", metavar="COUNT", parser=COUNT, help="patches: how many (512).", show_default=False, rich_help_panel=LIGHTS),
+]
+GridSpacing = Annotated[
+    float | None,
+    typer.Option(
+        "--grid",
+        metavar="METERS",
+        parser=POSITIVE,
+        help="cloud: point lights on a grid, so far apart, instead of blue noise.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -90,7 +118,7 @@ LightBounds = Annotated[
     str | None,
     typer.Option(
         metavar="BOX",
-        help="x0,y0,z0,x1,y1,z1 of --light-set, m; default: all that renders.",
+        help="x0,y0,z0,x1,y1,z1 of lights inside the scene, m; default: all that renders.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -107,6 +135,17 @@ SunAngle = Annotated[
 TransportOf = Annotated[
     Literal["combined", "indirect"],
     typer.Option(help="All light, or all but the light's direct diffuse part.", rich_help_panel=LIGHTS),
+]
+Gloss = Annotated[
+    int | None,
+    typer.Option(
+        "--gloss",
+        metavar="ORDER",
+        parser=COUNT,
+        help="cloud: for glossy surfaces, the radiance toward any viewer, as spherical harmonics of order 1 to 4 (3).",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
 ]
 ValidationLights = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT_OR_NONE, help="Validation lights.", rich_help_panel=LIGHTS)]
 HoldoutLights = Annotated[

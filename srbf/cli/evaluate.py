@@ -10,13 +10,16 @@ import typer
 from srbf.asset import Asset
 from srbf.bake.point_reference import compare_with_point_lights
 from srbf.capture import Capture
+from srbf.captured_light import ROLES
 from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
+from srbf.evaluation.random_mixes import mix_errors
 from srbf.fitting.options import method_for
+from srbf.light_domain import domain_of_capture
 from srbf.relighting.direct_light import Added, chosen
 
 COMMAND = FitCommand
@@ -80,20 +83,42 @@ def evaluate(
             cells = [f"{row[name]['relative_rmse']:.3f} ({row[name]['scaled']:.3f})" for name in ("inverse-square", "linear")]
             typer.echo(f"{row['from']:7.2f} – {row['to']:6.2f} {cells[0]:>18} {cells[1]:>18} {row['texels']:>10}")
         return
+    images = Capture.open(reference)
     with progress_bar("evaluate") as update:
-        result = evaluate_capture(opened, Capture.open(reference), update, direct or "none")
+        result = evaluate_capture(opened, images, update, direct or "none")
+    if domain_of_capture(images).kind == "cloud":
+        _add_means(result)
+    if domain_of_capture(images).kind == "named" and direct in (None, "none"):
+        result["mixes"] = mix_errors(opened, images).as_dict()
     _print_errors(result, json)
+
+
+def _add_means(result: dict[str, Any]) -> None:
+    """The mean relative RMSE over the lights of each role, beside the pooled one; not of lights that do not say theirs."""
+    for role in ROLES:
+        values = [light["relative_rmse"] for light in result["lights"] if light["role"] == role and "relative_rmse" in light]
+        if role in result and values:
+            result[role]["relative_rmse_mean"] = sum(values) / len(values)
 
 
 def _print_errors(result: dict[str, Any], json: bool) -> None:
     if json:
         print_json(result)
         return
-    typer.echo(f"{'role':<14}{'lights':>7}{'rmse':>12}{'relative':>10}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
+    with_mean = any("relative_rmse_mean" in error for error in result.values() if isinstance(error, dict))
+    mean = f"{'mean':>8}" if with_mean else ""
+    typer.echo(f"{'role':<14}{'lights':>7}{'rmse':>12}{'relative':>10}{mean}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
     for role, error in result.items():
-        if role != "lights":
+        if role not in ("lights", "mixes"):
             count = sum(light["role"] == role for light in result["lights"])
+            mean = f"{error['relative_rmse_mean']:>8.4f}" if with_mean else ""
             typer.echo(
-                f"{role:<14}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{error['psnr']:>10.2f}"
+                f"{role:<14}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{mean}{error['psnr']:>10.2f}"
                 f"{error['psnr_pooled']:>8.2f}{error['peak']:>8.3g}"
             )
+    if "mixes" in result:
+        mixes = result["mixes"]
+        typer.echo(
+            f"{mixes['count']} random mixes: PSNR {mixes['psnr']:.2f} dB in the mean, {mixes['worst']:.2f} dB at worst, "
+            f"relative {mixes['relative_rmse']:.4f}, peak {mixes['peak']:.3g}"
+        )

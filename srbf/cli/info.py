@@ -11,6 +11,8 @@ from srbf.cli.parameters import Json
 from srbf.cli.terminal import print_json
 from srbf.info import describe
 
+MOST_NAMES = 8  # in a line
+
 
 def info(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="Folder of a capture or an asset.", show_default=False)],
@@ -28,4 +30,9 @@ def info(
 def _shown(value: object) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{key} {_shown(part)}" for key, part in value.items())
+    if isinstance(value, list) and value and all(isinstance(part, str) for part in value):
+        more = f" and {len(value) - MOST_NAMES} more" if len(value) > MOST_NAMES else ""
+        return ", ".join(value[:MOST_NAMES]) + more
+    if isinstance(value, list) and value and all(isinstance(part, (int, float)) for part in value):
+        return "(" + ", ".join(_shown(part) for part in value) + ")"
     return f"{value:.5g}" if isinstance(value, float) else str(value)

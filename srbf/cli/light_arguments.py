@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,18 @@ import numpy as np
 from srbf import schemas
 from srbf.errors import InputError
 from srbf.io import files
-from srbf.lights import DirectionalLight, EnvironmentLight, Falloff, Light, PointLight, SpotLight
+from srbf.lights import (
+    AreaLight,
+    DirectionalLight,
+    EnvironmentLight,
+    Falloff,
+    Light,
+    NamedLight,
+    PointLight,
+    SphereLight,
+    SpotLight,
+    Triple,
+)
 
 
 def parse_directional(text: str) -> DirectionalLight:
@@ -32,30 +45,80 @@ def parse_spot(text: str, a0: float, falloff: Falloff) -> SpotLight:
     return SpotLight(_xyz(n, 0), direction=_xyz(n, 3), inner=n[6], outer=n[7], a0=a0, falloff=falloff, **_color(n, 8))
 
 
+def parse_sphere(text: str, a0: float, falloff: Falloff) -> SphereLight:
+    """`X,Y,Z,SIZE[,R,G,B]`: center and radius in meters, irradiance at the distance a0."""
+    n = _numbers(text, (4, 7), "`sphere` X,Y,Z,SIZE[,R,G,B]")
+    return SphereLight(_xyz(n, 0), size=n[3], a0=a0, falloff=falloff, **_color(n, 4))
+
+
+def parse_area(text: str, a0: float) -> AreaLight:
+    """`X,Y,Z,UX,UY,UZ,VX,VY,VZ[,R,G,B]`: center and sides in meters, irradiance straight in front at the distance a0."""
+    n = _numbers(text, (9, 12), "`area` X,Y,Z,UX,UY,UZ,VX,VY,VZ[,R,G,B]")
+    return AreaLight(_xyz(n, 0), u=_xyz(n, 3), v=_xyz(n, 6), a0=a0, **_color(n, 9))
+
+
+def parse_named(text: str) -> NamedLight:
+    """`NAME=INTENSITY[,R,G,B]`: the name is all before the last `=`; intensity 1 is as the scene has the light set."""
+    name, equals, rest = text.rpartition("=")
+    usage = "`light` NAME=INTENSITY[,R,G,B], the intensity at least 0"
+    if not (name and equals):
+        raise InputError(f"expected {usage}, found {text!r}")
+    n = _numbers(rest, (1, 4), usage, text)
+    return _named(name, n[0], _xyz(n, 1) if len(n) > 1 else (1.0, 1.0, 1.0))
+
+
+def with_falloff(lights: Sequence[Light], falloff: Falloff) -> list[Light]:
+    """The same, point and spot lights with this falloff; spheres keep theirs."""
+    return [
+        replace(light, falloff=falloff) if isinstance(light, PointLight) and not isinstance(light, SphereLight) else light
+        for light in lights
+    ]
+
+
 def read_environment(path: Path) -> EnvironmentLight:
     """An equirectangular EXR or picture, its values taken as linear. What was done that is not plain is a warning."""
     return EnvironmentLight(_environment(path))
 
 
-def read_frames(path: Path) -> list[list[Light]]:
-    """The lights of every frame of a FRAMES.json; environment files are found beside it. ManifestError, InputError on bad ones."""
+def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
+    """The lights of every frame of a FRAMES.json; environment files are found beside it. ManifestError, InputError on bad ones.
+
+    `falloff`: of point and spot lights that do not say it.
+    """
     document = files.read_json(path)
     schemas.check(document, "frames", str(path))
     frames = []
     for number, frame in enumerate(document["frames"]):
         try:
-            frames.append([_light(entry, path.parent) for entry in frame["lights"]])
+            frames.append([_light(entry, path.parent, falloff) for entry in frame["lights"]])
         except InputError as error:
             raise InputError(f"{path}, frame {number}: {error}") from error
     return frames
 
 
-def _light(entry: dict[str, Any], folder: Path) -> Light:
+def _light(entry: dict[str, Any], folder: Path, falloff: Falloff) -> Light:
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
     if entry["kind"] == "environment":
         return EnvironmentLight(_environment(folder / fields.pop("file")), **fields)
-    kinds: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight}
+    if entry["kind"] == "named":
+        return _named(**fields)
+    if entry["kind"] in ("point", "spot"):
+        fields.setdefault("falloff", falloff)
+    kinds: dict[str, Any] = {
+        "directional": DirectionalLight,
+        "point": PointLight,
+        "spot": SpotLight,
+        "sphere": SphereLight,
+        "area": AreaLight,
+    }
     return kinds[entry["kind"]](**fields)
+
+
+def _named(name: str, intensity: float = 1.0, color: Triple = (1.0, 1.0, 1.0)) -> NamedLight:
+    if intensity < 0:
+        raise InputError(f"expected an intensity of at least 0 for the light {name!r}, found {intensity:g}")
+    red, green, blue = color
+    return NamedLight(name, (intensity * red, intensity * green, intensity * blue))
 
 
 def _environment(path: Path) -> np.ndarray:
@@ -67,13 +130,14 @@ def _environment(path: Path) -> np.ndarray:
     return picture.pixels
 
 
-def _numbers(text: str, counts: tuple[int, int], usage: str) -> list[float]:
+def _numbers(text: str, counts: tuple[int, int], usage: str, whole: str | None = None) -> list[float]:
+    """The numbers of a text of one of two lengths; InputError with the `whole` flag's text, by default this one."""
     try:
         numbers = [float(word) for word in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) not in counts or not np.isfinite(numbers).all():
-        raise InputError(f"expected {usage}, found {text!r}")
+        raise InputError(f"expected {usage}, found {text if whole is None else whole!r}")
     return numbers
 
 

@@ -103,6 +103,8 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
         return Annotated[
             Any, typer.Option(_flag(entry), parser=parser, metavar="|".join((*words, "NUMBER")), help=help_text, show_default=False)
         ]
+    if hints == {bool}:
+        return Annotated[bool | None, typer.Option(_flag(entry), help=help_text, show_default=False)]
     if hints == {int}:
         return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", parser=COUNT, help=help_text, show_default=False)]
     choices = tuple(dict.fromkeys(choice for hint in hints for choice in _choices(hint)))

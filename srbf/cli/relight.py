@@ -12,12 +12,23 @@ import typer
 from srbf import methods
 from srbf.asset import Asset
 from srbf.cli.flags import flags_alone
-from srbf.cli.light_arguments import parse_directional, parse_point, parse_spot, read_environment, read_frames
+from srbf.cli.light_arguments import (
+    parse_area,
+    parse_directional,
+    parse_named,
+    parse_point,
+    parse_sphere,
+    parse_spot,
+    read_environment,
+    read_frames,
+    with_falloff,
+)
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
+from srbf.light_domain import domain_of_asset
 from srbf.lights import Light
 from srbf.methods import outside_domain
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
@@ -46,13 +57,36 @@ def relight(
             show_default=False,
         ),
     ] = None,
+    sphere: Annotated[
+        list[str] | None, typer.Option(metavar="X,Y,Z,SIZE[,R,G,B]", help="Center, radius in meters, color. Repeats.", show_default=False)
+    ] = None,
+    area: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="X,Y,Z,UX,UY,UZ,VX,VY,VZ[,R,G,B]",
+            help="Center, its sides U and V in meters, color; shines towards U x V. Repeats.",
+            show_default=False,
+        ),
+    ] = None,
+    light: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=INTENSITY[,R,G,B]", help="One of the scene's own lights: 1 is as it is set, 0 off. Repeats.", show_default=False
+        ),
+    ] = None,
     environment: Annotated[
         list[Path] | None, typer.Option(metavar="IMAGE", help="Equirectangular environment map. Repeats.", show_default=False)
     ] = None,
     reference_distance: Annotated[
-        float, typer.Option(metavar="METERS", parser=POSITIVE, help="Distance a0 at which a point or spot light has its color.")
+        float, typer.Option(metavar="METERS", parser=POSITIVE, help="Distance a0 at which a light inside the scene has its color.")
     ] = 1.0,
-    falloff: Annotated[Literal["linear", "inverse-square"], typer.Option(help="Of point and spot lights.")] = "linear",
+    falloff: Annotated[
+        Literal["linear", "inverse-square"] | None,
+        typer.Option(
+            help="Of point and spot lights; default: linear for assets of distant lights, else inverse-square. Of spheres inverse-square.",
+            show_default=False,
+        ),
+    ] = None,
     lights: Annotated[Path | None, typer.Option(metavar="FRAMES.json", help="A folder of images, one a frame.", show_default=False)] = None,
     ambient_only: Annotated[bool, typer.Option("--ambient-only", help="No light: the ambient light that the scene itself emits.")] = False,
     direct: Annotated[
@@ -77,8 +111,11 @@ def relight(
     with flags_alone():
         placed: list[Light] = [
             *map(parse_directional, directional or []),
-            *(parse_point(text, reference_distance, falloff) for text in point or []),
-            *(parse_spot(text, reference_distance, falloff) for text in spot or []),
+            *(parse_point(text, reference_distance, falloff or "linear") for text in point or []),
+            *(parse_spot(text, reference_distance, falloff or "linear") for text in spot or []),
+            *(parse_sphere(text, reference_distance, falloff or "inverse-square") for text in sphere or []),
+            *(parse_area(text, reference_distance) for text in area or []),
+            *map(parse_named, light or []),
         ]
     has_light = bool(placed or environment)
     if lights is not None and has_light:
@@ -86,18 +123,24 @@ def relight(
     if ambient_only and (has_light or lights is not None):
         raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
     if not (has_light or ambient_only or lights is not None):
-        raise typer.BadParameter("expected a light, found none; add --directional, --point, --spot, --environment or --ambient-only")
+        raise typer.BadParameter(
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --environment or --ambient-only"
+        )
     picture = lights is None and output.suffix.lower() == ".png"
     if lights is None and output.suffix.lower() not in (".exr", ".png"):
         raise typer.BadParameter(f"expected an output named .exr or .png, found {output.name!r}")
     if picture and alpha == "premultiplied":
         raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     if lights is not None:
-        _relight_frames(asset, output, read_frames(lights), direct, renderer, alpha, force)
+        opened = Asset.open(asset)
+        frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
+        _relight_frames(opened, output, frames, direct, renderer, alpha, force)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
     opened = Asset.open(asset)
+    if falloff is None:
+        placed = with_falloff(placed, domain_of_asset(opened.manifest).falloff)
     opacity = alpha_of(opened)
     for line in outside_domain(opened, placed):
         note(line)
@@ -113,10 +156,9 @@ def relight(
 
 
 def _relight_frames(
-    asset: Path, output: Path, frames: list[list[Light]], direct: Direct | None, renderer: str, alpha: Alpha, force: bool
+    opened: Asset, output: Path, frames: list[list[Light]], direct: Direct | None, renderer: str, alpha: Alpha, force: bool
 ) -> None:
     """An image of each frame's lights in the folder `output`."""
-    opened = Asset.open(asset)
     opacity = alpha_of(opened)
     with (
         Added(opened, chosen(opened, direct)) as added,

@@ -35,8 +35,8 @@ def report(
     ],
     force: Force = False,
 ) -> None:
-    """Write one page to look at: errors at held-out lights, by bytes and in motion, and the article's figures, all inside it."""
-    from srbf.report import write_report
+    """Write one page to look at: errors at held-out lights, in motion, by bytes, on mixes or over places, and figures, all inside it."""
+    from srbf.report import check_domains, write_report
 
     single = output.suffix.lower() in (".html", ".htm")
     if single:
@@ -44,7 +44,7 @@ def report(
     else:
         check_replaceable(output, force, PAGE)
     opened, images = Asset.open(asset), Capture.open(capture)
-    images.require_directional("a report")
+    check_domains(opened, images)
     started = time.perf_counter()
     with progress_bar("evaluate") as update:
         errors = evaluate(opened, images, update)
@@ -67,9 +67,15 @@ def _with_direct(asset: Asset, capture: Capture) -> dict[str, Any]:
     if asset.transport != "indirect":
         return found
     role = next(role for role in ROLES[::-1] if capture.indices(role))
+    if not capture.has_direct_of((role,)):
+        note(f"no errors with direct light: {capture.folder} has no direct images of its {role} lights")
+        return found
+    tested, as_role = capture, role
+    if not capture.has_direct:  # patches have no direct light: the peak is that of the tested lights
+        tested, as_role = capture.with_roles(["train" if light.role == role else None for light in capture.lights]), "train"
     for key, direct in WITH_DIRECT.items():
         try:
-            found[key] = {role: evaluate(asset, capture, direct=direct, roles=(role,))[role]}
+            found[key] = {role: evaluate(asset, tested, direct=direct, roles=(as_role,))[as_role]}
         except SrbfError as error:
             note(f"no errors with --direct {direct}: {error}")
     return found

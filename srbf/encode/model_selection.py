@@ -56,13 +56,7 @@ class TexelSample:
     def of(capture: Capture, count: int = SAMPLE_TEXELS, share: float = 0.25, seed: int = 0) -> TexelSample:
         """`count` covered texels, or all; of large images only a `share` of the rows is read, in even strips."""
         train, validation = capture.indices("train"), capture.indices("validation")
-        covered = capture.coverage() >= COVERED
-        if not covered.any():
-            raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
-        texels = np.flatnonzero(_in_strips(covered, count, share))
-        if len(texels) > count:
-            runs = np.arange(count + 1) * len(texels) // count
-            texels = texels[(runs[:-1] + np.random.default_rng(seed).random(count) * np.diff(runs)).astype(np.int64)]
+        texels = sampled_texels(capture, count, share, seed)
         lights = [*train, *validation]
         domain = domain_of_capture(capture)
         return TexelSample(texels, capture.sample(lights, texels), domain.captured(capture, lights), len(train), domain)
@@ -132,6 +126,18 @@ def choose(
 def spread_candidates(typical: float, factors: Sequence[float] = SPREADS) -> list[float]:
     """Spreads around `typical` (rad) within the range of the R table."""
     return sorted({float(np.clip(typical * f, MIN_SPREAD, MAX_SPREAD)) for f in factors})
+
+
+def sampled_texels(capture: Capture, count: int, share: float = 1.0, seed: int = 0) -> Int[ndarray, " n"]:
+    """Flat indices of `count` covered texels, one of each of equal runs, or of all; of large images from a `share` of the rows."""
+    covered = capture.coverage() >= COVERED
+    if not covered.any():
+        raise InputError(f"expected covered texels in {capture.folder}, found coverage below {COVERED} everywhere")
+    texels = np.flatnonzero(_in_strips(covered, count, share))
+    if len(texels) > count:
+        runs = np.arange(count + 1) * len(texels) // count
+        texels = texels[(runs[:-1] + np.random.default_rng(seed).random(count) * np.diff(runs)).astype(np.int64)]
+    return texels
 
 
 def _in_strips(covered: Bool[ndarray, "H W"], count: int, share: float) -> Bool[ndarray, "H W"]:

@@ -17,9 +17,8 @@ from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
 from srbf.io.float16 import finite_to_float32
-from srbf.light_domain import domain_of_capture
-from srbf.lights import PointLight
-from srbf.methods import linear_response, responses
+from srbf.light_domain import light_of
+from srbf.methods import captured_responses
 from srbf.relighting.direct_light import Added, Direct
 
 PEAK_QUANTILE = 0.999
@@ -131,12 +130,11 @@ class TrainErrorAccumulator:
     def squares(self, asset: Asset, capture: Capture, floor: float = 0.0) -> tuple[Float64[ndarray, " L"], Float64[ndarray, " L"]]:
         """Sums of squared differences and of squared references, per light, over `texels`, both clamped at `floor`."""
         picked = asset.at(self.texels)
-        coordinates = domain_of_capture(capture).captured(capture, self.lights)
         sums = np.empty((2, len(self.lights)))
 
         def compare(task: int) -> None:
             rows = range(task * LIGHT_BATCH, min((task + 1) * LIGHT_BATCH, len(self.lights)))
-            relit = responses(picked, coordinates[rows.start : rows.stop])[:, 0]  # (b, n, 3)
+            relit = captured_responses(picked, capture, [self.lights[row] for row in rows])[:, 0]  # (b, n, 3)
             for row, response in zip(rows, relit, strict=True):
                 reference = self._responses[row]
                 if reference.dtype == np.float16:
@@ -179,8 +177,8 @@ def evaluate(
     -------
     dict
         By role a `RoleError` as a dict: `rmse` and `peak` in the capture's unit, `psnr` and `psnr_pooled` in dB. `lights` lists a
-        {file, role, rmse} per light. A role without lights is left out, and so are roles not in `roles`. The peak is the 99.9 %
-        quantile of the combined train references, 1 for 8-bit sources.
+        {file, role, rmse, relative_rmse} per light. A role without lights is left out, and so are roles not in `roles`. The peak is the
+        99.9 % quantile of the combined train references (of patches, of the point lights that test them), 1 for 8-bit sources.
 
     Raises
     ------
@@ -202,9 +200,11 @@ def evaluate(
     covered = _covered(capture)
     samples = dict.fromkeys(ROLES, int(covered.sum()) * 3)
     floor = -np.inf if reference.transport == "indirect" else 0.0
-    peaks = PeakHistogram() if watch is None else watch.peaks
-    if watch is None and (peak_source is not reference or "train" not in roles):
-        for _, block in peak_source.blocks(peak_source.indices("train")):
+    peak_lights = lights_of_peak(peak_source)
+    counted = peak_lights == peak_source.indices("train")
+    peaks = PeakHistogram() if watch is None or not counted else watch.peaks
+    if not counted or (watch is None and (peak_source is not reference or "train" not in roles)):
+        for _, block in peak_source.blocks(peak_lights):
             peaks.add(block[:, covered])
     squares: dict[int, float] = {}  # sum of squared differences per light
     powers: dict[int, float] = {}  # sum of squared references per light
@@ -220,12 +220,11 @@ def evaluate(
                 chosen = indices[first : first + len(block)]
                 for index, response, true in zip(chosen, _relit(asset, capture, chosen, added), block, strict=True):
                     true = true[covered]
-                    if role == "train" and peak_source is reference:
+                    if role == "train" and counted and peak_source is reference:
                         peaks.add(true)
                     squares[index], powers[index] = squared_errors(response[covered], true, floor)
                     progress(len(squares), total)
-    has_train = bool(capture.indices("train"))
-    peak = 1.0 if capture.source_bits == 8 or not has_train else peaks.quantile(PEAK_QUANTILE)
+    peak = 1.0 if capture.source_bits == 8 or not peak_lights else peaks.quantile(PEAK_QUANTILE)
     result: dict[str, Any] = {}
     for role in roles:
         indices = capture.indices(role)
@@ -235,11 +234,24 @@ def evaluate(
     if watch is not None and not watch.exact:
         result["train"]["texels"] = len(watch.texels)
     result["lights"] = [
-        {"file": light.file, "role": light.role, "rmse": float(np.sqrt(squares[i] / samples[light.role]))}
+        {
+            "file": light.file,
+            "role": light.role,
+            "rmse": float(np.sqrt(squares[i] / samples[light.role])),
+            "relative_rmse": float(np.sqrt(squares[i] / powers[i])) if powers[i] > 0 else 0.0,
+        }
         for i, light in enumerate(capture.lights)
         if i in squares
     ]
     return result
+
+
+def lights_of_peak(capture: Capture) -> list[int]:
+    """The lights whose images define the peak: the train lights; of patches, which are no lights, the point lights that test them."""
+    train = capture.indices("train")
+    if capture.kind != "patch":
+        return train
+    return [*capture.indices("validation"), *capture.indices("holdout")] or train
 
 
 def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) -> Iterator[Float32[ndarray, "P 3"]]:
@@ -247,16 +259,9 @@ def _relit(asset: Asset, capture: Capture, lights: Sequence[int], added: Added) 
 
     A captured point light is relit as a point light, inverse-square and with unit irradiance at 1 m.
     """
-    if capture.kind == "point":
-        for position in capture.positions(lights):
-            point_light = [PointLight(tuple(position), falloff="inverse-square")]
-            response, direct = linear_response(asset, point_light), added.response(point_light)
-            yield (response if direct is None else response + direct).reshape(-1, 3)
-        return
-    domain = domain_of_capture(capture)
-    coordinates = domain.captured(capture, lights)
-    for own, response in zip(coordinates, responses(asset, coordinates), strict=True):
-        direct = added.response([domain.light(own)])
+    for index, response in zip(lights, captured_responses(asset, capture, lights), strict=True):
+        light = light_of(capture.lights[index])
+        direct = None if light is None else added.response([light])
         yield (response if direct is None else response + direct).reshape(-1, 3)
 
 
@@ -287,7 +292,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
             raise InputError(f"expected an indirect asset for `direct={direct}`, found a combined one: it holds the direct light already")
         combined = capture.combined()
         return combined, combined
-    whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture
+    whole = capture.combined() if capture.transport == "combined" or capture.has_direct else capture  # patches have no direct light
     if direct == "none":
         if capture.transport == "combined":
             raise InputError(

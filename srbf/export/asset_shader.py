@@ -2,7 +2,8 @@
 
 `srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
 centers, scale and bias are constants of the shader, floats that need no decoding are not decoded, and an engine passes weights and
-point lights alone.
+point lights alone. Where lights are named, or stand in a cloud, all of them enter through the weights, and only `srbfAssetDirectional`
+is there.
 """
 
 from __future__ import annotations
@@ -15,7 +16,36 @@ from numpy import ndarray
 
 from srbf.asset import Asset
 from srbf.export.translation import PackFile, pack_files, parse
+from srbf.lights import PointLight
 from srbf.methods import method_of
+
+LAST = ["combine/finish.glsl", "combine/mip_level.glsl"]
+# By stem of the pack: the file and the function for assets all of whose lights are in the weights, which are a texture.
+WEIGHTED = {
+    "relighting_map": "combine/weighted.glsl",
+    "eigen_map": "combine/components_directional.glsl",
+    "clustered_eigen_map": "methods/clustered_eigen_map.glsl",
+}
+_WEIGHTED_GLSL = {
+    "relighting_map": """
+/* All lights of this asset: a texel of weights per map, in one row. */
+vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, float level, highp sampler2D weights) {
+    return srbfCombineWeighted(layers, uv, level, 0, weights, srbfScale, srbfBias);
+}
+""",
+    "eigen_map": """
+/* All lights of this asset: a row of weights, of the mean and of each component. */
+vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, highp sampler2D weights) {
+    return srbfCombineComponentsDirectional(layers, uv, 0, weights, 0, srbfScale, srbfBias);
+}
+""",
+    "clustered_eigen_map": """
+/* All lights of this asset: a row of weights a cluster, bilinear between texels. */
+vec3 srbfAssetDirectional(highp sampler2DArray layers, highp sampler2D clusters, vec2 uv, highp sampler2D weights) {
+    return srbfClusteredDirectionalFiltered(layers, clusters, uv, 0, weights, srbfScale, srbfBias);
+}
+""",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +65,30 @@ class AssetShader:
         return self.files[-1]
 
 
+def by_weights_alone(asset: Asset) -> bool:
+    """Whether every light enters through the weights of a frame, so that a texel costs the same under any number of lights."""
+    return not method_of(asset).local_lights([PointLight((0.0, 0.0, 0.0))])
+
+
 def counts(asset: Asset, pairs: bool = False) -> dict[str, int]:
     """What the pack asks for by `#define`, of one asset; InputError on one that no shader relights.
 
     `pairs`: relighting maps find the R table as values and differences, one fetch in place of two.
     """
-    return method_of(asset).shader_parts(asset, pairs).defines
+    defines = method_of(asset).shader_parts(asset, pairs).defines
+    return {key: count for key, count in defines.items() if not (key == "SRBF_POINT_LIGHTS" and by_weights_alone(asset))}
 
 
 def asset_shader(asset: Asset, defines: dict[str, int], prepare: Callable[[str, str], str]) -> AssetShader:
     """The shader of one asset with its `counts`, its files by `pack_files`."""
     method = method_of(asset)
     parts = method.shader_parts(asset)
-    needed = [f"methods/{method.stem()}.glsl", f"methods/{method.stem()}_lights.glsl", "combine/mip_level.glsl"]
-    return AssetShader(defines, parts.arrays, [*pack_files(needed, None, prepare), parse(parts.functions, "asset")])
+    stem = method.shader_stem(asset)
+    if by_weights_alone(asset):
+        needed, functions = [WEIGHTED[stem]], _WEIGHTED_GLSL[stem]
+    else:
+        needed, functions = [f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl"], parts.functions
+    return AssetShader(defines, parts.arrays, [*pack_files([*needed, *LAST], None, prepare), parse(functions, "asset")])
 
 
 def rows_of(values: ndarray, row: Callable[[str], str]) -> str:

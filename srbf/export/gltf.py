@@ -16,8 +16,10 @@ from srbf.export.settings import PLAIN, Settings, Written
 from srbf.export.texel_mesh import texel_mesh
 from srbf.io.files import atomic_path
 from srbf.io.glb import DAMAGE, Glb
-from srbf.lights import EnvironmentLight
-from srbf.methods import relight
+from srbf.light_domain import Cloud, Named, domain_of_asset
+from srbf.lights import EnvironmentLight, NamedLight
+from srbf.methods import method_of, relight
+from srbf.methods.over_lights import finish
 from srbf.relighting.alpha import alpha_of, write_png
 
 EXTENSION = "SRBF_relighting_map"
@@ -26,13 +28,14 @@ MODEL = "model.glb"
 UV_SET = 1  # TEXCOORD_1
 LINEAR_FILTER, CLAMP = 9729, 33071
 ENVIRONMENT_SIZE = (16, 32)  # texels of the white environment map
+CLOUD_PLACES = 24
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill `folder` with the asset, its layers in a .ktx2 file, and `model.glb` that points to it.
 
     The mesh is `settings.mesh`, else rebuilt from the position map, for a view a picture of its size. Its materials carry the extension,
-    {manifest, texCoord, and the `surface` material they had}; without it they show the asset under a white environment map, unlit.
+    {manifest, texCoord, and the `surface` material they had}; without it they show the asset as `under_white`, unlit.
     """
     notes: list[str] = []
     document, lit = _lit_document(asset, settings.mesh, notes)
@@ -50,7 +53,15 @@ def model(asset: Asset, mesh: Path | None = None) -> bytes:
 
 
 def under_white(asset: Asset) -> Float32[np.ndarray, "H W 3"]:
-    """The asset under a uniform environment map of radiance 1/pi (irradiance 1 on an open plane), or for radiance assets of radiance 1."""
+    """The asset under a uniform environment map of radiance 1/pi (irradiance 1 on an open plane), or for radiance assets of radiance 1.
+
+    Named lights: all of them as the scene has them set. A cloud: the mean over lights of irradiance 1 at 1 m all over the free space.
+    """
+    domain = domain_of_asset(asset.manifest)
+    if isinstance(domain, Named):
+        return relight(asset, [NamedLight(name) for name in domain.names])
+    if isinstance(domain, Cloud):
+        return finish(asset, method_of(asset).responses(asset, domain.probes(CLOUD_PLACES)).mean(axis=0))
     radiance = 1 / np.pi if asset.quantity == "irradiance" else 1.0
     return relight(asset, [EnvironmentLight(np.full((*ENVIRONMENT_SIZE, 3), radiance, np.float32))])
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import ShaderError
 from srbf.export import dds, exr, png
+from srbf.export.asset_shader import LAST, WEIGHTED
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
 from srbf.io import files
 from srbf.methods import method_of
-from srbf.registry import all_methods
 
 DATA = "asset"  # the folder of the asset's images, hidden from Godot's own importers
 IMPORTED = "asset.srbf"  # the file that Godot imports: it holds the path of asset.json
@@ -37,8 +37,9 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """
     method_of(asset).shader_parts(asset)  # refuses what no shader knows
     shutil.copytree(engine_root("godot"), folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns(".godot", "*.uid", "*.import"))
-    for name in (method.stem() for method in all_methods() if method.has_shader):
+    for name in WEIGHTED:
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))
+        files.write_text(folder / SHADERS / f"{name}_weighted.gdshaderinc", weighted_include(name))
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held
     writer = WRITERS[encoding] if settings.levels in ("auto", 0, 1) else dds.write
@@ -55,10 +56,19 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 def method_include(name: str) -> str:
     """A method of the shader pack for all lights at once, includes in place, in Godot's shading language: the text of a .gdshaderinc."""
-    source = f'#include "methods/{name}_lights.glsl"\n#include "combine/mip_level.glsl"\n'
+    return _include(name, f"methods/{name}_lights.glsl")
+
+
+def weighted_include(name: str) -> str:
+    """The same for assets all of whose lights are in the weights."""
+    return _include(f"{name}_weighted", WEIGHTED[name])
+
+
+def _include(name: str, path: str) -> str:
+    source = "".join(f'#include "{part}"\n' for part in (path, *LAST))
     text = translated(resolve_text(source, name).text)
     guard = f"SRBF_{name.upper()}_INCLUDED"
-    head = f"// SPDX-License-Identifier: MIT\n// From glsl/methods/{name}_lights.glsl and its includes, by srbf export --target godot.\n"
+    head = f"// SPDX-License-Identifier: MIT\n// From glsl/{path} and its includes, by srbf export --target godot.\n"
     return f"{head}#ifndef {guard}\n#define {guard}\n{text}#endif\n"
 
 

@@ -8,14 +8,14 @@ from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, PeakHistogram, psnr, squared_errors
 from srbf.light_domain import domain_of_asset
-from srbf.methods import responses as asset_responses
+from srbf.methods import method_of
 
-LIGHTS = 48  # white, directional, from Fibonacci points of the domain
+LIGHTS = 48  # of the domain: white and directional from Fibonacci points, mixes of names, or at free places of a cloud
 AT_A_TIME = 8
 
 
 def relit_psnr(asset: Asset, other: Asset) -> float:
-    """PSNR (dB) of `other` relit against `asset` relit, the mean over LIGHTS directions of the domain.
+    """PSNR (dB) of `other` relit against `asset` relit, the mean over LIGHTS lights of the domain.
 
     As DESIGN has it of captures: over covered texels, clamped at 0 (indirect responses unclamped), without ambient; the peak is the 99.9 %
     quantile of the asset's own pictures. MAX_PSNR where nothing differs.
@@ -26,9 +26,11 @@ def relit_psnr(asset: Asset, other: Asset) -> float:
     coordinates = domain_of_asset(asset.manifest).probes(LIGHTS)
     floor = -np.inf if asset.transport == "indirect" else 0.0
     peaks, squares = PeakHistogram(), []
-    for start in range(0, LIGHTS, AT_A_TIME):
+    if not len(coordinates):
+        raise InputError("expected free places in the asset to measure the loss on, found none; fit again")
+    for start in range(0, len(coordinates), AT_A_TIME):
         some = coordinates[start : start + AT_A_TIME]
-        references, responses = asset_responses(asset, some), asset_responses(other, some)
+        references, responses = (method_of(one).responses(one, some) for one in (asset, other))  # in the asset's own frame
         for reference, response in zip(references, responses, strict=True):
             true = reference[covered]
             peaks.add(true)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from srbf.asset import Asset
 from srbf.export import dds, exr
+from srbf.export.asset_shader import by_weights_alone
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.settings import PLAIN, Settings, Written
@@ -49,5 +50,6 @@ def unity_include(asset: Asset) -> str:
         f"#define SRBF_UNITY_SCALE {math.pi if radiance else 1.0}  // {'radiance' if radiance else 'irradiance'} in Unity's units",
         f"#define SRBF_ALBEDO(albedo) {'float3(1.0, 1.0, 1.0)' if radiance else '(albedo)'}",
         *(["#define SRBF_CLUSTERED"] if "cluster_index" in asset.tables else []),
+        *(["#define SRBF_WEIGHTS_ALONE  // every light is in _SrbfWeightRows"] if by_weights_alone(asset) else []),
     ]
     return asset_include(asset, pairs=True) + "\n" + "\n".join(defines) + '\n#include "Srbf/Shaders/SrbfUnity.hlsl"\n'

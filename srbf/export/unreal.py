@@ -9,15 +9,19 @@ from pathlib import Path
 from typing import Any
 
 from srbf.asset import Asset
-from srbf.export.asset_shader import rows_of
+from srbf.export.asset_shader import by_weights_alone, rows_of
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
+from srbf.export.light_tables import first_weights, table_file
 from srbf.export.settings import PLAIN, Settings, Written
 from srbf.io import files
+from srbf.io.image import write_image
 from srbf.methods import method_of
 
 DATA = "images"
 SCRIPT = "import_srbf.py"
+TABLES = "SrbfTables.bin"  # from which SrbfRelit makes a frame's weights
+WEIGHTS = "weights.exr"  # until it has
 # Inputs of the Custom node besides textures and positions; the material parameter collection holds them under these names.
 LIGHTS = {
     "SunDirection": (0.0, 0.0, 1.0, 0.0),  # towards the sun, Unreal's frame
@@ -31,7 +35,7 @@ LIGHTS = {
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` under a unique name, `node.json`, the Custom node, and the
-    editor script that imports all of it.
+    editor script that imports all of it. Named lights and clouds: also `Source/`, a component that makes their weights, and its tables.
 
     InputError on an asset that no shader relights.
     """
@@ -43,11 +47,17 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     files.write_text(folder / "Shaders" / f"{name}.ush", text)
     files.write_json(folder / "node.json", custom_node(written, name))
     shutil.copyfile(engine_root("unreal") / SCRIPT, folder / SCRIPT)
+    if by_weights_alone(written):
+        write_image(folder / DATA / WEIGHTS, first_weights(written), "float")
+        (folder / TABLES).write_bytes(table_file(written))
+        shutil.copytree(engine_root("unreal") / "Source", folder / "Source")
     return Written(("docs/engines/unreal.md: run import_srbf.py in the editor; it copies Shaders/ into the project",))
 
 
 def unreal_include(asset: Asset) -> str:
-    """`Srbf_*.ush`: the asset's functions, and Unreal's axes and units."""
+    """`Srbf_*.ush`: the asset's functions, and Unreal's axes and units where the shader sees lights."""
+    if by_weights_alone(asset):
+        return asset_include(asset)
     rows = rows_of(asset.asset_from_world, "{}".format)
     frame = f"// World to the asset's frame, by rows.\nstatic const float4x4 srbfAssetFromWorld = float4x4(\n{rows}\n);\n"
     return asset_include(asset) + "\n" + frame + "\n" + (engine_root("unreal") / "SrbfUnreal.ush").read_text(encoding="utf-8")
@@ -60,26 +70,34 @@ def custom_node(asset: Asset, name: str) -> dict[str, Any]:
     material multiplies by its base color, in Unreal's units, where a white Lambert surface under 1 lux gives 1 / pi.
     """
     clustered = "cluster_index" in asset.tables
-    textures = {"Table": asset.manifest["r_table" if "r_table" in asset.tables else "w_table"]["file"]}
+    weighted = by_weights_alone(asset)
+    textures = (
+        {"Weights": WEIGHTS} if weighted else {"Table": asset.manifest["r_table" if "r_table" in asset.tables else "w_table"]["file"]}
+    )
     if clustered:
         textures["Clusters"] = asset.manifest["cluster_index"]["file"]
     if "ambient" in asset.images:
         textures["Ambient"] = asset.manifest["ambient"]
     scale = 1.0 if asset.quantity == "radiance" else 1 / math.pi
     ambient = "Ambient.SampleLevel(AmbientSampler, UV, 0.0).rgb" if "Ambient" in textures else "float3(0.0, 0.0, 0.0)"
-    common = f"Layers, LayersSampler, {'Clusters, ' if clustered else ''}UV, Table"
-    code = [
-        f"float3 Sum = srbfAssetPoint({common}, float3(0.0, 0.0, 0.0), SrbfUnrealSun(SunDirection, SunColor));",
-        "SrbfPointLight PointLight = SrbfUnrealPointLight(PointLightPosition, PointLightColor, PointLightAxis, PointLightShape);",
-        f"Sum += srbfAssetPoint({common}, SrbfPlaceFromUnreal(WorldPosition), PointLight);",
-        f"return srbfFinish(Sum, {ambient}) * {scale!r};",
-    ]
+    drawn = f"Layers, LayersSampler, {'Clusters, ' if clustered else ''}UV"
+    if weighted:
+        level = "" if "scalars" in asset.manifest else "0.0, "
+        code = [f"return srbfFinish(srbfAssetDirectional({drawn}, {level}Weights), {ambient}) * {scale!r};"]
+    else:
+        common = f"{drawn}, Table"
+        code = [
+            f"float3 Sum = srbfAssetPoint({common}, float3(0.0, 0.0, 0.0), SrbfUnrealSun(SunDirection, SunColor));",
+            "SrbfPointLight PointLight = SrbfUnrealPointLight(PointLightPosition, PointLightColor, PointLightAxis, PointLightShape);",
+            f"Sum += srbfAssetPoint({common}, SrbfPlaceFromUnreal(WorldPosition), PointLight);",
+            f"return srbfFinish(Sum, {ambient}) * {scale!r};",
+        ]
     return {
         "include": f"/Project/{name}.ush",
-        "inputs": ["Layers", *textures, "UV", "WorldPosition", *LIGHTS],
+        "inputs": ["Layers", *textures, "UV", *([] if weighted else ["WorldPosition", *LIGHTS])],
         "textures": {key: f"{DATA}/{file}" for key, file in textures.items()},
         "layers": [f"{DATA}/{entry['file']}" for entry in asset.layers],
         "filtered": method_of(asset).filterable,
-        "lights": {key: list(value) for key, value in LIGHTS.items()},
+        "lights": {} if weighted else {key: list(value) for key, value in LIGHTS.items()},
         "code": "\n".join(code),
     }

@@ -12,11 +12,13 @@ from numpy import ndarray
 from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
+from srbf.captured_light import Role
 from srbf.encode.light_function_fit import choose_functions, dense_centers
 from srbf.encode.model_selection import TexelSample
 from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
+from srbf.light_domain import Directions, domain_of_capture
 from srbf.methods.protocol import Method
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
@@ -61,18 +63,19 @@ def within_budget(
     trial = capture.load(texels)
     trial = trial.with_roles([None if light.role == "holdout" else light.role for light in trial.lights])
     size, numbers = budget or DEFAULT_BUDGET, 3 * len(trial.indices("train"))
-    if not trial.indices("validation") and len(trial.indices("train")) < LEAST_LIGHTS:
-        simplest = next(iter(_candidates(size, len(covered), numbers)))
+    estimated = not trial.indices("validation") and domain_of_capture(trial).kind == Directions.kind
+    if estimated and len(trial.indices("train")) < LEAST_LIGHTS:
+        simplest = next(iter(_candidates(trial, size, len(covered), numbers)))
         say(f"fewer than {LEAST_LIGHTS} train lights and no validation lights: too few to compare methods by; taking {simplest}")
-        return replace(simplest, **settings)  # type: ignore[type-var]
-    missed = None if trial.indices("validation") else _between_lights(trial)
+        return _with(simplest, settings)
+    missed = _between_lights(trial) if estimated else None
     ratio = len(covered) / max(1, len(texels))
     sizes = [size] if psnr is None else range(LEAST_BUDGET, MOST_SIZE + 1, 4)
     best: tuple[float, Method] | None = None
     for tried_size in sizes:
-        for method in _candidates(tried_size, len(covered), numbers):
+        for method in _candidates(trial, tried_size, len(covered), numbers):
             tried = method.on_sample(ratio)  # as many texels per cluster as there will be
-            reached = _reached(replace(tried, **settings).encode(trial), trial, missed)  # type: ignore[type-var]
+            reached = _reached(_with(tried, settings).encode(trial), trial, missed)
             if best is None or reached > best[0] + WORTH:
                 best = (reached, method)
         assert best is not None, "no candidate fits"
@@ -83,13 +86,23 @@ def within_budget(
     if psnr is not None and reached < psnr:
         say(f"expected {psnr:g} dB on held-out lights of a sample, found {reached:.1f} at most; taking that")
     say(f"chose {method}")
-    return replace(method, **settings)  # type: ignore[type-var]
+    return _with(method, settings)
 
 
-def _candidates(size: int, texels: int, numbers: int) -> Iterable[Method]:
-    """What `size` bytes per texel can hold, fewest light functions first."""
+def _candidates(capture: Capture, size: int, texels: int, numbers: int) -> Iterable[Method]:
+    """What `size` bytes per texel can hold of the capture's lights, fewest light functions first."""
+    kind = domain_of_capture(capture).kind
     for method in all_methods():
-        yield from method.candidates(size, texels, numbers)
+        if kind in method.domains:
+            yield from method.candidates(size, texels, numbers)
+
+
+def _with(method: Method, settings: dict[str, Any]) -> Method:
+    """`method` with `settings`; InputError on one that it does not have."""
+    for name in settings:
+        if name not in method.settings():
+            raise InputError(f"`{name}` applies to other lights than those of this capture, which {method.name} fits; leave it out")
+    return replace(method, **settings)  # type: ignore[type-var]
 
 
 def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
@@ -107,9 +120,10 @@ def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
 
 
 def _reached(asset: Asset, capture: Capture, missed: Float64[ndarray, " L"] | None) -> float:
-    """PSNR (dB) of a trial on the validation lights, or its estimate from the train lights."""
+    """PSNR (dB) of a trial on the validation lights, or its estimate from the train lights; named lights are all there are."""
     if missed is None:
-        return float(evaluate(asset, capture, roles=("validation",))["validation"]["psnr"])
+        role: Role = "validation" if capture.indices("validation") else "train"
+        return float(evaluate(asset, capture, roles=(role,))[role]["psnr"])
     errors = evaluate(asset, capture, roles=("train",))
     squares = np.array([light["rmse"] ** 2 for light in errors["lights"]]) + missed
     return float(np.mean([psnr_of(errors["train"]["peak"], float(np.sqrt(square))) for square in squares]))

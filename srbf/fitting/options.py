@@ -130,9 +130,11 @@ def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool =
 
 
 def _shared_settings() -> set[str]:
-    """What `auto` hands on: settings that every candidate has."""
+    """What `auto` hands on: settings that every candidate of some light domain has."""
     candidates = [m for m in all_methods() if any(True for _ in m.candidates(1 << 10, 1 << 20, 1 << 10))]
-    return set.intersection(*(set(m.settings()) for m in candidates)) - {"components", "encoding"}
+    kinds = {kind for m in candidates for kind in m.domains}
+    shared = (set.intersection(*(set(m.settings()) for m in candidates if kind in m.domains)) for kind in kinds)
+    return set.union(*shared) - {"components", "encoding", "clusters"}
 
 
 def _check_known(name: str, settings: dict[str, Any], known: Any) -> None:

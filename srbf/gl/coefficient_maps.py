@@ -23,6 +23,7 @@ from srbf.gl.uniforms import (
     vectors_free,
 )
 from srbf.lights import PointLight
+from srbf.registry import method_named
 
 if TYPE_CHECKING:
     import moderngl
@@ -36,7 +37,7 @@ class ComponentPasses(Passes):
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
         self._asset, self._programs, self._textures = asset, programs, textures
-        self._method = asset.method.replace("-", "_")
+        self._method = method_named(asset.method).shader_stem(asset)
         self._clustered = "cluster_index" in asset.tables
         self._free = vectors_free(limits)
         self._point_lights = point_lights_per_pass(self._free, VECTORS_PER_LAYER)

@@ -19,6 +19,7 @@ from srbf.gl.uniforms import camera_uniforms
 if TYPE_CHECKING:
     import moderngl
 
+ON_HOST = {"light_coefficients", "light_values", "cells"}  # tables that no shader reads
 _DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalized byte
 
 
@@ -32,7 +33,7 @@ class AssetTextures:
             raise InputError(
                 f"expected {asset.height} x {asset.width} depth samples, found {view.samples.shape}; render the asset's picture"
             )
-        looked_up = [table.shape[:2] for name, table in asset.tables.items() if name != "light_coefficients"]  # which stay on the host
+        looked_up = [table.shape[:2] for name, table in asset.tables.items() if name not in ON_HOST]
         side = max(asset.width, asset.height, asset.manifest.get("scalars", 0) + 1, *map(max, looked_up))
         if side > limits.texture_size:
             raise ShaderError(f"expected at most {limits.texture_size} texels a side on this GPU, found {side}; shrink the asset")

@@ -13,7 +13,8 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.light_domain.protocol import LightDomain
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, environment_samples, light_vectors
+from srbf.light_geometry import environment_samples, light_vectors
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Falloff, Light, NamedLight, PointLight
 from srbf.sphere import Domain, all_around, domain_of, mean_spacing, normalize, point_set
 
 PIECE = 1 << 16  # texels of an environment map weighed at a time
@@ -29,7 +30,8 @@ class Directions(LightDomain):
     """Unit vectors from the surface to the light, in the `region` sphere or hemisphere (z > 0)."""
 
     kind: ClassVar[str] = "directions"
-    captured_kind: ClassVar[str] = "directional"
+    captured_kinds: ClassVar[tuple[str, ...]] = ("directional",)
+    falloff: ClassVar[Falloff] = "linear"
     region: Domain
 
     @classmethod
@@ -57,8 +59,7 @@ class Directions(LightDomain):
     def captured(capture: Capture, lights: Sequence[int] | None = None) -> Float64[ndarray, "L 3"]:
         return capture.directions(lights)
 
-    @staticmethod
-    def light(coordinates: Float64[ndarray, " 3"]) -> DirectionalLight:
+    def light(self, coordinates: Float64[ndarray, " 3"]) -> DirectionalLight:
         x, y, z = coordinates.tolist()
         return DirectionalLight((x, y, z))
 
@@ -68,6 +69,13 @@ class Directions(LightDomain):
 
     def shared(self, lights: Sequence[Light]) -> list[tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]]:
         """Directional lights, and the texels of environment maps: radiance times solid angle, no cosine (T holds it)."""
+        for light in lights:
+            if isinstance(light, (AreaLight, NamedLight)):
+                kind = "an area" if isinstance(light, AreaLight) else "a named"
+                raise InputError(
+                    f"expected directional, point, spot, sphere or environment lights for an asset of directions, found {kind} light; "
+                    "capture patches for lights inside the scene, or named lights"
+                )
         pieces = []
         distant = [light for light in lights if isinstance(light, DirectionalLight)]
         if distant:
@@ -111,12 +119,10 @@ class Directions(LightDomain):
                     notes.append(f"light {i} is below {below:.0%} of the receivers, outside the captured hemisphere: extrapolated there")
         return notes
 
-    @staticmethod
-    def spacing(coordinates: Float64[ndarray, "L 3"]) -> float:
+    def spacing(self, coordinates: Float64[ndarray, "L 3"]) -> float:
         return mean_spacing(coordinates) if len(coordinates) > 1 else 1.0
 
-    @staticmethod
-    def quadrature(coordinates: Float64[ndarray, "L 3"]) -> Float64[ndarray, " L"]:
+    def quadrature(self, coordinates: Float64[ndarray, "L 3"]) -> Float64[ndarray, " L"]:
         """One over the density of lights: lights nearer than half the spacing count, the less the farther.
 
         The weights are equal on a lattice, and half for two lights in one place. A light at the edge of a dome weighs no more than its
@@ -127,8 +133,7 @@ class Directions(LightDomain):
         shares = 1 / density
         return shares / shares.mean()
 
-    @staticmethod
-    def left_out_groups(coordinates: Float64[ndarray, "L 3"]) -> list[Int[ndarray, "_ _"]]:
+    def left_out_groups(self, coordinates: Float64[ndarray, "L 3"]) -> list[Int[ndarray, "_ _"]]:
         """Lights of about one elevation, each group led by the light in its middle; groups of one size are one array.
 
         Domes carry their lights on rings. A light of a ring is predicted by its neighbors on the ring, however badly the gap between two
@@ -161,8 +166,7 @@ class Directions(LightDomain):
         """A Fibonacci set; without a count about 2048 directions on the sphere, half of them on the hemisphere."""
         return all_around(self.region) if count is None else point_set("fibonacci", count, self.region)
 
-    @staticmethod
-    def nearest(coordinates: Float64[ndarray, "n 3"], among: Float64[ndarray, "L 3"]) -> Int[ndarray, " n"]:
+    def nearest(self, coordinates: Float64[ndarray, "n 3"], among: Float64[ndarray, "L 3"]) -> Int[ndarray, " n"]:
         return (coordinates @ among.T).argmax(axis=1)
 
     def paths(self, frames: int, count: int | None = None) -> Iterator[tuple[str, Float64[ndarray, "f 3"]]]:

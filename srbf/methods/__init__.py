@@ -8,6 +8,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
+from srbf.capture import Capture
 from srbf.light_domain import domain_of_asset
 from srbf.lights import Light, moved
 from srbf.methods.over_lights import finish
@@ -17,6 +18,7 @@ from srbf.registry import method_named
 __all__ = [
     "FitRun",
     "Method",
+    "captured_responses",
     "in_asset_frame",
     "linear_response",
     "method_of",
@@ -166,6 +168,32 @@ def responses(asset: Asset, coordinates: Float64[ndarray, "b d"]) -> Float32[nda
     """
     domain = domain_of_asset(asset.manifest)
     return method_of(asset).responses(asset, domain.moved(coordinates, asset.asset_from_world))
+
+
+def captured_responses(asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+    """Responses to lights of a capture, as it has them, unclamped and without ambient: what its images are compared with.
+
+    Parameters
+    ----------
+    asset
+        Of any method.
+    capture
+        With lights that the asset's method knows.
+    lights
+        Indices of the capture's lights.
+
+    Returns
+    -------
+    ndarray
+        (b, H, W, 3) float32.
+
+    Examples
+    --------
+    >>> from srbf.methods import captured_responses
+    >>> captured_responses(asset, capture, capture.indices("holdout")[:2]).shape
+    (2, 6, 8, 3)
+    """
+    return method_of(asset).captured_responses(asset, capture, lights)
 
 
 def projected_weights(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:

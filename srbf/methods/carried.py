@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 import srbf
-from srbf.arrays import Bool, Int
+from srbf.arrays import Int
 from srbf.asset import GEOMETRY, SCENE_FILE
 from srbf.capture import Capture
 from srbf.encode.dilation import dilate
@@ -56,16 +56,11 @@ def common_manifest(
             "settings": settings,
             "fit": {
                 "train_lights": len(capture.indices("train")),
-                **domain.extent(domain.captured(capture, capture.indices("train"))),
+                **(domain.extent(domain.captured(capture, capture.indices("train"))) if capture.kind == "directional" else {}),
                 **_finite(fit),
             },
         },
     }
-
-
-def covered_texels(capture: Capture) -> Bool[ndarray, " P"]:
-    """Which texels, flat, have any coverage: the rest are filled from them."""
-    return capture.coverage().ravel() > 0
 
 
 def needs_albedo(capture: Capture) -> bool:

@@ -9,30 +9,24 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
+from srbf.encode.clustered_components import clustered_components
 from srbf.encode.light_function_fit import functions_through
 from srbf.encode.model_selection import TexelSample
-from srbf.encode.uv_seams import Stitch
 from srbf.encode.weighted_rows import LightSpace
-from srbf.errors import InputError, ManifestError
+from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.light_domain import domain_of_capture
-from srbf.methods.carried import covered_texels
-from srbf.methods.coefficient_maps import CoefficientMaps, StitchedComponents, check_settings, coefficient_maps_asset
+from srbf.methods.coefficient_maps import CoefficientMaps, check_settings, coefficient_maps_asset
+from srbf.methods.component_maps import read_cluster_index
 from srbf.methods.protocol import QUIET, FitRun, setting
-from srbf.solve.clustered_pca import Clusters, cluster
-from srbf.solve.grouped_product import GroupedProduct
-from srbf.solve.pca import principal_axes
-from srbf.solve.streamed_product import StreamedProduct, in_tasks
 from srbf.sphere import Domain
 
 MOST_CLUSTERS = 256  # a texel's index is a byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_PER_CLUSTER = 96
-FEATURES = 48  # numbers per texel by which it finds its cluster
 
 TRIED_CLUSTERS = (16, 64, 256)
 MOST_TRIED = 64  # components of a candidate
@@ -122,7 +116,7 @@ class ClusteredEigenMap(CoefficientMaps):
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
         """Clusters from a texel sample; a pass over the images to assign every texel, another to project it.
 
-        Peak memory, whatever the number of lights: about 4 (FEATURES + 2 `components`) + 40 bytes per texel, two blocks of
+        Peak memory, whatever the number of lights: about 4 (48 + 2 `components`) + 40 bytes per texel, two blocks of
         `capture.STREAM_BYTES`, twice the sample (12 bytes per light and sampled texel), what `run.on_image` keeps, and some 0.2 GB of
         libraries.
 
@@ -157,43 +151,18 @@ class ClusteredEigenMap(CoefficientMaps):
         # From every row: clusters are of places, and those of a few strips of rows serve the rows between badly.
         sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_PER_CLUSTER * self.clusters), share=1.0)
         domain = domain_of_capture(capture, self.domain)
-        space = LightSpace.of(sample, "plain")
-        features, _ = principal_axes(space.centered, FEATURES)
-        found = cluster(space.centered, np.ascontiguousarray(features.T), self.clusters, self.components, self.seed)
-        seen = StreamedProduct(space.weights(features))
-        for first, block in capture.stream(train, run.on_image):
-            seen.add(first, block)
-            run.progress(first + len(block), 2 * len(train))
-        stitch = run.stitch
-        columns = seen.result if stitch is None else _with_stitched(seen.result, stitch)
-        index = _assigned(columns, space, features, found)
-        del seen, columns
-        axes = found.axes.transpose(0, 2, 1)  # (C, S, M)
-        weights = np.stack([space.weights(a) for a in axes]).astype(np.float32)
-        texels = capture.width * capture.height
-        product = GroupedProduct(weights, index[:texels])
-        for first, block in capture.stream(train):
-            product.add(first, block)
-            run.progress(len(train) + first + len(block), 2 * len(train))
-        projected, covered = product.result, covered_texels(capture)
-        del product
-        stitched = None
-        if stitch is not None:
-            again = GroupedProduct(weights, index[texels:])
-            for first, block in stitch.blocks(capture, train):
-                again.add(first, block)
-            # The stitched texels come first; what they would be without stands behind, where it sets no range.
-            unstitched, unstitched_index = projected[:, stitch.sources], index[stitch.sources]
-            projected[:, stitch.texels], index[stitch.texels] = again.result, index[texels:]
-            projected = np.concatenate([projected, unstitched], axis=1)
-            index = np.concatenate([index[:texels], unstitched_index])
-            covered = np.concatenate([covered, np.zeros(len(unstitched_index), bool)])
-        components, values = _in_own_range(projected, index, covered, space, found)
-        if stitch is not None:
-            stitched = StitchedComponents(components[:, texels:], index[texels:])
-            components, index = components[:, :texels], index[:texels]
-        functions, fit = functions_through(sample, values, domain, self.spread, self.ridge)
-        return coefficient_maps_asset(self, capture, domain, components, functions, fit, index, stitch, stitched)
+        found = clustered_components(
+            capture,
+            LightSpace.of(sample, "plain"),
+            self.clusters,
+            self.components,
+            self.seed,
+            run.stitch,
+            run.on_image,
+            lambda images: run.progress(images, 2 * len(train)),
+        )
+        functions, fit = functions_through(sample, found.functions, domain, self.spread, self.ridge)
+        return coefficient_maps_asset(self, capture, domain, found.components, functions, fit, found, run.stitch)
 
     def __str__(self) -> str:
         return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
@@ -217,12 +186,7 @@ class ClusteredEigenMap(CoefficientMaps):
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
-        tables, manifest = super().read_tables(reader), reader.manifest
-        clusters = manifest.get("clusters", 1)
-        index = np.round(reader.table("cluster_index", (manifest["height"], manifest["width"]), 1)[:, :, 0] * 255).astype(np.uint8)
-        if index.max() >= clusters:
-            raise ManifestError(f"expected cluster indices below {clusters} in {reader.path}, found {index.max()}")
-        return {**tables, "cluster_index": index}
+        return {**super().read_tables(reader), "cluster_index": read_cluster_index(reader)}
 
     @classmethod
     def label(cls, asset: Asset) -> str:
@@ -231,48 +195,6 @@ class ClusteredEigenMap(CoefficientMaps):
     @classmethod
     def summary(cls, asset: Asset) -> str:
         return f"{asset.clusters} clusters of {asset.components} components"
-
-
-def _with_stitched(seen: Float32[ndarray, "D P"], stitch: Stitch) -> Float32[ndarray, "D Q"]:
-    """Features of all texels, and behind them those of the stitch's texels once their (dilated) images are: features are sums."""
-    values = seen[:, stitch.sources].T
-    return np.concatenate([seen, (values + stitch.change(values)).T.astype(np.float32)], axis=1)
-
-
-def _assigned(seen: Float32[ndarray, "D P"], space: LightSpace, features: Float32[ndarray, "D M"], found: Clusters) -> Int[ndarray, " P"]:
-    """The cluster of every texel, by its features."""
-    clusters = found.through(np.ascontiguousarray(features.T))
-    offsets = space.offsets(features)
-    index = np.empty(seen.shape[1], np.int64)
-
-    def work(task: slice) -> None:
-        index[task] = clusters.assign(np.ascontiguousarray((seen[:, task] - offsets[:, None]).T) * np.float32(space.scale))[0]
-
-    in_tasks(work, seen.shape[1])
-    return index
-
-
-def _in_own_range(
-    projected: Float32[ndarray, "S P"], index: Int[ndarray, " P"], covered: Bool[ndarray, " P"], space: LightSpace, found: Clusters
-) -> tuple[Float32[ndarray, "S P"], Float64[ndarray, "L F 3"]]:
-    """(planes, values of the functions at the train lights) with every scalar of a cluster spanning -1 to 1 over its covered texels."""
-    count, components = len(found.means), len(projected)
-    planes = np.zeros_like(projected)
-    values = np.zeros((space.sample.train, count, components + 1, 3))
-    for number in range(count):
-        axes = np.ascontiguousarray(found.axes[number].T)  # (S, M)
-        functions = space.functions(axes, found.means[number])  # (L, S + 1, 3)
-        offsets = space.offsets(axes, found.means[number])
-        members = index == number
-        own = projected[:, members] - offsets[:, None]
-        real = own[:, covered[members]]
-        low, high = (real.min(axis=1), real.max(axis=1)) if real.shape[1] else (np.zeros(components), np.zeros(components))
-        middle, half = (low + high) / 2, (high - low) / 2
-        half = np.where(half > 0, half, 1)
-        planes[:, members] = np.clip((own - middle[:, None]) / half[:, None], -1, 1)
-        values[:, number, 0] = functions[:, 0] + np.tensordot(functions[:, 1:], middle.astype(np.float64), ([1], [0]))
-        values[:, number, 1:] = functions[:, 1:] * half[:, None]
-    return planes, values.reshape(len(values), -1, 3)
 
 
 METHOD = ClusteredEigenMap

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
@@ -22,7 +23,8 @@ from srbf.encode.row_blocks import SolveRows
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.lights import Light
+from srbf.light_domain import domain_of_asset, light_of
+from srbf.lights import Light, PointLight
 
 if TYPE_CHECKING:
     from srbf.gl.passes import Passes
@@ -127,6 +129,25 @@ class Method(ABC):
     @abstractmethod
     def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b d"]) -> Float32[ndarray, "b H W 3"]:
         """`linear_response` to a white light at each of many coordinates of the light domain, in the asset's frame."""
+
+    @classmethod
+    def local_lights(cls, lights: Sequence[Light]) -> list[PointLight]:
+        """Those of `lights` that every receiver sees at coordinates of its own; the rest are in `projected_weights`."""
+        return [light for light in lights if isinstance(light, PointLight)]
+
+    @classmethod
+    def shader_stem(cls, asset: Asset) -> str:
+        """Of the pack's files that draw an asset."""
+        return cls.stem()
+
+    @classmethod
+    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+        """`linear_response` to each of a capture's `lights`, as the capture has them: what its images are compared with."""
+        domain = domain_of_asset(asset.manifest)
+        if all(capture.lights[i].kind in domain.captured_kinds for i in lights):
+            return cls.responses(asset, domain.captured(capture, lights))
+        every = [light_of(capture.lights[i]) for i in lights]
+        return np.stack([cls.linear_response(asset, [light]) for light in every if light is not None])
 
     @classmethod
     @abstractmethod

@@ -213,7 +213,7 @@ class RelightingMap(Method):
             manifest["basis"] = {"kind": self.basis}
         asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
         if stitch is not None and unstitched is not None:
-            manifest["seams"] = seam_report(asset, capture, stitch, unstitched, self.responses)
+            manifest["seams"] = seam_report(asset, capture, stitch, unstitched, self.captured_responses)
         return asset
 
     def model(self, read_sample: Callable[[], TexelSample], domain: LightDomain) -> tuple[Basis, float, Choice | None]:

@@ -15,21 +15,21 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.light_domain import Directions
-from srbf.lights import EnvironmentLight, Light, moved
+from srbf.lights import EnvironmentLight, Light, NamedLight, moved
 from srbf.visibility.embree import has_embree
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.shadow_map import ShadowMapper
 
 Direct = Literal["none", "ray", "shadow-map"]
-NAMES = {"ray": "exact direct light by rays", "shadow-map": "direct light by a shadow map"}
+NAMES = {"ray": "exact direct light by rays", "shadow-map": "direct light by shadow maps"}
 
 
 class DirectLight(Protocol):
     """Adds what an indirect asset leaves out; lights are in the asset's frame."""
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The direct diffuse light of `lights`; environments add nothing."""
+        """The direct diffuse light of `lights`; environments and named lights add nothing."""
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
@@ -82,7 +82,10 @@ class Added:
         """What is to be said of `lights`: what was added, and what was not."""
         if self._light is None:
             return []
-        lines = [f"added {NAMES[self._kind]}"]
+        without = (EnvironmentLight, NamedLight)
+        lines = [] if lights and all(isinstance(light, without) for light in lights) else [f"added {NAMES[self._kind]}"]
         if any(isinstance(light, EnvironmentLight) for light in lights):
             lines.append("an environment's direct light is not added: the picture holds only what it reflects on")
+        if any(isinstance(light, NamedLight) for light in lights):
+            lines.append("a named light's direct light is not added: the picture holds only what it reflects on")
         return lines

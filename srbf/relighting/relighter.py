@@ -18,7 +18,7 @@ from srbf.gl.depth_buffer import DepthView
 from srbf.gl.environment import EnvironmentWeights
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
-from srbf.lights import EnvironmentLight, Light, PointLight
+from srbf.lights import EnvironmentLight, Light
 from srbf.methods import in_asset_frame, method_of
 
 if TYPE_CHECKING:
@@ -211,7 +211,7 @@ class Relighter:
         if not 1 <= units <= most:
             raise InputError(f"expected 1 to {most} texture units a pass, found {units}")
         inside = in_asset_frame(self._asset, lights)
-        point_lights = [light for light in inside if isinstance(light, PointLight)]
+        point_lights = method_of(self._asset).local_lights(inside)
         if point_lights and not self._located:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if point_lights:

@@ -11,42 +11,33 @@ from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
 from srbf.evaluation.rate_distortion import compared_methods
 from srbf.io import files
+from srbf.light_domain import domain_of_asset, domain_of_capture
 from srbf.lights import Light
 from srbf.methods import Method
-from srbf.report.abrdf_mosaic import abrdf_tiles
-from srbf.report.contact_sheet import contact_sheet
-from srbf.report.findings import measure
-from srbf.report.maps import sum_of_maps
+from srbf.report.directions_report import DirectionsReport
+from srbf.report.domain_report import DomainReport
+from srbf.report.names_report import NamesReport
 from srbf.report.page import write_page
-from srbf.report.point_light import point_light
-from srbf.report.sphere import centers, r_curve
-from srbf.report.strips import animation, point_strip, spot_strip
-from srbf.report.subject import Picture, Subject, gather
+from srbf.report.places_report import PlacesReport
+from srbf.report.section import Figure
+from srbf.report.subject import Picture, gather
 
-MAPS, POSITION = "maps", "position"  # requirements of a figure on the asset
-Draw = Callable[[Subject, Path], Picture]
-REASONS = {
-    MAPS: "Not drawn: this picture shows the terms of a relighting map of Gaussians, and the asset holds other functions.",
-    POSITION: "Not drawn: the asset has no position map (photographs never have one), which a point light needs.",
-}
-FIGURES: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, function, requirements
-    ("contact_sheet.png", "Reference against relit", contact_sheet, ()),
-    ("animation.webp", "In motion", animation, ()),
-    ("sum_of_maps.png", "A sum of maps", sum_of_maps, (MAPS,)),
-    ("point_light.png", "A point light", point_light, (MAPS, POSITION)),
-    ("point_strip.png", "Point lights", point_strip, (POSITION,)),
-    ("spot_strip.png", "Spot lights", spot_strip, (POSITION,)),
-    ("abrdf_tiles.png", "ABRDF tiles", abrdf_tiles, ()),
-    ("centers.png", "Centers and lights", centers, (MAPS,)),
-    ("r_curve.png", "The curve R", r_curve, (MAPS,)),
-)
+REPORTS: dict[str, type[DomainReport]] = {report.kind: report for report in (DirectionsReport, NamesReport, PlacesReport)}
 REPORT_FILES = (
-    *(file for file, *_ in FIGURES),
-    "error_by_light.png",
+    "contact_sheet.png",
+    "animation.webp",
     "animation.gif",
+    "sum_of_maps.png",
+    "point_light.png",
+    "point_strip.png",
+    "spot_strip.png",
+    "abrdf_tiles.png",
+    "centers.png",
+    "r_curve.png",
+    "error_by_light.png",
     "report.md",
     "index.html",
-)  # of any version of the report
+)  # of any version and kind of the report
 
 
 def write_report(
@@ -68,7 +59,7 @@ def write_report(
     asset
         Of the capture's size in texels.
     capture
-        The references.
+        The references, under lights of the asset's light domain: directions, names, or places inside the scene.
     folder
         Made where it is missing. Files of an earlier report in it are replaced.
     evaluation
@@ -92,7 +83,7 @@ def write_report(
     Raises
     ------
     InputError
-        On sizes that differ, and on an evaluation of other lights than the capture's.
+        On sizes that differ, on lights of another domain than the asset's, and on an evaluation of other lights than the capture's.
     MissingLibraryError
         Without matplotlib.
 
@@ -106,6 +97,7 @@ def write_report(
     srbf.errors.InputError: expected an evaluation of the 48 lights of ..., found others; evaluate again
     """
     folder = Path(folder)
+    check_domains(asset, capture)
     if (asset.width, asset.height) != (capture.width, capture.height):
         found = f"{capture.width}x{capture.height}"
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {found}")
@@ -115,23 +107,31 @@ def write_report(
     for name in REPORT_FILES:
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
-    steps = 4 + len(FIGURES)
-    findings = measure(subject, compared_methods() if methods is None else methods, lambda done, total: progress(done, steps))
+    kind = REPORTS[subject.domain.kind]
+    compared = [method for method in (compared_methods() if methods is None else methods) if kind.kind in method.domains]
+    steps = kind.steps + kind.drawings
+    report = kind.measured(subject, compared, lambda done, total: progress(done, steps))
     pictures = []
-    for entry in FIGURES:
-        pictures.append(_draw(subject, folder, *entry))
-        progress(4 + len(pictures), steps)
-    return write_page(subject, findings, folder, pictures, timings, asset_folder)
+    for figure in report.figures():
+        pictures.append(_draw(figure, folder))
+        progress(kind.steps + len(pictures), steps)
+    return write_page(subject, report, folder, pictures, timings, asset_folder)
 
 
-def _draw(subject: Subject, folder: Path, file: str, title: str, draw: Draw, needs: tuple[str, ...]) -> Picture:
-    has = {MAPS: subject.asset.manifest.get("basis", {}).get("kind") == "gaussian", POSITION: bool(subject.points)}
-    for need in needs:
-        if not has[need]:
-            return Picture(file, title, REASONS[need], omitted=True)
-    if draw is animation:
-        try:
-            return draw(subject, folder)
-        except MissingLibraryError as error:
-            return Picture(file, title, f"Not drawn: {error}.", omitted=True)
-    return draw(subject, folder)
+def check_domains(asset: Asset, capture: Capture) -> None:
+    """InputError where the lights of a capture are not those that an asset is a function of."""
+    domain = domain_of_asset(asset.manifest)
+    if domain_of_capture(capture).kind != domain.kind:
+        wanted = " or ".join(domain.captured_kinds)
+        raise InputError(f"expected a capture under {wanted} lights, as the asset's are, found {capture.kind} lights in {capture.folder}")
+
+
+def _draw(figure: Figure, folder: Path) -> Picture:
+    if figure.missing is not None:
+        return Picture(figure.file, figure.title, figure.missing, omitted=True)
+    try:
+        return figure.draw(folder)
+    except MissingLibraryError as error:
+        if not figure.optional:
+            raise
+        return Picture(figure.file, figure.title, f"Not drawn: {error}.", omitted=True)

@@ -13,17 +13,14 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError, MissingLibraryError
 from srbf.evaluation.cluster_borders import ClusterBorders, cluster_borders
-from srbf.evaluation.errors_by_role import psnr
+from srbf.evaluation.errors_by_role import PEAK_QUANTILE, psnr
 from srbf.evaluation.flip import Flip
 from srbf.evaluation.held_out import LIGHTS, HeldOutError, Negative, held_out_error, negative
 from srbf.evaluation.light_spacing import ShadowSampling, shadow_sampling
 from srbf.evaluation.rate_distortion import Score, contest, planes_bound, score_asset, spectrum
 from srbf.evaluation.temporal_stability import TEXELS, Motion, dense_reference, sampled_texels, sweep
-from srbf.light_domain import domain_of_capture
-from srbf.methods import Method
-from srbf.methods import responses as asset_responses
-from srbf.report.subject import Subject
-from srbf.sphere import farthest_points
+from srbf.methods import Method, captured_responses
+from srbf.report.subject import Subject, far_apart
 
 STEPS = 4  # of `measure`, for progress
 WORST_LIGHTS = 4  # shown side by side
@@ -35,7 +32,7 @@ MIN_LIGHTS = 8  # held in memory at any size
 class HeldOut:
     """References and relit images before the clamp under lights of the subject's role, and their errors.
 
-    `worst` are positions in `lights` with the lowest PSNR, lowest first; `flips` are their FLIP maps, empty without flip-evaluator.
+    `worst` are positions in `lights` with the largest errors, largest first; `flips` are their FLIP maps, empty without flip-evaluator.
     """
 
     lights: tuple[int, ...]
@@ -106,30 +103,34 @@ def spectrum_of(sample: Capture, asset: Asset, peak: float) -> Spectrum:
     train = sample.indices("train")
     values = spectrum(sample)
     responses = sample.width * sample.height * 3 * len(train)
-    coordinates = domain_of_capture(sample).captured(sample, train)
     squares = 0.0
     for first, block in sample.blocks(train):
-        relit = asset_responses(asset, coordinates[first : first + len(block)]).reshape(block.shape)
+        relit = captured_responses(asset, sample, train[first : first + len(block)]).reshape(block.shape)
         squares += float(((relit - block) ** 2).sum(dtype=np.float64))
     return Spectrum(values, planes_bound(values, responses, peak), psnr(peak, float(np.sqrt(squares / responses))))
 
 
-def measure_held_out(subject: Subject) -> HeldOut:
-    """Read and relight the lights of the subject's role: all, or, where images are large, the worst and others far apart."""
+def measure_held_out(subject: Subject, own_peak: bool = False) -> HeldOut:
+    """Read and relight the lights of the subject's role: all, or, where images are large, the worst and others far apart.
+
+    `own_peak`: PSNR is of the peak of these references, where train lights are of another kind.
+    """
     asset, capture = subject.asset, subject.capture
-    indices = sorted(capture.indices(subject.role), key=subject.psnr_of)
+    indices = subject.worst_first(capture.indices(subject.role))
     most = max(MIN_LIGHTS, MEMORY_BYTES // (asset.width * asset.height * 12))
     if len(indices) > most:
-        spread = [indices[i] for i in farthest_points(domain_of_capture(capture).captured(capture, indices), most - WORST_LIGHTS)]
+        spread = far_apart(capture, indices, most - WORST_LIGHTS)
         indices = indices[:WORST_LIGHTS] + [i for i in spread if i not in indices[:WORST_LIGHTS]]
     indices.sort()
     references = np.stack([capture.image(i) for i in indices])
-    relit = asset_responses(asset, domain_of_capture(capture).captured(capture, indices))
+    relit = captured_responses(asset, capture, indices)
     metric = Flip(float(np.log2(subject.gain)))
     peak = subject.evaluation[subject.role]["peak"]
+    if own_peak:
+        peak = float(np.quantile(np.maximum(references[:, subject.covered], 0), PEAK_QUANTILE))
     floor = -np.inf if capture.transport == "indirect" else 0.0  # as in the evaluation
     errors = tuple(held_out_error(references, relit, subject.covered, n, peak, metric, floor=floor) for n in LIGHTS)
-    worst = tuple(sorted(range(len(indices)), key=lambda i: subject.psnr_of(indices[i]))[:WORST_LIGHTS])
+    worst = tuple(indices.index(i) for i in subject.worst_first(indices)[:WORST_LIGHTS])
     try:
         flips = tuple(metric.error_map(references[i], relit[i], subject.covered) for i in worst)
     except MissingLibraryError:

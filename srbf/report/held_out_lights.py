@@ -1,6 +1,8 @@
-"""The first section of a report: the worst held-out directions side by side, and errors under one and several held-out lights."""
+"""The first section of a report: the worst lights side by side, and errors under one and several held-out lights."""
 
 from __future__ import annotations
+
+from html import escape
 
 import numpy as np
 
@@ -14,8 +16,8 @@ from srbf.report.subject import Subject
 NO_FLIP = "FLIP is not shown: flip-evaluator is not installed (pip install flip-evaluator)."
 
 
-def worst_directions(subject: Subject, held_out: HeldOut) -> str:
-    """One row per direction: reference, relit, difference, FLIP."""
+def worst_lights(subject: Subject, held_out: HeldOut) -> str:
+    """One row per light: reference, relit, difference, FLIP."""
     gain, covered = subject.gain, subject.covered
     rows = list(held_out.worst)
     differences = np.abs(np.maximum(held_out.relit[rows], 0) - np.maximum(held_out.references[rows], 0))
@@ -24,10 +26,9 @@ def worst_directions(subject: Subject, held_out: HeldOut) -> str:
     cells = [f'<p class="head">{head}</p>' for head in heads]
     for n, row in enumerate(rows):
         index = held_out.lights[row]
-        x, y, z = subject.capture.lights[index].direction
-        where = f"elevation {np.degrees(np.arcsin(z)):.0f}°<br>azimuth {np.degrees(np.arctan2(y, x)):.0f}°".replace("-", "−")
+        where = "<br>".join(escape(line) for line in subject.light_words(index)).replace("-", "−")
         flip = f"<br>FLIP {held_out.flips[n][covered].mean():.3f}" if held_out.flips else ""
-        cells.append(f'<p><b>{subject.psnr_of(index):.1f} dB</b><br><span class="soft">{where}{flip}</span></p>')
+        cells.append(f'<p><b>{subject.error_words(index)}</b><br><span class="soft">{where}{flip}</span></p>')
         pictures = [
             shown(np.maximum(held_out.references[row], 0), gain, covered),
             shown(np.maximum(held_out.relit[row], 0), gain, covered),
@@ -39,9 +40,9 @@ def worst_directions(subject: Subject, held_out: HeldOut) -> str:
             cells.append(image(pixels_uri(display), f"{head}, light {index}"))
     columns = f"grid-template-columns: 7.2rem repeat({len(heads) - 1}, 1fr)"
     grid = f'<div class="pictures" style="{columns}">' + "\n".join(cells) + "</div>"
-    caption = (
-        f"The {len(rows)} of {len(held_out.lights)} {subject.role_words} with the lowest PSNR, worst first, at {gain_text(gain)}. "
-        + (f"{held_out.metric.sentence()} Black is no error, pale yellow the maximum." if held_out.flips else NO_FLIP)
+    measure = "the largest relative RMSE" if subject.by_relative else "the lowest PSNR"
+    caption = f"The {len(rows)} of {len(held_out.lights)} {subject.role_words} with {measure}, worst first, at {gain_text(gain)}. " + (
+        f"{held_out.metric.sentence()} Black is no error, pale yellow the maximum." if held_out.flips else NO_FLIP
     )
     return figure(grid, caption)
 

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from srbf.capture import Capture
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
+from srbf.report.section import Section
 
 
 def samples_plot(curve: list[dict[str, Any]]) -> str:
@@ -33,3 +35,9 @@ def samples_plot(curve: list[dict[str, Any]]) -> str:
         "relative RMSE on the validation lights without their noise. It does not use the holdout lights."
     )
     return figure('<div class="plots">' + plot.svg("Validation error by samples") + "</div>", caption)
+
+
+def samples_section(capture: Capture) -> list[Section]:
+    """The section of a capture that was baked with automatic samples; else none."""
+    curve = capture.manifest.get("source", {}).get("validation_curve")
+    return [Section("Samples", samples_plot(curve))] if curve else []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from srbf.methods import method_of
-from srbf.report.findings import Findings, Spectrum
+from srbf.report.findings import Spectrum
 from srbf.report.inline import figure
 from srbf.report.plot import Axis, Plot
 from srbf.report.subject import Subject
@@ -15,7 +15,7 @@ FLOOR = 1e-4  # of the largest value
 HEADROOM = 15.0  # dB shown above the asset's PSNR; beyond, planes fit noise
 
 
-def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> str:
+def spectrum_plots(subject: Subject, texels: int, spectrum: Spectrum) -> str:
     """Singular values, and the PSNR of the best planes, side by side."""
     components = method_of(subject.asset).numbers_per_texel(subject.asset)
     ranks = np.arange(1, len(spectrum.values) + 1)
@@ -37,15 +37,15 @@ def spectrum_plots(subject: Subject, findings: Findings, spectrum: Spectrum) -> 
     right = Plot(450, 290, rank_axis, Axis(low, high, "PSNR on train lights, pooled, dB"), (24, 20, 42, 52))
     right.line(near, bound[near], "blue")
     if len(near):
-        middle = near[len(near) // 4]
-        right.label(float(middle), float(bound[middle]), "the best planes", "strong blue", dx=-10, dy=-6, anchor="end")
+        last_shown = near[-1]  # HEADROOM above the asset, so that the labels keep apart
+        right.label(float(last_shown), float(bound[last_shown]), "the best planes", "strong blue", dx=-10, dy=4, anchor="end")
     right.dots(np.array([components]), np.array([spectrum.own]), "red", 5)
     right.label(components, spectrum.own, f"this asset, {spectrum.own:.1f} dB", "strong red", dx=0, dy=20, anchor="middle")
     enough = bound >= spectrum.own
     reach = f", which the best {planes_words(int(np.argmax(enough)))} would reach too" if enough.any() else ""
     caption = (
         f"On the train lights the asset's {components} numbers per texel reach {spectrum.own:.1f} dB before the clamp{reach}. Singular "
-        f"values are those of the responses of {findings.texels} texels to all train lights and colors, minus the mean texel; all "
+        f"values are those of the responses of {texels} texels to all train lights and colors, minus the mean texel; all "
         "lights have equal weight. The curve on the right bounds any linear model of so many components on these responses, not on "
         "held-out lights; clusters with separate components may exceed it."
     )

@@ -87,11 +87,26 @@ def animation(subject: Subject, folder: Path) -> Picture:
 
     MissingLibraryError without Pillow. At most 24 frames and MAX_BYTES.
     """
+    lights = _path(subject)
+    path = write_animation([frame(subject, light) for light in lights], folder)
+    second = f", then {len(lights) - ORBIT_FRAMES} of a point light passing by" if len(lights) > ORBIT_FRAMES else ""
+    return Picture(
+        path.name,
+        "In motion",
+        f"{ORBIT_FRAMES} frames of a directional light orbiting at {np.degrees(ELEVATION):.0f}° of elevation{second}.",
+    )
+
+
+def write_animation(pictures: Sequence[ndarray], folder: Path) -> Path:
+    """Write frames (H, W, 3) uint8 as animation.webp, or animation.gif where Pillow has no WebP; at most MAX_BYTES.
+
+    MissingLibraryError without Pillow.
+    """
     try:
         from PIL import Image, features
     except ImportError as error:
         raise MissingLibraryError("the animation of a report needs Pillow: pip install Pillow") from error
-    frames = [Image.fromarray(_frame(subject, light)) for light in _path(subject)]
+    frames = [Image.fromarray(picture) for picture in pictures]
     webp = bool(features.check("webp"))
     path = folder / (ANIMATION if webp else "animation.gif")
     factor = MAX_SIDE / max(frames[0].size)
@@ -105,12 +120,7 @@ def animation(subject: Subject, folder: Path) -> Picture:
         if path.stat().st_size <= MAX_BYTES:
             break
         factor *= 0.7
-    second = f", then {len(frames) - ORBIT_FRAMES} of a point light passing by" if len(frames) > ORBIT_FRAMES else ""
-    return Picture(
-        path.name,
-        "In motion",
-        f"{ORBIT_FRAMES} frames of a directional light orbiting at {np.degrees(ELEVATION):.0f}° of elevation{second}.",
-    )
+    return path
 
 
 def _path(subject: Subject) -> list[Light]:
@@ -123,6 +133,7 @@ def _path(subject: Subject) -> list[Light]:
     return lights
 
 
-def _frame(subject: Subject, light: Light) -> ndarray:
+def frame(subject: Subject, light: Light) -> ndarray:
+    """The asset under one light, (H, W, 3) uint8, at the page's exposure."""
     image = relight(subject.asset, [light])
     return np.round(shown(image, subject.gain, subject.covered) * 255).astype(np.uint8)

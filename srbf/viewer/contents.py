@@ -11,6 +11,7 @@ from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.light_domain import domain_of_asset
 from srbf.viewer import page_manifest
 from srbf.viewer.built_page import page_files
 from srbf.viewer.measures import Measures
@@ -43,6 +44,9 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
         for asset in assets:
             references.check(asset)
     notes: list[str] = []
+    compared = references if references is not None and references.compared else None
+    if references is not None and compared is None:
+        notes.append("the page compares directional and point lights with a capture: of this one it uses the spectrum alone")
     shown = shown_mesh(assets[0], mesh, notes)
     measures = Measures(assets, references.capture if references else None)
     contents: dict[str, Content] = {"": page["index.html"], **page}
@@ -53,18 +57,18 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
         contents |= _files(asset, folder, place)
         contents[f"spectrum-{i}.json"] = partial(measures.spectrum, i)
         errors = None
-        if references is not None:
+        if compared is not None:
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
         told.append(page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors))
     if shown is not None:
         contents[page_manifest.MESH] = shown
-    if references is not None:
-        contents[f"{CAPTURE}lights.json"] = json.dumps(references.lights()).encode()
-        for index in range(len(references.capture.lights)):
-            contents[f"{CAPTURE}{index}.exr"] = partial(references.image, index)
+    if compared is not None:
+        contents[f"{CAPTURE}lights.json"] = json.dumps(compared.lights()).encode()
+        for index in compared.compared:
+            contents[f"{CAPTURE}{index}.exr"] = partial(compared.image, index)
     page_facts = page_manifest.facts(
-        assets[0], told, shown is not None, page_manifest.title(folders), CAPTURE if references else None, tuple(notes)
+        assets[0], told, shown is not None, page_manifest.title(folders), CAPTURE if compared else None, tuple(notes)
     )
     contents[page_manifest.NAME] = json.dumps(page_facts).encode()
     return contents
@@ -72,7 +76,9 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
 
 def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
     def kind(asset: Asset) -> str:
-        return f"{asset.width} x {asset.height} {asset.receiver_kind} of {asset.quantity}"
+        lights = domain_of_asset(asset.manifest).kind
+        named = f" of {len(asset.manifest['lights'])} lights" if "lights" in asset.manifest else ""
+        return f"{asset.width} x {asset.height} {asset.receiver_kind} of {asset.quantity} under {lights}{named}"
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):

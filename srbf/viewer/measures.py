@@ -16,9 +16,10 @@ from srbf.capture import COVERED, Capture
 from srbf.evaluation.errors_by_role import PEAK_QUANTILE, psnr, squared_errors
 from srbf.evaluation.rate_distortion import singular_values, spectrum
 from srbf.evaluation.temporal_stability import sampled_texels
-from srbf.light_domain import domain_of_asset, domain_of_capture
-from srbf.methods import method_of
+from srbf.light_domain import domain_of_asset
+from srbf.methods import captured_responses, method_of
 from srbf.methods import responses as asset_responses
+from srbf.viewer.references import compared_lights
 
 DIRECTIONS = 192  # at which an asset is evaluated for its spectrum, enough for its number of functions
 
@@ -33,8 +34,8 @@ class Measures:
         self._made: dict[tuple[str, int], bytes] = {}
 
     def errors(self, index: int) -> bytes:
-        """JSON of asset `index` against every light of the capture: `rmse` and `psnr` (dB; of the peak of the train references) by light,
-        and `texels`, the number of sampled texels. Both images are clamped at 0, except for indirect light."""
+        """JSON of asset `index` against every light that the page compares with: `rmse` and `psnr` (dB; of the peak of the train
+        references) by light, and `texels`, the number of sampled texels. Both images are clamped at 0, except for indirect light."""
         return self._once("errors", index)
 
     def spectrum(self, index: int) -> bytes:
@@ -62,13 +63,12 @@ class Measures:
     def _errors(self, index: int) -> dict[str, object]:
         sample, asset = self._sample, self._assets[index].at(self._texels)
         floor = -np.inf if sample.transport == "indirect" else 0.0
-        every = range(len(sample.lights))
+        every = compared_lights(sample)
         responses = sample.sample(sample.indices("train") or every, np.arange(len(self._texels)))
         peak = 1.0 if sample.source_bits == 8 else float(np.quantile(np.maximum(responses, 0), PEAK_QUANTILE))
-        coordinates = domain_of_capture(sample).captured(sample, every)
         errors = []
         for first, block in sample.blocks(every):
-            relit = asset_responses(asset, coordinates[first : first + len(block)])
+            relit = captured_responses(asset, sample, every[first : first + len(block)])
             for response, true in zip(relit.reshape(block.shape), block, strict=True):
                 errors.append(float(np.sqrt(squared_errors(response, true, floor)[0] / true.size)))
         return {"texels": len(self._texels), "peak": peak, "rmse": errors, "psnr": [psnr(peak, error) for error in errors]}

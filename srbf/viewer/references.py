@@ -15,6 +15,7 @@ from srbf.io.image import write_image
 from srbf.light_domain import domain_of_asset, domain_of_capture
 
 CACHED_IMAGES = 32
+COMPARED = {"directions": "directional", "cloud": "point"}  # by light domain: the captured lights that the page can place
 
 
 @dataclass(eq=False)
@@ -38,9 +39,16 @@ class References:
                 "leave it out, or give the right one"
             )
 
+    @property
+    def compared(self) -> list[int]:
+        """Indices of the lights that the page compares with: those that it can place, by direction or position."""
+        return compared_lights(self.capture)
+
     def lights(self) -> dict[str, Any]:
-        """lights.json."""
-        return {"lights": [{"direction": list(light.direction), "role": light.role} for light in self.capture.lights]}
+        """lights.json: of each compared light its place, its role, and the number of its image."""
+        key = "direction" if domain_of_capture(self.capture).kind == "directions" else "position"
+        lights = self.capture.lights
+        return {"lights": [{key: list(lights[i].place), "role": lights[i].role, "image": i} for i in self.compared]}
 
     def image(self, index: int) -> bytes:
         """The EXR of light `index`; IndexError if there is none."""
@@ -55,6 +63,12 @@ class References:
                 while len(self._made) > CACHED_IMAGES:
                     self._made.pop(next(iter(self._made)))
             return self._made[index]
+
+
+def compared_lights(capture: Capture) -> list[int]:
+    """Indices of the lights of a capture that are of a kind that the page can place."""
+    kind = COMPARED.get(domain_of_capture(capture).kind)
+    return [i for i, light in enumerate(capture.lights) if light.kind == kind]
 
 
 def _described(facts: tuple[object, ...]) -> str:

@@ -1,4 +1,4 @@
-"""Direct light by rays: several per texel, over its footprint on the mesh and over the sun's disc, traced by Embree."""
+"""Direct light by rays: several per texel, over its footprint on the mesh and over the light's extent, traced by Embree."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
 from srbf.encode.dilation import dilate, nearest_covered
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, spot_cone
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
-from srbf.visibility.receivers import Receivers, disc_points, hashed, pixel_filter, spread_points
-from srbf.visibility.shadow import transmittance
+from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
+from srbf.visibility.shadow import rounded_share, transmittance
 from srbf.visibility.surface import surface_at
+from srbf.visibility.texel_sums import TexelSums
 
 FIRST_SAMPLES = 4  # of every texel
 SAMPLES = 32  # of a texel whose first samples differ
 MAX_SAMPLES = 512  # of a texel whose samples still differ, mostly at shadow edges
 EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
-REFINE_STEP = 0.02  # irradiance between samples of a texel, or between neighbors, from which a texel is refined
-NEIGHBOR_STEP = 0.2  # between neighbors: a shadow edge may cross a corner without samples
-EDGE_STEP = 0.03  # between samples of a texel, from which it gets up to MAX_SAMPLES
+SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of it
+SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
 RAY_OFFSET = 1e-5  # m, plus this share of the distance from the origin: between a surface and the start of its shadow rays
 MAX_WALLS = 32
-TERMINATOR = 0.1  # cosine below which the ray of a smooth surface starts on the rounded surface [Hanika2021], Cycles' default
-MIN_DIFFUSE = 1e-12  # share
 NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
@@ -76,11 +76,11 @@ class RayTracer:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The direct light of `lights` in the receivers' quantity; environments add nothing."""
+        """The direct light of `lights` in the receivers' quantity; environments and named lights add nothing."""
         height, width = self._receivers.height, self._receivers.width
         total = np.zeros((height * width, 3), np.float32)
         for light in lights:
-            if not isinstance(light, EnvironmentLight):
+            if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
                 total += self._irradiance(light) * np.array(light.color, np.float32)
         return dilate(total.reshape(height, width, 3), self._nearest) * self._receivers.reflectance()
 
@@ -88,43 +88,42 @@ class RayTracer:
         """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
-    def _irradiance(self, light: DirectionalLight | PointLight) -> Float32[ndarray, "P 3"]:
-        texels = self._receivers.height * self._receivers.width
-        sums = _Sums(
-            np.zeros((texels, 3)), np.zeros((texels, 3)), np.full((texels, 3), np.inf, np.float32), np.zeros((texels, 3), np.float32)
-        )
-        weight = np.zeros(texels)
+    def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
+        sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
+        weight = np.zeros(len(sums.total))
         for start in range(0, len(self._texels), TEXEL_BATCH):
             samples = self._first(start)
-            sums.add(samples, self._lit(samples, light, range(FIRST_SAMPLES)))
-            weight += np.bincount(samples.texel, samples.weight, texels)
-        ragged = self._ragged(sums.mean(), sums.low, sums.high, weight)
-        self._refine(sums, light, ragged, range(FIRST_SAMPLES, self._count))
-        edges = ragged[(sums.spread(ragged) > EDGE_STEP) | (self._steps(sums.mean())[ragged] > NEIGHBOR_STEP)]
+            self._add(sums, samples, light, range(FIRST_SAMPLES))
+            weight += np.bincount(samples.texel, samples.weight, len(weight))
+        partly = (weight > 0) & (weight < FIRST_SAMPLES)
+        refined = np.zeros(len(weight), bool)
+        for _ in range(SPREAD_ROUNDS if _has_size(light) else 1):
+            new = self._texels[((sums.ragged() | partly) & ~refined)[self._texels]]
+            self._refine(sums, light, new, range(FIRST_SAMPLES, self._count))
+            refined[new] = True
+        edges = np.flatnonzero(refined & sums.edges())
         most = min(self._most, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
         self._refine(sums, light, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
 
-    def _refine(self, sums: _Sums, light: DirectionalLight | PointLight, texels: Int[ndarray, " e"], numbers: range) -> None:
+    def _scale(self, light: CastingLight) -> Float64[ndarray, " P"] | None:
+        """Every texel's unshadowed irradiance over the mean of those that have any; None for suns."""
+        if isinstance(light, DirectionalLight):
+            return None
+        if isinstance(light, SpotLight):
+            light = PointLight(light.position, a0=light.a0, falloff=light.falloff, radius=light.radius)
+        position, normal = (self._receivers.images[name].reshape(-1, 3)[self._texels] for name in ("position", "normal"))
+        scale = np.zeros(self._receivers.height * self._receivers.width)
+        scale[self._texels] = irradiance_from(light, position, normal)
+        lit = scale > 0
+        fine = SOFT_STEPS if _has_size(light) else 1.0
+        return scale * fine / (scale[lit].mean() if lit.any() else 1.0)
+
+    def _refine(self, sums: TexelSums, light: CastingLight, texels: Int[ndarray, " e"], numbers: range) -> None:
         """Add samples `numbers` of `texels`."""
         step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
         for start in range(0, len(texels) if len(numbers) else 0, step):
-            samples = self._samples(texels[start : start + step], numbers)
-            sums.add(samples, self._lit(samples, light, numbers))
-
-    def _ragged(self, mean: np.ndarray, low: np.ndarray, high: np.ndarray, weight: np.ndarray) -> Int[ndarray, " e"]:
-        """Texels whose samples differ, or that differ from a neighbor."""
-        beside = self._steps(mean) > REFINE_STEP
-        within = ((high - low).max(axis=1) > REFINE_STEP) | ((weight > 0) & (weight < FIRST_SAMPLES))
-        chosen = (beside | within)[self._texels]
-        return self._texels[chosen]
-
-    def _steps(self, mean: np.ndarray) -> Float64[ndarray, " P"]:
-        """Largest difference of each texel to a neighbor."""
-        image = mean.max(axis=1).reshape(self._receivers.height, self._receivers.width)
-        from scipy import ndimage
-
-        return (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
+            self._add(sums, self._samples(texels[start : start + step], numbers), light, numbers)
 
     def _first(self, start: int) -> Samples:
         if start in self._kept:
@@ -134,45 +133,25 @@ class RayTracer:
             self._kept[start] = samples
         return samples
 
-    def _lit(self, samples: Samples, light: DirectionalLight | PointLight, numbers: range) -> Float32[ndarray, "n 3"]:
-        """N.L times the light that reaches each sample, for a white light."""
-        to_light, distance, strength = self._towards(samples, light, numbers)
-        NoL = np.einsum("nc,nc->n", samples.normal, to_light)
-        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (strength > 0))
-        result = np.zeros((len(NoL), 3), np.float32)
-        direction = to_light[lit].astype(np.float32)
+    def _add(self, sums: TexelSums, samples: Samples, light: CastingLight, numbers: range) -> None:
+        """Add the light that reaches each sample from a white light."""
+        count = len(samples.texel)
+
+        def square() -> Float64[ndarray, "n 2"]:
+            number = numbers.start + np.arange(count) // max(1, count // len(numbers))
+            return (self._disc[number] + self._turn[samples.texel, 2:]) % 1
+
+        rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, square)
+        NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
+        visible = np.repeat(rays.opening.astype(np.float32)[:, None], 3, axis=1)
+        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0))
+        direction = rays.direction[lit].astype(np.float32)
         point, face = samples.point[lit], samples.face[lit]
         NgL = np.einsum("nc,nc->n", face, direction)
-        low_sun = NoL[lit] < TERMINATOR
-        amount = np.where(low_sun, 2 - (NgL + NoL[lit]) / TERMINATOR, 1 - NgL / TERMINATOR)
-        origin = point + samples.lift[lit] * np.clip(amount, 0, 1)[:, None]
+        origin = point + samples.lift[lit] * rounded_share(NoL[lit], NgL)[:, None]
         origin += face * (np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1)))[:, None]
-        passed = self._passed(origin, direction, None if distance is None else distance[lit])
-        result[lit] = passed * (NoL * strength)[lit, None]
-        return result
-
-    def _towards(
-        self, samples: Samples, light: DirectionalLight | PointLight, numbers: range
-    ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-        """(unit vector to the light, distance or None, strength) of every sample."""
-        count = len(samples.texel)
-        if isinstance(light, PointLight):
-            vector = np.array(light.position) - samples.point
-            distance = np.linalg.norm(vector, axis=1)
-            unit = vector / np.maximum(distance, 1e-30)[:, None]
-            strength = attenuation(distance, light)
-            if isinstance(light, SpotLight):
-                strength = strength * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
-            return unit, distance, strength
-        axis = np.array(light.direction)
-        if self._receivers.sun_angle == 0:
-            return np.broadcast_to(axis, (count, 3)), None, np.ones(count)
-        number = numbers.start + np.arange(count) // max(1, count // len(numbers))
-        disc = disc_points((self._disc[number] + self._turn[samples.texel, 2:]) % 1) * np.tan(self._receivers.sun_angle / 2)
-        across = np.cross(axis, [1, 0, 0] if abs(axis[0]) < 0.9 else [0, 1, 0])
-        across /= np.linalg.norm(across)
-        unit = axis + disc[:, :1] * across + disc[:, 1:] * np.cross(axis, across)
-        return unit / np.linalg.norm(unit, axis=1, keepdims=True), None, np.ones(count)
+        visible[lit] *= self._passed(origin, direction, None if rays.distance is None else rays.distance[lit])
+        sums.add(samples.texel, samples.share, rays.importance, visible, rays.irradiance)
 
     def _passed(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Float32[ndarray, "n 3"]:
         """Transmittance of each ray: 0 behind opaque surfaces, else the product over the walls on the way."""
@@ -204,6 +183,8 @@ class RayTracer:
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
         square = (self._square[numbers.start : numbers.stop, None] + self._turn[None, texels, :2]) % 1  # (s, e, 2)
+        if numbers.start == 0:
+            square[:FIRST_SAMPLES] = _balanced(self._turn[texels])
         texel = np.tile(texels, len(numbers))
         square = square.reshape(-1, 2)
         return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
@@ -272,29 +253,11 @@ class RayTracer:
         return np.maximum(image[source], 0)
 
 
-@dataclass(frozen=True)
-class _Sums:
-    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance for any mixture; minimum and maximum."""
+def _has_size(light: CastingLight) -> bool:
+    return isinstance(light, (AreaLight, SphereLight))
 
-    total: Float64[ndarray, "P 3"]
-    share: Float64[ndarray, "P 3"]
-    low: Float32[ndarray, "P 3"]
-    high: Float32[ndarray, "P 3"]
 
-    def add(self, samples: Samples, light: Float32[ndarray, "n 3"]) -> None:
-        """Add the light at `samples`."""
-        every = np.broadcast_to(samples.share, light.shape)
-        for channel in range(3):
-            self.total[:, channel] += np.bincount(samples.texel, light[:, channel] * every[:, channel], len(self.total))
-            self.share[:, channel] += np.bincount(samples.texel, every[:, channel], len(self.share))
-        real = samples.weight > 0
-        np.minimum.at(self.low, samples.texel[real], light[real])
-        np.maximum.at(self.high, samples.texel[real], light[real])
-
-    def mean(self) -> Float64[ndarray, "P 3"]:
-        """Mean light of every texel."""
-        return self.total / np.maximum(self.share, MIN_DIFFUSE)
-
-    def spread(self, texels: Int[ndarray, " e"]) -> Float32[ndarray, " e"]:
-        """Difference between the largest and the smallest sample of `texels`."""
-        return (self.high[texels] - self.low[texels]).max(axis=1)
+def _balanced(turn: Float64[ndarray, "e 4"]) -> Float64[ndarray, "s e 2"]:
+    """FIRST_SAMPLES points of the unit square, one in each quarter and their mean in its middle: a slope over a texel makes no noise."""
+    one, two = turn[:, :2] / 2, turn[:, 2:] / 2 + [0.5, 0]
+    return np.stack([one, 1 - one, two, 1 - two])

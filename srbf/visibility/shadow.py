@@ -11,6 +11,8 @@ from srbf.arrays import Float, Float64
 from srbf.io.scene_glb import KNOTS
 from srbf.lights import triple
 
+TERMINATOR = 0.1  # cosine below which a smooth surface's light is looked up on the rounded surface [Hanika2021], Cycles' default
+
 
 @dataclass(frozen=True)
 class SunFrame:
@@ -79,3 +81,11 @@ def transmittance(curve: Float[ndarray, "n KNOTS 3"], cosine: Float[ndarray, " n
 def direct(normal: Float[ndarray, "n 3"], to_light: Float[ndarray, " 3"], visibility: Float[ndarray, "n 3"]) -> Float[ndarray, "n 3"]:
     """N.L times visibility: the irradiance by a directional light of unit irradiance."""
     return np.maximum(normal @ to_light, 0)[:, None] * visibility
+
+
+def rounded_share(NoL: Float[ndarray, " n"], NgL: Float[ndarray, " n"]) -> Float[ndarray, " n"]:
+    """How far the lookup of a smooth surface moves from its triangle (0) to the rounded surface (1) [Hanika2021].
+
+    `NoL`, `NgL`: cosines of the light to the shading normal and to the triangle's.
+    """
+    return np.clip(np.where(NoL < TERMINATOR, 2 - (NgL + NoL) / TERMINATOR, 1 - NgL / TERMINATOR), 0, 1)

@@ -23,6 +23,7 @@ from srbf.bake.accumulation import Accumulation
 from srbf.bake.folder import hold, hold_shard
 from srbf.bake.images import CaptureImages
 from srbf.bake.light_pass import add_pass
+from srbf.bake.light_sets import CloudSet, NamedSet
 from srbf.bake.openjd import LIGHT_LIST, arguments, template
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
@@ -280,7 +281,9 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     ):
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
-    missing = set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "denoise", "no_shadow"}
+    missing = (
+        set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "light_set", "denoise", "no_shadow"}
+    )
     assert not missing and "--no-cast-shadow=Roof" in flags
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
@@ -296,3 +299,16 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     (tmp_path / "some.lp").write_text("1\na.png 0 0 1\n")
     listed = template(bake_of(tmp_path, light_list=tmp_path / "some.lp"))
     assert [entry["default"] for entry in listed["parameterDefinitions"] if entry["name"] == "LightList"] == [LIGHT_LIST]
+
+
+@pytest.mark.parametrize(
+    ("light_set", "expected"),
+    [
+        (NamedSet(("Hall", "Yard"), (("Hall", ()),)), ["--light-set=named", "--light-group=Hall", "--light-group=Yard"]),
+        (CloudSet("cloud", 77, 0.5, (0, 0, 0, 1, 2, 3)), ["--light-set=cloud", "--lights=77", "--grid=0.5", "--light-bounds=0,0,0,1,2,3"]),
+        (CloudSet("patches", 300), ["--light-set=patches", "--patches=300", "--transport=indirect"]),
+    ],
+)
+def test_a_job_of_a_light_set_says_what_it_is(light_set: NamedSet | CloudSet, expected: list[str]) -> None:
+    flags = arguments(BakeSettings(Receiver("lightmap", "A"), transport="indirect", light_set=light_set))
+    assert set(expected) <= set(flags)

@@ -64,7 +64,7 @@ def test_planned_point_lights_have_their_roles_and_places() -> None:
     lights = plan_lights(settings)
     assert [light.role for light in lights] == ["train"] * 2 + ["validation"] * 2 + ["holdout"] * 3
     assert [light.place[0] for light in lights] == [0, 1, 0.1, 0.2, 0.3, 0.4, 0.5]
-    assert lights[2].placed() == {"kind": "point", "position": [0.1, 0, 1]}
+    assert lights[2].placed.json() == {"kind": "point", "position": [0.1, 0, 1]}
     record = json.loads(json.dumps(settings.record()))
     assert "lights" not in record and record["points"]["spacing"] == 1 and record["points"]["box"] == list(BOX)
     moved = settings_with(PointGrid(1.0, BOX, ((0, 0, 1.5), (1, 0, 1)), points.random))

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import importlib.util
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from srbf.bake.light_sets import PlacedLight
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import PlannedLight
 from srbf.bake.worker_pool import Task
 
-LIGHT = PlannedLight(7, (0.0, 0.6, 0.8), "train", 2, 5)
+LIGHT = PlannedLight(7, PlacedLight("directional", (0.0, 0.6, 0.8)), "train", 2, 5)
 needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="this Python has no bpy")
 
 
@@ -31,7 +33,7 @@ def test_a_request_is_one_json_object() -> None:
 
 def test_a_task_asks_for_the_images_that_it_takes() -> None:
     assert Task(LIGHT, 2, 3).request == RenderRequest(LIGHT, 2, 3)
-    assert Task(LIGHT, 2, 3, direct=True).request.channels == ("response", "direct")
+    assert Task(replace(LIGHT, parts=("response", "direct")), 2, 3).request.channels == ("response", "direct")
     assert Task(LIGHT, 2, 3, denoise=True).request.channels == ("denoised",)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from srbf.bake.light_sets import PlacedLight
 from srbf.bake.schedule import next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, Receiver, plan_lights
 from srbf.sphere import all_around, farthest_points, point_set
@@ -69,7 +70,7 @@ def test_tested_lights_stand_between_the_others() -> None:
     ],
 )
 def test_passes_double_the_samples(role: str, goal: int, first: int, expected: list[int]) -> None:
-    light = PlannedLight(0, (0, 0, 1), role, goal, 0)
+    light = PlannedLight(0, PlacedLight("directional", (0, 0, 1)), role, goal, 0)
     passes: list[int] = []
     while sum(passes) < goal:
         passes.append(next_samples(light, sum(passes), goal, first))

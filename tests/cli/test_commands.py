@@ -71,7 +71,7 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     result = json.loads(ok("evaluate", asset, capture.folder, "--json"))
     assert set(result) == {"train", "holdout", "lights"}
     assert set(result["train"]) == {"rmse", "relative_rmse", "psnr", "psnr_pooled", "peak"}
-    assert set(result["lights"][0]) == {"file", "role", "rmse"} and len(result["lights"]) == 68
+    assert set(result["lights"][0]) == {"file", "role", "rmse", "relative_rmse"} and len(result["lights"]) == 68
     assert result["holdout"] == opened.manifest["error"]["holdout"]
     assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
@@ -250,7 +250,10 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
         (["--point", "0,0,1", "--reference-distance", "0"], "--reference-distance: expected a number above 0, found '0'"),
         (["--spot", "0,0,1,0,0,-1,0.5,0.2"], "inner"),
         (["--exposure", "bright"], "--exposure: expected a number from -100 to 100, found 'bright'"),
-        ([], "expected a light, found none; add --directional, --point, --spot, --environment or --ambient-only"),
+        (
+            [],
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --environment or --ambient-only",
+        ),
         (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
         (["--lights", "frames.json", "--point", "0,0,1"], "put all lights into the file"),
     ],

@@ -17,8 +17,10 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import read_image, write_image
-from srbf.lights import DirectionalLight
+from srbf.lights import AreaLight, DirectionalLight, NamedLight, PointLight
 from srbf.methods import relight
+from srbf.relighting.direct_light import Added, Direct
+from srbf.unshadowed import irradiance_from
 
 BOUNCE = np.array([0.2, 0.1, 0.05])
 
@@ -79,7 +81,7 @@ def test_relight_adds_direct_light_and_says_so(asset: Path, tmp_path: Path, dire
     flags = [] if direct is None else ["--direct", direct]
     done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--directional", "0.6,0,0.8,2,1,1", "--renderer", renderer, *flags)
     assert done.exit_code == 0, done.stderr
-    assert {"none": "wrote", "shadow-map": "by a shadow map"}.get(direct or "ray", "exact direct light by rays") in done.stderr
+    assert {"none": "wrote", "shadow-map": "by shadow maps"}.get(direct or "ray", "exact direct light by rays") in done.stderr
     alone = relight(Asset.open(asset), [DirectionalLight((0.6, 0.0, 0.8), (2.0, 1.0, 1.0))])
     added = 0.0 if direct == "none" else 0.8 * np.array([2, 1, 1])
     np.testing.assert_allclose(read_image(tmp_path / "lit.exr", 3), alone + added, rtol=1e-4, atol=1e-5)
@@ -95,7 +97,55 @@ def test_frames_and_point_lights_take_rays(asset: Path, tmp_path: Path) -> None:
     lit = read_image(tmp_path / "frames" / "0000.exr", 3)
     assert (lit[..., 0] > 0.99 / distance**2).all()
     assert (read_image(tmp_path / "frames" / "0001.exr", 3) == 0).all()
-    assert "--direct ray" in refused("relight", asset, "-o", tmp_path / "x.exr", "--point", "0,0,1", "--direct", "shadow-map")
+
+
+PLACED = {
+    "point": ("--point", "0.1,0.2,1"),
+    "spot": ("--spot", "0.1,0.2,1,0,0,-1,0.3,0.5"),
+    "sphere": ("--sphere", "0.1,0.2,1,0.2"),
+}
+
+
+@pytest.mark.parametrize("kind", PLACED)
+def test_lights_inside_the_scene_light_it_by_rays_and_by_shadow_maps(asset: Path, tmp_path: Path, kind: str) -> None:
+    found = {}
+    for direct in ("none", "ray", "shadow-map"):
+        out = tmp_path / f"{direct}.exr"
+        ok("relight", asset, "-o", out, *PLACED[kind], "--falloff", "inverse-square", "--direct", direct)
+        found[direct] = read_image(out, 3)
+    assert found["ray"].max() > found["none"].max() + 0.2
+    np.testing.assert_allclose(found["shadow-map"], found["ray"], rtol=2e-2, atol=2e-3)
+    if kind == "point":
+        images = Asset.open(asset).images
+        light = PointLight((0.1, 0.2, 1.0), falloff="inverse-square")
+        expected = irradiance_from(light, *(images[name].reshape(-1, 3) for name in ("position", "normal")))
+        np.testing.assert_allclose((found["ray"] - found["none"])[..., 1].ravel(), expected, rtol=2e-2, atol=2e-3)
+
+
+@pytest.mark.parametrize(("flag", "kind"), [("--area=0.1,0.2,1,0.4,0,0,0,-0.4,0", "an area"), ("--light=Window=1", "a named")])
+def test_an_asset_of_directions_has_no_bounces_of_such_lights(asset: Path, tmp_path: Path, flag: str, kind: str) -> None:
+    done = srbf("relight", asset, "-o", tmp_path / "lit.exr", flag)
+    assert done.exit_code == 1 and f"found {kind} light; capture patches" in done.stderr and not (tmp_path / "lit.exr").exists()
+
+
+@pytest.mark.parametrize("kind", ["ray", "shadow-map"])
+def test_an_area_light_lights_the_receivers_of_a_scene(asset: Path, kind: Direct) -> None:
+    opened = Asset.open(asset)
+    light = AreaLight((0.1, 0.2, 1), u=(0.4, 0, 0), v=(0, -0.4, 0))
+    with Added(opened, kind) as added:
+        found = added.response([light])
+    assert found is not None
+    expected = irradiance_from(light, *(opened.images[name].reshape(-1, 3) for name in ("position", "normal")))
+    np.testing.assert_allclose(found[..., 1].ravel(), expected, rtol=2e-2, atol=2e-3)
+
+
+def test_a_named_light_has_no_direct_light_of_its_own(asset: Path) -> None:
+    with Added(Asset.open(asset), "ray") as added:
+        assert (added.response([NamedLight("Window")]) == 0).all()  # type: ignore[union-attr]
+        assert added.notes([NamedLight("Window")]) == [
+            "a named light's direct light is not added: the picture holds only what it reflects on"
+        ]
+        assert len(added.notes([NamedLight("Window"), PointLight((0.0, 0.0, 1.0))])) == 2
 
 
 def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
@@ -130,7 +180,7 @@ def test_without_embreex_a_shadow_map_stands_in(asset: Path, tmp_path: Path, mon
     for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore_scene"):
         monkeypatch.setitem(sys.modules, name, None)
     assert "pip install embreex" in refused("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--direct", "ray")
-    assert "by a shadow map" in srbf("relight", asset, "-o", tmp_path / "y.exr", "--directional", "0,0,1").stderr
+    assert "by shadow maps" in srbf("relight", asset, "-o", tmp_path / "y.exr", "--directional", "0,0,1").stderr
 
 
 def test_what_the_asset_lacks_is_named(asset: Path, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 from made_captures import write_capture
 
 import srbf
-from srbf import lights, methods, sphere
+from srbf import light_geometry, lights, methods, sphere, unshadowed
 from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.export import export
@@ -22,7 +22,15 @@ from srbf.relighting.relighter import relight
 pytestmark = pytest.mark.slow  # fits and relights for every example
 ROOT = Path(__file__).parents[2]
 BAKING = (Bake, BakeSettings, Receiver)
-LIGHTS = (lights.attenuation, lights.environment_samples, lights.light_vectors, lights.moved, lights.spot_cone)
+LIGHTS = (
+    light_geometry.area_samples,
+    light_geometry.attenuation,
+    light_geometry.environment_samples,
+    light_geometry.light_vectors,
+    light_geometry.spot_cone,
+    lights.moved,
+    unshadowed.irradiance_from,
+)
 METHODS = (
     *(methods.in_asset_frame, methods.linear_response, methods.method_of, methods.outside_domain),
     *(methods.projected_weights, methods.relight, methods.responses, relight),

@@ -25,7 +25,7 @@ def ring_dome(counts: tuple[int, ...] = (12, 10, 8), elevations: tuple[float, ..
 
 def test_a_ring_is_a_band() -> None:
     lights = ring_dome()
-    groups = [list(group) for array in Directions.left_out_groups(lights) for group in array]
+    groups = [list(group) for array in Directions("sphere").left_out_groups(lights) for group in array]
     assert sorted(group[0] for group in groups) == list(range(30))
     rings = [set(range(12)), set(range(12, 22)), set(range(22, 30))]
     assert all(set(group) in rings for group in groups)
@@ -33,7 +33,7 @@ def test_a_ring_is_a_band() -> None:
 
 def test_of_many_lights_some_are_the_middle() -> None:
     lights = point_set("fibonacci", 300, "sphere")
-    groups = [group for array in Directions.left_out_groups(lights) for group in array]
+    groups = [group for array in Directions("sphere").left_out_groups(lights) for group in array]
     assert len(groups) == BANDED_LIGHTS
     height = 0.4 * mean_spacing(lights)
     for group in groups:
@@ -48,7 +48,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
     centers = point_set("fibonacci", 50, "hemisphere")
     basis = weight(lights @ centers.T, 0.4)
     images = basis @ rng.normal(size=(50, 300)) + 0.01 * rng.normal(size=(count + 7, 300))
-    held_out = HeldOut.of(images @ images.T / 300, Directions.left_out_groups(lights[:count]), count)
+    held_out = HeldOut.of(images @ images.T / 300, Directions("sphere").left_out_groups(lights[:count]), count)
     kernel = basis @ basis.T
     path = KernelPath(kernel[:count, :count])
 
@@ -70,7 +70,7 @@ def test_errors_are_those_of_fits_without_the_lights(count: int) -> None:
 
 def test_no_light_drowns_the_rest() -> None:
     lights = ring_dome()
-    held_out = HeldOut.of(np.eye(30), Directions.left_out_groups(lights), 30)
+    held_out = HeldOut.of(np.eye(30), Directions("sphere").left_out_groups(lights), 30)
     even, spiked = np.full(30, 1e-2), np.full(30, 1e-3)
     spiked[29] = 10.0
     assert held_out.score(spiked, spiked) < held_out.score(even, even)

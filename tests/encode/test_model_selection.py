@@ -43,7 +43,7 @@ def fitted(matrix: np.ndarray, values: np.ndarray, ridge: float) -> np.ndarray:
 def test_choice_equals_the_slow_twin(validated: bool, noise: float) -> None:
     given, centers = sample(noise, validated)
     values = given.responses.transpose(1, 0, 2).reshape(len(given.coordinates), -1).astype(np.float64)
-    groups = [group for array in Directions.left_out_groups(given.coordinates[:TRAIN]) for group in array]
+    groups = [group for array in Directions("sphere").left_out_groups(given.coordinates[:TRAIN]) for group in array]
     held_out = given.held_out()
     scores: dict[tuple[float, float], tuple[float, float]] = {}
     for spread, weights in candidates(given, centers):
@@ -125,12 +125,12 @@ def test_gram_is_the_images_mean_products() -> None:
 
 
 def test_quadrature_weights_of_a_lattice_are_equal_and_twins_share() -> None:
-    assert Directions.quadrature(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
+    assert Directions("sphere").quadrature(point_set("fibonacci", 300, "sphere")) == pytest.approx(np.ones(300), rel=0.2)
     octahedron = np.concatenate([np.eye(3), -np.eye(3)])
-    np.testing.assert_allclose(Directions.quadrature(octahedron), 1)
+    np.testing.assert_allclose(Directions("sphere").quadrature(octahedron), 1)
     lights = point_set("fibonacci", 60, "sphere")
     twin = normalize(lights[:1] + 1e-6)
-    shares = Directions.quadrature(np.concatenate([lights, twin]))
+    shares = Directions("sphere").quadrature(np.concatenate([lights, twin]))
     assert shares[[0, -1]] == pytest.approx(shares[1:-1].mean() / 2, rel=0.1)
 
 

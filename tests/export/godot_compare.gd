@@ -19,6 +19,9 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	var relight := SrbfRelight.new()
 	relight.asset = asset
 	relight.suns_by_table = job.by_table
+	for name in job.mix:
+		var color: Array = job.mix[name][1]
+		relight.set_light(name, job.mix[name][0], Color(color[0], color[1], color[2]))
 	if job.sky:
 		var rows := PackedFloat32Array(job.sky).to_byte_array()
 		relight.sky = ImageTexture.create_from_image(Image.create_from_data(16, 8, false, Image.FORMAT_RGBF, rows))

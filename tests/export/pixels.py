@@ -16,7 +16,8 @@ from srbf.export import spirv
 from srbf.gl.context import create_context
 from srbf.gl.textures import AssetTextures, Limits
 from srbf.gl.uniforms import padded, point_light_uniforms
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight, attenuation, light_vectors
+from srbf.light_geometry import attenuation, light_vectors
+from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
 from srbf.methods.coefficient_maps import components_of, first_function
 from srbf.methods.relighting_map import basis_weights
 

@@ -90,12 +90,12 @@ def picture(asset: Asset, method: str, light: Any) -> dict[str, Any]:
         "code": wgsl.asset_module(asset) + STAGE.replace("COUNT", str(len(values))).replace("BODY", body),
         "width": asset.width,
         "height": asset.height,
-        "images": [_image(pixels) for pixels in textures],
+        "images": [texels_of(pixels) for pixels in textures],
         "values": encoded(values),
     }
 
 
-def _image(pixels: np.ndarray) -> dict[str, Any]:
+def texels_of(pixels: np.ndarray) -> dict[str, Any]:
     layers = pixels if pixels.ndim == 4 else pixels[None]
     four = np.ones((*layers.shape[:3], 4), np.float32)
     four[..., : layers.shape[3]] = layers

@@ -31,7 +31,7 @@ needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono"
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 HERE = Path(__file__).parent / "unity"
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds")
+ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds", "SrbfLightTable", "SrbfPositionTable")
 AXES = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)  # of the asset from Unity's, written down once more
 OFFSET = np.array([0.2, -0.4, 0.3])  # of the imported scene's root, in the asset's axes
 FARS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)), DirectionalLight((-0.6, 0.1, 0.4), (0.2, 0.5, 0.9))]
@@ -150,9 +150,12 @@ def test_the_graph_version_takes_a_texture_array_and_a_sampler(folders: dict[str
     spirv.compile_hlsl(text + "\nfloat4 main() : SV_Target { return 0.0; }\n")
 
 
+Said = dict[str, list[list[float]]]
+
+
 @pytest.fixture(scope="module")
-def responses(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], dict[str, list[list[float]]]]:
-    """What the engine-free C# says of an exported folder, rows of numbers by name."""
+def ask(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, list[float]], Said]:
+    """What the engine-free C# says of an exported folder and of lights as numbers, rows of numbers by name."""
     program = tmp_path_factory.mktemp("mono") / "responses.exe"
     sources = [engine_root("unity") / "Srbf" / "Runtime" / f"{name}.cs" for name in ENGINE_FREE]
     done = subprocess.run(
@@ -160,19 +163,25 @@ def responses(folders: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
     )
     assert done.returncode == 0, done.stdout + done.stderr
 
-    def ask(folder: Path) -> dict[str, list[list[float]]]:
-        numbers = [repr(float(value)) for light in FARS for value in (*light.direction, *light.color)]
-        done = subprocess.run(["mono", str(program), str(folder), *numbers], capture_output=True, text=True, timeout=60)
+    def found(folder: Path, lights: list[float]) -> Said:
+        done = subprocess.run(["mono", str(program), str(folder), *map(repr, lights)], capture_output=True, text=True, timeout=60)
         assert done.returncode == 0, done.stderr
         if done.stdout.startswith("refused"):
             raise ValueError(done.stdout.strip())
-        said: dict[str, list[list[float]]] = {}
+        said: Said = {}
         for line in done.stdout.splitlines():
             name, *values = line.split()
             said.setdefault(name, []).append([float(value) for value in values])
         return said
 
-    return ask
+    return found
+
+
+@pytest.fixture(scope="module")
+def responses(ask: Callable[[Path, list[float]], Said]) -> Callable[[Path], Said]:
+    """The same under distant lights."""
+    numbers = [float(value) for light in FARS for value in (*light.direction, *light.color)]
+    return lambda folder: ask(folder, numbers)
 
 
 @needs_mono

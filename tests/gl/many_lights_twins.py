@@ -14,7 +14,8 @@ from srbf.basis import gaussian, octahedral_table
 from srbf.gl.coefficient_maps import projected_rows
 from srbf.gl.textures import pairs_of
 from srbf.gl.uniforms import packed_point_lights, padded, point_light_uniforms
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, attenuation, environment_samples, light_vectors
+from srbf.light_geometry import attenuation, environment_samples, light_vectors
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight
 from srbf.methods import coefficient_maps as coefficient_maps
 from srbf.methods import linear_response, projected_weights
 from srbf.methods.relighting_map import basis_weights

@@ -13,7 +13,8 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
+from srbf.light_geometry import attenuation, light_vectors
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, moved
 from srbf.methods import projected_weights
 from srbf.methods.relighting_map import receiver_weights
 from srbf.relighting.relighter import Relighter, relight

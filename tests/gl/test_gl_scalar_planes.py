@@ -14,7 +14,8 @@ from srbf.asset import Asset
 from srbf.basis.octahedral_table import lookup
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, attenuation, light_vectors, moved
+from srbf.light_geometry import attenuation, light_vectors
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, moved
 from srbf.methods import linear_response, projected_weights
 from srbf.methods.coefficient_maps import components_of, first_function
 from srbf.relighting.relighter import Relighter

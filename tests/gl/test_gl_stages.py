@@ -54,6 +54,13 @@ def test_every_method_has_the_same_stages() -> None:
     kinds = ["accumulate", "directional", "projected", "lightmap", "lights", "point"]
     methods = [f"{method}{kind}.frag" for method in METHODS for kind in kinds]
     shadows = ["direct.frag", "direct_on_mesh.frag", "shadow.vert", "shadow_height.frag", "shadow_transmittance.frag"]
+    shadows += [
+        "direct_point.frag",
+        "direct_point_on_mesh.frag",
+        "point_shadow.vert",
+        "point_shadow_nearness.frag",
+        "point_shadow_transmittance.frag",
+    ]
     environments = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
     assert sorted([*methods, *shadows, *environments, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
@@ -63,7 +70,8 @@ def test_every_method_has_the_same_stages() -> None:
 def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[str, object], version: str) -> None:
     if version == "300 es" and "GL_ARB_ES3_compatibility" not in context.extensions:
         pytest.skip("this driver compiles no ES 3.00 on a desktop context")
-    fragment = {"fullscreen.vert": "finish.frag", "shadow.vert": "shadow_height.frag"}.get(name, name)
+    fragments = {"fullscreen.vert": "finish.frag", "shadow.vert": "shadow_height.frag", "point_shadow.vert": "point_shadow_nearness.frag"}
+    fragment = fragments.get(name, name)
     if name == "lightmap.vert":
         fragment, defines = "lightmap.frag", DEFINES["lightmap.frag"][0]
     vertex = resolve(f"stages/{vertex_of(fragment)}", version=version)
@@ -75,6 +83,8 @@ def test_the_driver_compiles_every_stage(context: Any, name: str, defines: dict[
 
 def vertex_of(fragment: str) -> str:
     """The vertex stage that goes with a fragment stage."""
+    if fragment.startswith("point_shadow"):
+        return "point_shadow.vert"
     return "shadow.vert" if "shadow" in fragment else "lightmap.vert" if "lightmap" in fragment else "fullscreen.vert"
 
 
@@ -132,6 +142,11 @@ def test_the_readme_says_what_every_stage_and_define_takes() -> None:
         if name.split(".")[0] in (
             "direct",
             "direct_on_mesh",
+            "direct_point",
+            "direct_point_on_mesh",
+            "point_shadow",
+            "point_shadow_nearness",
+            "point_shadow_transmittance",
             "shadow",
             "shadow_height",
             "shadow_transmittance",

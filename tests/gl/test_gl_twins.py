@@ -12,7 +12,9 @@ from typing import Any
 import depth_twins  # noqa: F401  registers its twins
 import many_lights_twins  # noqa: F401
 import numpy as np
+import point_shadow_twins  # noqa: F401
 import pytest
+import rounded_twins  # noqa: F401
 from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, point_light_expression, twin, units, vec4
 
 from srbf.asset import Asset
@@ -20,7 +22,8 @@ from srbf.basis import octahedral_table
 from srbf.basis.gaussian import lookup, r_table
 from srbf.gl.includes import shader_root
 from srbf.gl.uniforms import padded
-from srbf.lights import DirectionalLight, PointLight, attenuation, light_vectors, spot_cone
+from srbf.light_geometry import attenuation, light_vectors, spot_cone
+from srbf.lights import DirectionalLight, PointLight
 from srbf.methods import coefficient_maps as coefficient_maps
 from srbf.methods import linear_response, projected_weights, relight
 from srbf.methods.coefficient_maps import first_function

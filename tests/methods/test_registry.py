@@ -50,7 +50,7 @@ def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def test_methods_are_listed_from_the_simplest() -> None:
-    assert registry.method_names() == ("relighting-map", "eigen-map", "clustered-eigen-map")
+    assert registry.method_names() == ("relighting-map", "eigen-map", "clustered-eigen-map", "light-mix", "light-cloud", "named-maps")
     assert [registry.method_named(name).name for name in registry.method_names()] == list(registry.method_names())
 
 

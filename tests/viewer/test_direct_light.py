@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -16,11 +19,13 @@ from web_assets import complete
 
 from srbf.asset import Asset
 from srbf.export import export
-from srbf.lights import DirectionalLight
+from srbf.io.image import write_image
+from srbf.lights import DirectionalLight, PointLight, SpotLight
 from srbf.methods import relight
 from srbf.relighting.direct_light import Added
 
 SIDE, ZOOM = 24, 16
+POINT_APART, POINT_MEAN = 2.0, 2.0  # bytes: nine of ten texels; a texel at a shadow's edge is a mean of four points here
 TRANSMITTANCE = np.linspace(0.2, 1.2, 24).reshape(8, 3)
 MOST_APART, MEAN_APART = (
     24.0,
@@ -68,16 +73,49 @@ def test_terms_are_the_shadow_map_s_and_the_maps(chromium: Any, split: Asset, se
         assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART), terms
 
 
-def test_point_lights_say_that_their_direct_light_is_missing(
+@pytest.mark.parametrize("kind", ["point", "spot", "wide spot"])
+def test_lights_inside_the_scene_cast_shadows_as_rays_do(
+    chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path, kind: str
+) -> None:
+    """A point light by the faces of a cube, a spot by one map, a wide spot by a cube again: crisp, through tinted panes."""
+    split.save(tmp_path / "asset")
+    common = {
+        "on": True,
+        "color": "#ffffff",
+        "intensity": 1.0,
+        "position": [0.25, -0.3, 1.1],
+        "a0": 1.2,
+        "falloff": "inverse-square",
+        "radius": 0.001,
+    }
+    state = {"kind": "point", **common}
+    light: PointLight = PointLight((0.25, -0.3, 1.1), a0=1.2, falloff="inverse-square", radius=0.001)
+    if kind != "point":
+        inner, outer = (20, 40) if kind == "spot" else (50, 75)
+        state |= {"kind": "spot", "target": [0.0, 0.0, 0.0], "inner": inner, "outer": outer}
+        angles = {"inner": np.radians(inner), "outer": np.radians(outer)}
+        light = SpotLight((0.25, -0.3, 1.1), a0=1.2, falloff="inverse-square", radius=0.001, direction=(-0.25, 0.3, -1.1), **angles)
+    with Added(split, "ray") as added:
+        expected = added.response([light])
+    assert (expected.min(axis=2) < 0.02 * expected.max()).mean() > 0.02, "the ball's shadow"
+    hashed = json.dumps({"zoom": ZOOM, "middle": [SIDE / 2, SIDE / 2], "terms": "direct", "exposure": 0, "lights": [state]})
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(hashed)}", width=WIDTH, height=HEIGHT)
+    apart = np.abs(chromium.texels(SIDE, SIDE, ZOOM) - shown_as(expected))
+    assert np.quantile(apart, 0.9) <= POINT_APART, np.quantile(apart, [0.5, 0.9, 0.95, 1])
+    assert apart.mean() <= POINT_MEAN
+
+
+def test_environments_say_that_their_direct_light_is_missing(
     chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path
 ) -> None:
     split.save(tmp_path / "asset")
     chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
-    assert "indirect light only" not in chromium("run", script="document.getElementById('status').textContent")
     chromium("choose", selector=".chip.add", value="point")
-    assert "point, spot and environment lights: indirect light only" in chromium(
-        "run", script="document.getElementById('status').textContent"
-    )
+    assert "indirect light only" not in chromium("run", script="document.getElementById('status').textContent")
+    picture = tmp_path / "environment.exr"
+    write_image(picture, np.ones((4, 8, 3), np.float32), "float")
+    chromium("drop", name="environment.exr", bytes=base64.b64encode(picture.read_bytes()).decode())
+    assert "environments: indirect light only" in chromium("run", script="document.getElementById('status').textContent")
 
 
 def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[[Path], str], tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +17,8 @@ from web_assets import decoded
 
 from srbf.asset import Asset
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "viewer"))
 
 __all__ = ["npm"]  # a fixture
 KINDS = {DirectionalLight: "directional", PointLight: "point", SpotLight: "spot", EnvironmentLight: "environment"}

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from web_assets import HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
+from web_assets import FLOAT, HALF_EXTENT, LIGHTS, complete, on_a_plane, tolerance
 
 from srbf.asset import Asset
 from srbf.methods import relight
 
 ALBEDO = (0.8, 0.5, 0.3)
+PLACE = 2e-5  # of a texel: how far single precision may put a pixel off its middle
 BRIGHTEST = 30.0  # Babylon.js clamps what a PBR material hands to post-processes
 
 
@@ -27,12 +28,23 @@ def test_a_pbr_material_shows_albedo_times_irradiance_over_pi(
     assert (np.abs(shown - relight(asset, LIGHTS[kind])) <= tolerance(asset, LIGHTS[kind])).all()
 
 
-def test_eigen_maps_and_radiance_work_too_and_the_rest_is_refused(browser: Any, make_planes: Callable[..., Asset]) -> None:
+def test_eigen_maps_and_radiance_work_too(browser: Any, make_planes: Callable[..., Asset]) -> None:
     asset = complete(make_planes(components=6, encoding="uint8"), quantity="radiance", receiver={"kind": "view"})
     asset.images["coverage"][:] = 1
     job = {"lights": LIGHTS["several"], "color": ALBEDO, "half": HALF_EXTENT}
     shown = browser.picture("babylon-material", asset=browser.serve(asset), **job)
     expected = np.minimum(relight(asset, LIGHTS["several"]), BRIGHTEST)
     assert (np.abs(shown - expected) <= tolerance(asset, LIGHTS["several"])).all()
-    clustered = browser.serve(complete(make_planes(components=5, clusters=7)))
-    assert "found clustered-eigen-map" in browser.response("babylon-material", asset=clustered, **job)["error"]
+
+
+@pytest.mark.parametrize("filtering", ["nearest", "linear"])
+@pytest.mark.parametrize("kind", ["directional", "several"])
+def test_clusters_are_rebuilt_texel_by_texel(browser: Any, make_planes: Callable[..., Asset], kind: str, filtering: str) -> None:
+    """Each texel by its own cluster's functions; filtered, the light of four texels is mixed, which in a texel's middle is its own."""
+    asset = complete(on_a_plane(make_planes(components=5, clusters=7, encoding="half", ambient=True)))
+    job = {"asset": browser.serve(asset), "lights": LIGHTS[kind], "color": ALBEDO, "half": HALF_EXTENT, "filter": filtering}
+    shown = browser.picture("babylon-material", **job) * np.pi / ALBEDO
+    allowed = tolerance(asset, LIGHTS[kind])
+    if filtering == "linear":
+        allowed = allowed + PLACE * allowed.max() / FLOAT
+    assert (np.abs(shown - relight(asset, LIGHTS[kind])) <= allowed).all()

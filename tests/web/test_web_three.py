@@ -189,7 +189,10 @@ def test_a_gltf_export_loads_and_is_lit_by_the_asset_that_it_names(browser: Any,
 @pytest.mark.parametrize(
     ("light", "message"),
     [
-        ({"type": "HemisphereLight"}, "expected a DirectionalLight, PointLight or SpotLight to follow, found HemisphereLight"),
+        (
+            {"type": "HemisphereLight"},
+            "expected a DirectionalLight, PointLight, SpotLight or RectAreaLight to follow, found HemisphereLight",
+        ),
         ({"type": "PointLight", "decay": 1.5}, "expected a decay of 2"),
         ({"type": "PointLight", "distance": 3}, "expected a light of distance 0"),
     ],

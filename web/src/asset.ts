@@ -8,7 +8,7 @@ import { decodeKtx2 } from "./ktx2";
 import { checkStack, type LayerStack } from "./layers";
 import { checkManifest, isPicture, type LayerEntry, layersOf, type Manifest, methodOf } from "./manifest";
 import { IDENTITY, type Matrix4 } from "./matrix";
-import type { Method, Tables } from "./methods/method";
+import type { Method, ReadOptions, Tables } from "./methods/method";
 import { decodePng } from "./png";
 
 export interface Asset {
@@ -28,7 +28,7 @@ export interface Asset {
   readonly assetFromWorld: Matrix4;
 }
 
-export interface LoadOptions {
+export interface LoadOptions extends ReadOptions {
   /** In place of the browser's own. */
   fetch?: Fetch;
   /** Compare every file with the checksum that asset.json records; needs a secure context (https or localhost). */
@@ -57,7 +57,7 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
   const entries = layersOf(manifest);
   const [layers, tables, position, ambient, alpha] = await Promise.all([
     readLayers(files, manifest, entries),
-    method.read(files, manifest),
+    method.read(files, manifest, options),
     readImage(files, manifest, manifest.position),
     readImage(files, manifest, manifest.ambient),
     readAlpha(files, manifest),

@@ -8,6 +8,7 @@ import type { Triple } from "./matrix";
 import type { Fail, Tables } from "./methods/method";
 import type { NodeKit } from "./methods/node_kit";
 import type { N } from "./three/tsl/nodes";
+import { combined } from "./weighted_components";
 
 /** Keys of asset.json. A cluster has `scalars` + 1 light functions: that of the mean, and one per component. */
 interface CoefficientManifest extends Manifest {
@@ -57,9 +58,9 @@ export async function readCoefficientMaps(
     integers: { srbfTableSize: size },
     textures: { srbfTable: table },
     weights: { kind: "texture", width: components + 1, height: clusters },
-    projectedWeights(lights) {
+    projectedWeights({ distant }) {
       const projected = new Float64Array(3 * count);
-      addProjected(functions, lights, projected);
+      addProjected(functions, distant, projected);
       return projected;
     },
     sum: (kit, uv, receiver) => sum(kit, { components, size, columns: table.width / size }, clusterAt, uv, receiver),
@@ -73,29 +74,18 @@ function sum(
   uv: N,
   receiver: N,
 ): N {
-  const { int, ivec2, textureLoad, vec3 } = kit.tsl;
-  const { least, octahedralEncode, octahedralLookup } = kit.pack;
+  const { ivec2, textureLoad, vec3 } = kit.tsl;
+  const { octahedralEncode, octahedralLookup } = kit.pack;
   const { components } = shape;
   const lookup = octahedralLookup(kit.texture("srbfTable"), shape.size, shape.columns);
   const weights = kit.texture("srbfWeights");
   const total = vec3(0).toVar();
   const cluster = clusterAt(kit, uv).toVar();
-  /** w_0 plus the sum over components of a_j w_j, `lightFunction` giving w_j. */
-  const combined = (lightFunction: (j: N) => N, loop: string) => {
-    const response = lightFunction(int(0)).toVar();
-    kit.each(kit.layers, loop, (i) => {
-      const values = kit.decoded(uv, i).toVar();
-      [values.x, values.y, values.z, values.w].forEach((value, c) => {
-        response.addAssign(lightFunction(least(i.mul(4).add(c + 1), components)).mul(value)); // an unused channel is 0 and takes the last weight
-      });
-    });
-    return response;
-  };
-  total.addAssign(combined((j) => textureLoad(weights, ivec2(j, cluster)).rgb, "k"));
+  total.addAssign(combined(kit, uv, components, (j) => textureLoad(weights, ivec2(j, cluster)).rgb, "k"));
   kit.addPointLights(total, receiver, (direction) => {
     const place = octahedralEncode(direction).toVar();
     const first = cluster.mul(components + 1).toVar();
-    return combined((j) => lookup(first.add(j), place), "m");
+    return combined(kit, uv, components, (j) => lookup(first.add(j), place), "m");
   });
   return total;
 }

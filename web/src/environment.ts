@@ -1,4 +1,4 @@
-/** An equirectangular map as many directional lights: `srbf.lights.environment_samples`. */
+/** An equirectangular map as many directional lights: `srbf.light_geometry.environment_samples`. */
 import type { DistantLight } from "./asset_frame";
 import type { EnvironmentLight } from "./lights";
 import { determinant, type Matrix4, turned } from "./matrix";

@@ -1,9 +1,9 @@
 /**
- * Lights to relight by: directional, point, spot, environment. Meters, radians, scene-linear Rec.709; the asset's own world, Blender's: right-handed,
+ * Lights to relight by: directional, point, spot, sphere, area, environment, named. Meters, radians, scene-linear Rec.709; the asset's own world, Blender's: right-handed,
  * z up. The arithmetic is that of `srbf/lights.py`, in double precision.
  */
 import { SrbfError } from "./errors";
-import { carried, determinant, type Matrix4, type Triple, turned } from "./matrix";
+import { carried, cross, determinant, type Matrix4, type Triple, turned } from "./matrix";
 
 export const DEFAULT_RADIUS = 1e-4; // meters: least distance to a receiver, so that a point light in a surface stays finite
 const WHITE: Triple = [1, 1, 1];
@@ -37,6 +37,25 @@ export interface SpotLight extends Punctual {
   readonly outer: number;
 }
 
+/** A sphere of radius `size` (m) that shines: far away a point light, its shadows are soft. */
+export interface SphereLight extends Punctual {
+  readonly kind: "sphere";
+  readonly size: number;
+}
+
+/**
+ * A rectangle about `position` with the sides `u` and `v` (m) that shines towards u x v alone, evenly from every direction: `color` is the irradiance
+ * on its axis at the distance `a0` (m), where that is far away; E = color a0^2 / A times the integral of cos cos / r^2 over its area A.
+ */
+export interface AreaLight {
+  readonly kind: "area";
+  readonly position: Triple;
+  readonly u: Triple;
+  readonly v: Triple;
+  readonly color: Triple;
+  readonly a0: number;
+}
+
 /** An equirectangular radiance map, `width` x `height` RGB: u = 1/2 - atan2(y, x) / 2 pi, top row first and towards +z. */
 export interface EnvironmentLight {
   readonly kind: "environment";
@@ -46,8 +65,15 @@ export interface EnvironmentLight {
   readonly color: Triple;
 }
 
-export type Light = DirectionalLight | PointLight | SpotLight | EnvironmentLight;
-export type PunctualLight = PointLight | SpotLight;
+/** A light of the scene by its name; `color` is its intensity times its hue, 1 as the scene has it set. */
+export interface NamedLight {
+  readonly kind: "named";
+  readonly name: string;
+  readonly color: Triple;
+}
+
+export type Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight;
+export type PunctualLight = PointLight | SpotLight | SphereLight;
 
 /** @throws SrbfError on a direction of no length. */
 export function directionalLight(direction: Triple, color: Triple = WHITE): DirectionalLight {
@@ -73,6 +99,21 @@ export function spotLight(
   return { kind: "spot", ...punctual(position, options), direction: unit(direction), inner, outer };
 }
 
+/** Inverse-square unless `falloff` says otherwise; inside the sphere as strong as on its surface. @throws SrbfError as `pointLight`, and on a size not above 0. */
+export function sphereLight(position: Triple, size: number, options: Partial<Omit<Punctual, "position">> = {}): SphereLight {
+  if (!(size > 0 && Number.isFinite(size))) throw new SrbfError(`expected size above 0, found ${size}`);
+  const own = punctual(position, { falloff: "inverse-square", ...options });
+  return { kind: "sphere", ...own, size, radius: Math.max(own.radius, size) };
+}
+
+/** @throws SrbfError on numbers that are not finite, sides that span no rectangle, or a0 not above 0. */
+export function areaLight(position: Triple, u: Triple, v: Triple, options: { color?: Triple; a0?: number } = {}): AreaLight {
+  const { color = WHITE, a0 = 1 } = options;
+  if (!(a0 > 0 && Number.isFinite(a0))) throw new SrbfError(`expected a0 above 0, found ${a0}`);
+  unit(cross(finite(u, "u"), finite(v, "v")));
+  return { kind: "area", position: finite(position, "position"), u, v, color: finite(color, "color"), a0 };
+}
+
 /** @throws SrbfError where `pixels` are not width x height x 3 finite numbers. */
 export function environmentLight(width: number, height: number, pixels: ArrayLike<number>, color: Triple = WHITE): EnvironmentLight {
   if (!(width > 0 && height > 0) || pixels.length !== width * height * 3) {
@@ -84,17 +125,26 @@ export function environmentLight(width: number, height: number, pixels: ArrayLik
   return { kind: "environment", width, height, pixels, color: finite(color, "color") };
 }
 
-/** A light under a rigid motion and uniform scale, which also scales a0 and radius; environments are unchanged: `inAssetFrame` turns their directions. */
+/** @throws SrbfError on a color that is not finite. */
+export function namedLight(name: string, color: Triple = WHITE): NamedLight {
+  return { kind: "named", name, color: finite(color, "color") };
+}
+
+/** A light under a rigid motion and uniform scale, which also scales a0 and radius; environments and named lights are unchanged: `inAssetFrame` turns an environment's directions. */
 export function moved<L extends Light>(light: L, matrix: Matrix4): L {
-  if (light.kind === "environment") return light;
+  if (light.kind === "environment" || light.kind === "named") return light;
   if (light.kind === "directional") return { ...light, direction: unit(turned(matrix, light.direction)) };
   const scale = Math.cbrt(Math.abs(determinant(matrix)));
+  if (light.kind === "area") {
+    return { ...light, position: carried(matrix, light.position), u: turned(matrix, light.u), v: turned(matrix, light.v), a0: light.a0 * scale };
+  }
   const out = { ...light, position: carried(matrix, light.position), a0: light.a0 * scale, radius: light.radius * scale };
+  if (light.kind === "sphere") return { ...out, size: light.size * scale };
   return light.kind === "spot" ? { ...out, direction: unit(turned(matrix, light.direction)) } : out;
 }
 
 export function isPunctual(light: Light): light is PunctualLight {
-  return light.kind === "point" || light.kind === "spot";
+  return light.kind === "point" || light.kind === "spot" || light.kind === "sphere";
 }
 
 /** @throws SrbfError on a vector that is zero or not finite. */

@@ -5,9 +5,11 @@ import { METHODS, methodNamed } from "./methods";
 import type { Method } from "./methods/method";
 
 export type Encoding = "half" | "float" | "uint8" | "bc7" | "bc1";
+export type LightDomain = "directions" | "named" | "cloud";
 export type ReceiverKind = "lightmap" | "view" | "vertices";
 
 const ENCODINGS: readonly Encoding[] = ["half", "float", "uint8", "bc7", "bc1"];
+const LIGHT_DOMAINS: readonly LightDomain[] = ["directions", "named", "cloud"];
 const RECEIVER_KINDS: readonly ReceiverKind[] = ["lightmap", "view", "vertices"];
 
 /** A stored layer: value = stored * scale + bias, three channels of an RGB coefficient map, or four of scalar ones. */
@@ -35,6 +37,9 @@ export interface Manifest {
   transport?: "combined" | "indirect";
   width: number;
   height: number;
+  /** What a light's coordinates are; directions unless given. */
+  light_domain?: LightDomain;
+  /** Which directions were captured; an asset of another light domain has none. */
   domain: "sphere" | "hemisphere";
   /** What is lit. `receivers` where several objects share one lightmap. */
   receiver?: Receiver;
@@ -51,6 +56,10 @@ export interface Manifest {
   sha256?: Record<string, string>;
   /** How the asset was made. Nothing depends on it but `receiverKind`, for assets that lack the key `receiver`. */
   source?: { receiver?: { kind?: string }; receivers?: { kind?: string }[] };
+}
+
+export function lightDomainOf(manifest: Manifest): LightDomain {
+  return manifest.light_domain ?? "directions";
 }
 
 /** What is lit; undefined where the asset does not say. Assets of older versions say so under `source`. */
@@ -83,7 +92,9 @@ export function checkManifest(value: unknown, where: string): Manifest {
   for (const side of ["width", "height"] as const) {
     if (!(Number.isInteger(manifest[side]) && manifest[side] >= 1)) fail(`${side} of at least 1`, manifest[side]);
   }
-  if (manifest.domain !== "sphere" && manifest.domain !== "hemisphere") fail("a domain of sphere, hemisphere", manifest.domain);
+  const lights = lightDomainOf(manifest);
+  if (!LIGHT_DOMAINS.includes(lights)) fail(`a light_domain of ${LIGHT_DOMAINS.join(", ")}`, lights);
+  if (lights === "directions" && manifest.domain !== "sphere" && manifest.domain !== "hemisphere") fail("a domain of sphere, hemisphere", manifest.domain);
   const { receiver, receivers } = manifest;
   for (const one of [...(receiver === undefined ? [] : [receiver]), ...(receivers ?? [])]) {
     if (!RECEIVER_KINDS.includes(one?.kind)) fail(`a receiver of ${RECEIVER_KINDS.join(", ")}`, one?.kind);

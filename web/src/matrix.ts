@@ -47,6 +47,10 @@ export function columnMajor(matrix: Matrix4): number[] {
   return [0, 1, 2, 3].flatMap((column) => matrix.map((row) => row[column]));
 }
 
+export function cross(a: Triple, b: Triple): Triple {
+  return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+}
+
 export function dot(a: Triple, b: Triple): number {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }

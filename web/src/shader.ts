@@ -13,11 +13,11 @@ export interface FrameValues {
 
 /** The frame's numbers under `lights`, which are in the asset's world. */
 export function frameValues(asset: Asset, lights: readonly Light[]): FrameValues {
-  const { distant, punctual } = inAssetFrame(asset, lights);
-  const projected = asset.tables.projectedWeights(distant);
+  const all = inAssetFrame(asset, lights);
+  const projected = asset.tables.projectedWeights(all);
   const weights = new Float32Array((projected.length / 3) * 4);
   for (let i = 0, j = 0; i < projected.length; i += 3, j += 4) weights.set([projected[i], projected[i + 1], projected[i + 2]], j);
-  return { weights, pointLights: punctual.map(pointLightUniforms) };
+  return { weights, pointLights: asset.tables.projectsPunctual ? [] : all.punctual.map(pointLightUniforms) };
 }
 
 /** @throws SrbfError where point lights need a position map and the asset has none. */
@@ -27,19 +27,13 @@ export function needPositions(asset: Asset, pointLights: number): void {
   }
 }
 
-/** @throws SrbfError for an `engine` whose materials sum filtered layers, on a method whose layers must not be filtered. */
-export function needFilterable(asset: Asset, engine: string): void {
-  if (!asset.method.filterable) {
-    throw new SrbfError(`expected maps that ${engine} may filter, found ${asset.method.name}; fit another method, or use srbf/three`);
-  }
-}
-
 /**
  * GLSL that declares an asset's uniforms and `vec3 srbfRelit(vec2 uv, float level, vec3 receiver)`: uv with v downwards, receiver in the asset's frame,
- * meters, `room` for point lights. `srbfRelitSurface(uv, receiver)` finds the mip level itself.
+ * meters, `room` for point lights. `srbfRelitSurface(uv, receiver)` finds the mip level itself; where layers must not be filtered, `filtered` mixes
+ * the light of the four texels about the place.
  */
-export function shaderText(asset: Asset, room: number): string {
-  const lines = Object.entries(shaderDefines(asset, room)).map(([name, value]) => `#define ${name} ${value}`);
+export function shaderText(asset: Asset, room: number, filtered = false): string {
+  const lines = Object.entries(shaderDefines(asset, room, filtered)).map(([name, value]) => `#define ${name} ${value}`);
   return [...lines, shaderBody(asset)].join("\n");
 }
 
@@ -48,8 +42,8 @@ export function shaderBody(asset: Asset): string {
   return asset.method.shader;
 }
 
-export function shaderDefines(asset: Asset, room: number): Record<string, number> {
-  return { ...asset.tables.defines, SRBF_POINT_LIGHTS: room };
+export function shaderDefines(asset: Asset, room: number, filtered = false): Record<string, number> {
+  return { ...asset.tables.defines, SRBF_POINT_LIGHTS: room, ...(filtered ? { SRBF_FILTERED: 1 } : {}) };
 }
 
 /** Uniform arrays of vec4 that never change, by name. */

@@ -1,8 +1,23 @@
 import { readdirSync, readFileSync } from "node:fs";
-import { basename, dirname, join } from "node:path";
+import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { describe, expect, it } from "vitest";
-import { directionalLight, environmentLight, inAssetFrame, type Manifest, type Matrix4, METHODS, methodNamed, pointLight } from "../src";
+import {
+  asDesigned,
+  type Asset,
+  directionalLight,
+  environmentLight,
+  IDENTITY,
+  inAssetFrame,
+  type Light,
+  type Manifest,
+  type Matrix4,
+  METHODS,
+  methodNamed,
+  namedLight,
+  pointLight,
+  setNamedLight,
+} from "../src";
 
 const ROOT = join(dirname(fileURLToPath(import.meta.url)), "..");
 
@@ -17,12 +32,32 @@ describe("methods", () => {
     expect(files).toEqual([`src/methods/${name.replaceAll("-", "_")}.ts`]);
   });
 
-  it("are found by name, one shader each", () => {
+  it("are found by name, each with a shader, and there are no other shaders", () => {
     for (const method of METHODS) expect(methodNamed(method.name)).toBe(method);
     expect(methodNamed("magic")).toBeUndefined();
-    const shaders = readdirSync(join(ROOT, "src/shaders")).map((file) => basename(file, ".glsl"));
-    expect(shaders.sort()).toEqual(METHODS.map(({ name }) => name.replaceAll("-", "_")).sort());
+    const imported = sources("src").flatMap((file) => [...readFileSync(join(ROOT, file), "utf8").matchAll(/shaders\/(\w+\.glsl)"/g)].map(([, name]) => name));
+    expect(readdirSync(join(ROOT, "src/shaders")).sort()).toEqual(imported.sort());
     for (const { shader } of METHODS) for (const name of ["srbfSum", "srbfRelit", "srbfRelitSurface"]) expect(shader).toContain(`vec3 ${name}(`);
+  });
+});
+
+describe("named lights", () => {
+  const asset = { tables: { names: ["Window", "TV"] } } as unknown as Asset;
+
+  it("are as designed until they are set, each once", () => {
+    const lights: Light[] = asDesigned(asset);
+    setNamedLight(asset, lights, "TV", 0.5, [1, 0.5, 2]);
+    setNamedLight(asset, lights, "TV", 2, [1, 0.5, 2]);
+    expect(lights).toEqual([namedLight("Window", [1, 1, 1]), namedLight("TV", [2, 1, 4])]);
+  });
+
+  it("are refused by unknown names and by assets without any", () => {
+    expect(() => setNamedLight(asset, [], "tv")).toThrow('expected a light of "Window", "TV", found "tv"');
+    expect(() => setNamedLight({ tables: {} } as Asset, [], "TV")).toThrow('expected an asset of named lights for "TV"');
+    expect(() => setNamedLight(asset, [], "TV", Number.NaN)).toThrow("expected color as three finite numbers");
+    const manifest = (light_domain?: "named") => ({ manifest: { domain: "sphere", light_domain } as Manifest, assetFromWorld: IDENTITY });
+    expect(() => inAssetFrame(manifest("named"), [pointLight([0, 0, 1])])).toThrow("expected lights of named for this asset, found a point one");
+    expect(() => inAssetFrame(manifest(), [namedLight("TV")])).toThrow("found a named one");
   });
 });
 

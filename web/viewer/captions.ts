@@ -28,13 +28,14 @@ export function statusLine(place: HTMLElement, subject: Subject, comparison: Com
   if (compared >= 0) parts.push(`baked light <b>${compared}</b> (${comparison.role})${error ? `, rmse <b>${error}</b>` : ""}`);
   if (asset.manifest.transport === "indirect") {
     if (!hasDirect || compared >= 0 || terms === "indirect") parts.push("indirect light only");
-    else if (shining.some((light) => light.kind !== "directional")) parts.push("point, spot and environment lights: indirect light only");
+    else if (shining.some((light) => light.kind === "environment")) parts.push("environments: indirect light only");
   }
   place.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
 }
 
 /** A directional light's azimuth and elevation; `inside`: whether it lies in the captured domain. */
 export function bearing(place: HTMLElement, direction: Triple | undefined, inside: boolean): void {
+  if (place.hidden) return;
   if (!direction) {
     place.textContent = "drag on the disc to add a directional light";
     return;

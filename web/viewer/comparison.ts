@@ -1,9 +1,9 @@
 /** The reference of the baked light that is nearest to the directional light, beside the relit picture; and every light's error. */
 import type { WebGLRenderer } from "three";
-import type { DirectionalLight, Triple } from "../src";
+import { type Light, pointLight, type Triple } from "../src";
 import { fetched } from "../src/files";
 import { Copy } from "./copy";
-import { type DirectionalState, linearColor } from "./light_state";
+import { type DirectionalState, linearColor, type PlacedState } from "./light_state";
 import { lineOf, say } from "./messages";
 import type { Receivers } from "./receivers";
 import { type References, rmse } from "./reference";
@@ -43,19 +43,22 @@ export class Comparison {
     this.error = "";
   }
 
-  /** The baked light to relight by in place of `sun`; undefined while its image is loading. */
-  light(sun: DirectionalState): DirectionalLight | undefined {
+  /** The baked light to relight by in place of `light`; undefined while its image is loading. */
+  light(light: DirectionalState | PlacedState): Light | undefined {
     const references = this.references as References;
     this.error = "";
-    this.want(references.nearest(sun.direction));
-    const color = linearColor(sun);
+    this.want(references.nearest(light));
+    const color = linearColor(light);
     this.uniforms.referenceColor.value = color;
-    return this.compared < 0 ? undefined : { kind: "directional", direction: references.lights[this.compared].direction, color };
+    if (this.compared < 0) return undefined;
+    const { direction, position } = references.lights[this.compared];
+    if (position) return pointLight(position, { color, falloff: "inverse-square" });
+    return direction && { kind: "directional", direction, color };
   }
 
-  /** Measure the error of the relit picture, once the light of `light` has been drawn. */
-  measure(subject: Subject, sun: DirectionalState, renderer: WebGLRenderer): void {
-    const [index, color] = [this.compared, linearColor(sun)];
+  /** Measure the error of the relit picture, once what `light` returned has been drawn. */
+  measure(subject: Subject, light: DirectionalState | PlacedState, renderer: WebGLRenderer): void {
+    const [index, color] = [this.compared, linearColor(light)];
     void this.references?.image(index).then((image) => {
       if (index !== this.compared) return;
       const relit = this.copy.read(renderer, subject.lightmap);

@@ -47,6 +47,7 @@ export class DirectionWidget {
   }
 
   draw(): void {
+    if (this.canvas.hidden) return;
     const ratio = Math.min(devicePixelRatio, 2);
     const { clientWidth: width, clientHeight: height } = this.canvas;
     if (this.canvas.width !== Math.round(width * ratio)) this.canvas.width = Math.round(width * ratio);
@@ -209,13 +210,13 @@ export class DirectionWidget {
 }
 
 /** The smallest and the largest of `values`, at least 0.1 apart. */
-function ends(values: readonly number[]): [number, number] {
+export function ends(values: readonly number[]): [number, number] {
   const [least, most] = [Math.min(...values), Math.max(...values)];
   return [least, Math.max(most, least + 0.1)];
 }
 
 /** Blue at 0, white between, red at 1. */
-function heat(x: number): string {
+export function heat(x: number): string {
   const [cold, mild, hot] = [[66, 135, 245], [232, 230, 220], [235, 64, 40]];
   const [from, to, t] = x < 0.5 ? [cold, mild, 2 * x] : [mild, hot, 2 * x - 1];
   return `rgb(${from.map((value, i) => Math.round(value + (to[i] - value) * t)).join(" ")})`;

@@ -90,7 +90,8 @@ const commands = {
     await settled();
     return { name: download.suggestedFilename(), bytes: (await readFile(await download.path())).toString("base64") };
   },
-  async drop({ name, bytes }) {
+  /** `moving`: as for `open`. */
+  async drop({ name, bytes, moving = false }) {
     const data = await page.evaluateHandle(
       ([file, text]) => {
         const transfer = new DataTransfer();
@@ -101,7 +102,7 @@ const commands = {
     );
     await page.dispatchEvent("#stage", "drop", { dataTransfer: data });
     await page.waitForTimeout(50);
-    await settled();
+    if (!moving) await settled();
   },
   /** The canvas as RGBA bytes, top row first. */
   async canvas() {

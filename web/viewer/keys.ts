@@ -1,6 +1,6 @@
 /** What keys do. */
 import { rounded } from "./light_state";
-import type { Changed, State } from "./state";
+import { type Changed, firstPath, type State } from "./state";
 
 const STEP = (2 * Math.PI) / 180;
 const LARGE_STEP = (10 * Math.PI) / 180;
@@ -8,7 +8,7 @@ const LARGE_STEP = (10 * Math.PI) / 180;
 const KEYS: [string, string][] = [
   ["← → ↑ ↓", "move the directional light by 2°, with shift by 10°"],
   ["space", "play or pause the path"],
-  ["1 … 9", "select a light"],
+  ["1 … 9", "select a light; switch a light of the scene on or off"],
   ["delete", "remove the light"],
   ["double click", "put the point light above a place, or aim the spot at it"],
   ["t", "the scene, the mesh alone, or texels"],
@@ -33,11 +33,13 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
     if (turns[event.key]) moveDirectional(state, ...turns[event.key]);
     else if (event.key === " ") {
       state.playing = !state.playing;
-      if (state.playing && state.path === "none") state.path = "turn";
+      if (state.playing && state.path === "none") state.path = firstPath(state);
     } else if (/^[1-9]$/.test(event.key) && Number(event.key) <= state.lights.length) {
-      state.selected = Number(event.key) - 1;
+      const light = state.lights[Number(event.key) - 1];
+      if (light.kind === "named") light.on = !light.on;
+      else state.selected = Number(event.key) - 1;
       changed({ panel: true });
-    } else if ((event.key === "Delete" || event.key === "Backspace") && state.lights[state.selected]) {
+    } else if ((event.key === "Delete" || event.key === "Backspace") && state.lights[state.selected] && state.lights[state.selected].kind !== "named") {
       state.lights.splice(state.selected, 1);
       state.selected = Math.min(state.selected, state.lights.length - 1);
       changed({ lights: true, panel: true });

@@ -1,5 +1,7 @@
 /** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
-import { directionalLight, environmentLight, type Light, pointLight, spotLight, SrbfError, type Triple } from "../src";
+import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, sphereLight, spotLight, SrbfError, type Triple } from "../src";
+import { unit } from "../src/lights";
+import { cross } from "../src/matrix";
 import type { Environment } from "./environment_file";
 
 interface Common {
@@ -34,13 +36,38 @@ export interface SpotState extends PointLight {
   outer: number;
 }
 
+/** A sphere of radius `size`, m. */
+export interface SphereState extends PointLight {
+  kind: "sphere";
+  size: number;
+}
+
+/** A rectangle that shines towards `target`: its first side is horizontal, turned about its axis by `turn` (degrees). */
+export interface AreaState extends Common {
+  kind: "area";
+  position: Triple;
+  target: Triple;
+  width: number;
+  height: number;
+  turn: number;
+  a0: number;
+}
+
 export interface EnvironmentState extends Common {
   kind: "environment";
   file: string;
 }
 
-export type PointLightState = PointState | SpotState;
-export type LightState = DirectionalState | PointLightState | EnvironmentState;
+/** A light of the scene: intensity 1 and white as it is set there. */
+export interface NamedState extends Common {
+  kind: "named";
+  name: string;
+}
+
+export type PointLightState = PointState | SpotState | SphereState;
+/** Lights with a place in the scene. */
+export type PlacedState = PointLightState | AreaState;
+export type LightState = DirectionalState | PlacedState | EnvironmentState | NamedState;
 
 const COMMON = { on: true, color: "#ffffff", intensity: 1 };
 
@@ -63,10 +90,33 @@ export const spotState = (position: Triple, target: Triple, a0: number): SpotSta
   outer: 30,
 });
 
+export const sphereState = (position: Triple, a0: number): SphereState => ({ ...pointState(position, a0), kind: "sphere", size: round(0.1 * a0) });
+
+export const areaState = (position: Triple, target: Triple, a0: number): AreaState => ({
+  kind: "area",
+  ...COMMON,
+  position: rounded(position),
+  target: rounded(target),
+  width: round(0.5 * a0),
+  height: round(0.3 * a0),
+  turn: 0,
+  a0: round(a0),
+});
+
 export const environmentState = (file: string): EnvironmentState => ({ kind: "environment", ...COMMON, file });
 
-export function isPointLightState(light: LightState | undefined): light is PointLightState {
-  return light?.kind === "point" || light?.kind === "spot";
+export const namedState = (name: string): NamedState => ({ kind: "named", ...COMMON, name });
+
+/** Whether a light is as the scene has it set. */
+export const isDesigned = ({ on, color, intensity }: NamedState): boolean => on && intensity === 1 && color === COMMON.color;
+
+export function isPlaced(light: LightState | undefined): light is PlacedState {
+  return light?.kind === "point" || light?.kind === "spot" || light?.kind === "sphere" || light?.kind === "area";
+}
+
+/** Placed lights that are aimed. */
+export function isAimed(light: LightState | undefined): light is SpotState | AreaState {
+  return light?.kind === "spot" || light?.kind === "area";
 }
 
 /** Five decimals: a hundredth of a millimeter, a thousandth of a degree. */
@@ -92,14 +142,32 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
     const image = environments.get(state.file);
     return image && environmentLight(image.width, image.height, image.pixels, color);
   }
+  if (state.kind === "named") return namedLight(state.name, color);
+  if (state.kind === "area") return areaLight(state.position, ...sides(state), { color, a0: state.a0 });
   const { position, a0, falloff, radius } = state;
   if (state.kind === "point") return pointLight(position, { color, a0, falloff, radius });
+  if (state.kind === "sphere") return sphereLight(position, state.size, { color, a0, falloff, radius });
   const cone = { inner: (state.inner * Math.PI) / 180, outer: (state.outer * Math.PI) / 180 };
   return spotLight(position, aim(state), cone, { color, a0, falloff, radius });
 }
 
-export function aim(spot: SpotState): Triple {
-  const { position: p, target: t } = spot;
+/** The two sides of an area, m. */
+export function sides(area: AreaState): [Triple, Triple] {
+  const facing = unit(aim(area));
+  const [level, other] = levelSides(facing);
+  const [c, s] = [Math.cos((area.turn * Math.PI) / 180), Math.sin((area.turn * Math.PI) / 180)];
+  const along = (a: number, b: number) => [0, 1, 2].map((k) => a * level[k] + b * other[k]) as unknown as Triple;
+  return [along(area.width * c, area.width * s), along(-area.height * s, area.height * c)];
+}
+
+/** Unit vectors across a unit direction, the first horizontal; their cross product is the direction. */
+export function levelSides(facing: Triple): [Triple, Triple] {
+  const level = unit(Math.abs(facing[2]) < 0.999 ? cross([0, 0, 1], facing) : cross([0, 1, 0], facing));
+  return [level, cross(facing, level)];
+}
+
+export function aim(light: SpotState | AreaState): Triple {
+  const { position: p, target: t } = light;
   const direction: Triple = [t[0] - p[0], t[1] - p[1], t[2] - p[2]];
   return direction.some((x) => x !== 0) ? direction : [0, 0, -1];
 }
@@ -121,9 +189,15 @@ export function checkLight(value: unknown): LightState {
   if (light.kind === "directional") triple("direction");
   else if (light.kind === "environment") {
     if (typeof light.file !== "string") bad("a name of file");
-  } else if (light.kind === "point" || light.kind === "spot") {
+  } else if (light.kind === "named") {
+    if (typeof light.name !== "string") bad("a light's name");
+  } else if (light.kind === "area") {
+    for (const key of ["position", "target"]) triple(key);
+    for (const key of ["a0", "width", "height"]) if (!((light[key] as number) > 0 && Number.isFinite(light[key]))) bad(`a number above 0 of ${key}`);
+    if (!Number.isFinite(light.turn)) bad("a number of turn");
+  } else if (light.kind === "point" || light.kind === "spot" || light.kind === "sphere") {
     triple("position");
-    for (const key of ["a0", "radius"]) if (!((light[key] as number) > 0 && Number.isFinite(light[key]))) bad(`a number above 0 of ${key}`);
+    for (const key of light.kind === "sphere" ? ["a0", "radius", "size"] : ["a0", "radius"]) if (!((light[key] as number) > 0 && Number.isFinite(light[key]))) bad(`a number above 0 of ${key}`);
     if (light.falloff !== "linear" && light.falloff !== "inverse-square") bad("linear or inverse-square of falloff");
     if (light.kind === "spot") {
       triple("target");

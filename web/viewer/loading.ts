@@ -1,7 +1,7 @@
 /** What the page loads before it shows anything, and its progress. */
 import type { BufferGeometry, Material, Mesh, Object3D, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { type Asset, type FloatImage, loadAsset, SrbfError } from "../src";
+import { type Asset, type FloatImage, lightDomainOf, loadAsset, SrbfError } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { insidePath } from "../src/manifest";
@@ -82,7 +82,7 @@ export async function loadOne(facts: AssetFacts, progress: (done: number, what: 
     progress(++done / Math.max(done, total), url);
     return new Response(body, { status: response.status });
   };
-  const asset = await loadAsset(facts.folder, { fetch: counting, verify: globalThis.isSecureContext });
+  const asset = await loadAsset(facts.folder, { fetch: counting, verify: globalThis.isSecureContext, exact: true });
   const { coverage: name } = asset.manifest;
   const coverage = name === undefined ? undefined : await readImage(facts.folder, name, counting);
   return { facts, asset, coverage, direct: await readDirect(asset, coverage, facts.folder, counting) };
@@ -93,10 +93,10 @@ async function readImage(folder: string, name: string, fetcher: Fetcher): Promis
   return decodeFloat(await (await fetched(fetcher, url)).arrayBuffer(), url);
 }
 
-/** Undefined for combined assets, and for indirect ones that lack what direct light needs. */
+/** Undefined for combined assets, for named lights, and for indirect ones that lack what direct light needs. */
 async function readDirect(asset: Asset, coverage: FloatImage | undefined, folder: string, fetcher: Fetcher): Promise<DirectInputs | undefined> {
   const { transport, scene, normal, albedo, quantity } = asset.manifest;
-  if (transport !== "indirect" || !scene || !normal || !asset.position || (quantity === "radiance" && !albedo)) return undefined;
+  if (transport !== "indirect" || lightDomainOf(asset.manifest) === "named" || !scene || !normal || !asset.position || (quantity === "radiance" && !albedo)) return undefined;
   const [normals, colors, casters] = await Promise.all([
     readImage(folder, normal, fetcher),
     quantity === "radiance" && albedo ? readImage(folder, albedo, fetcher) : undefined,

@@ -1,15 +1,18 @@
 /** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
-import { directionalState, isPointLightState, type LightState, pointState, rounded, spotState } from "./light_state";
+import { areaState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, sphereState, spotState } from "./light_state";
+import type { AddedKind } from "./asset_lights";
 import type { Bounds } from "./receivers";
-import { type Changed, COMPARES, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
+import { Mixer } from "./mixer";
+import { type Changed, COMPARES, firstPath, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
 
 export interface Actions {
   changed: Changed;
   chooseEnvironment(): void;
   savePng(): void;
   saveFrames(): void;
+  loadFrames(): void;
   savePath(): void;
   chooseAsset(): void;
   resetCamera(): void;
@@ -19,7 +22,10 @@ export interface Actions {
 export interface PanelFacts {
   /** Coefficient maps of the asset that is shown. */
   maps: number;
-  hasPositions: boolean;
+  /** Kinds of lights that can be added. */
+  kinds: readonly AddedKind[];
+  /** Where a new light goes; above the receivers unless given. */
+  middle?: Triple;
   hasDirect: boolean;
   /** Names of all assets. */
   assets: string[];
@@ -27,12 +33,16 @@ export interface PanelFacts {
   hasScene: boolean;
   hasCapture: boolean;
   bounds: Bounds;
+  /** Whether its lights are the scene's own, by name. */
+  named: boolean;
+  hasFrames: boolean;
 }
 
-const KINDS: Record<LightState["kind"], string> = { directional: "Directional", point: "Point", spot: "Spot", environment: "Environment" };
+const KINDS = { directional: "Directional", point: "Point", spot: "Spot", sphere: "Sphere", area: "Area", environment: "Environment" } as const satisfies Record<AddedKind, string>;
 
 export class Panel {
   private gui: GUI | undefined;
+  private readonly mixer: Mixer;
   private drawn = "";
   private readonly open = new Map<string, boolean>();
 
@@ -42,7 +52,9 @@ export class Panel {
     private readonly state: State,
     private facts: PanelFacts,
     private readonly actions: Actions,
+    mixer: HTMLElement,
   ) {
+    this.mixer = new Mixer(mixer, state, actions.changed);
     this.rebuild();
   }
 
@@ -57,8 +69,8 @@ export class Panel {
     const scrolled = this.controls.parentElement?.scrollTop ?? 0;
     this.gui?.destroy();
     this.gui = new GUI({ container: this.controls, title: "", autoPlace: false });
-    this.drawChips();
-    this.light();
+    this.lights();
+    if (!this.facts.named) this.light();
     this.picture();
     if (this.facts.hasCapture) this.compare();
     this.path();
@@ -70,7 +82,12 @@ export class Panel {
   /** Show numbers that have changed elsewhere. */
   refresh(): void {
     this.gui?.controllersRecursive().forEach((controller) => controller.updateDisplay());
-    this.drawChips();
+    this.lights();
+  }
+
+  private lights(): void {
+    this.mixer.refresh();
+    if (!this.facts.named) this.drawChips();
   }
 
   private get selected(): LightState | undefined {
@@ -94,7 +111,7 @@ export class Panel {
       chip.dataset.kind = light.kind;
       const dot = document.createElement("i");
       dot.style.background = light.color;
-      chip.append(dot, `${KINDS[light.kind]}${lights.filter((other) => other.kind === light.kind).length > 1 ? ` ${number}` : ""}`);
+      chip.append(dot, `${KINDS[light.kind as keyof typeof KINDS]}${lights.filter((other) => other.kind === light.kind).length > 1 ? ` ${number}` : ""}`);
       chip.setAttribute("aria-pressed", String(i === selected));
       chip.onclick = () => {
         this.state.selected = i;
@@ -105,25 +122,30 @@ export class Panel {
     const add = document.createElement("select");
     add.className = "chip add";
     add.setAttribute("aria-label", "Add a light");
-    const kinds = this.facts.hasPositions ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
-    add.append(new Option("+ add", "", true, true), ...kinds.map((kind) => new Option(KINDS[kind as LightState["kind"]], kind)));
-    add.onchange = () => this.add(add.value as LightState["kind"]);
+    add.append(new Option("+ add", "", true, true), ...this.facts.kinds.map((kind) => new Option(KINDS[kind], kind)));
+    add.onchange = () => this.add(add.value as keyof typeof KINDS);
     add.disabled = lights.length >= MOST_LIGHTS;
     this.chips.replaceChildren(...chips, add);
   }
 
   /** Add a light; a point or spot light at `at`, `height` above what it lights. */
-  add(kind: LightState["kind"], at?: Triple, height = 0.5 * this.facts.bounds.radius): void {
+  add(kind: keyof typeof KINDS, at?: Triple, height = 0.5 * this.facts.bounds.radius): void {
     const { center } = this.facts.bounds;
-    const place: Triple = at ?? [center[0], center[1], center[2] + height];
+    const place: Triple = at ?? this.facts.middle ?? [center[0], center[1], center[2] + height];
+    const below: Triple = this.facts.middle ? [place[0], place[1], place[2] - height] : center;
     if (kind === "environment") {
       this.actions.chooseEnvironment();
       this.drawChips(true);
       return;
     }
-    const light =
-      kind === "directional" ? directionalState([-0.5, -0.5, 0.70711]) : kind === "point" ? pointState(place, height) : spotState(place, center, height);
-    this.state.selected = this.state.lights.push(light) - 1;
+    const make = {
+      directional: () => directionalState([-0.5, -0.5, 0.70711]),
+      point: () => pointState(place, height),
+      sphere: () => sphereState(place, height),
+      spot: () => spotState(place, below, height),
+      area: () => areaState(place, below, height),
+    };
+    this.state.selected = this.state.lights.push(make[kind]()) - 1;
     this.actions.changed({ lights: true, panel: true });
   }
 
@@ -135,7 +157,7 @@ export class Panel {
     folder.addColor(light, "color").name("Color").onChange(this.relight);
     folder.add(light, "intensity", 0, 10, 0.01).name("Intensity").onChange(this.relight);
     if (light.kind === "environment") folder.add(light, "file").name("File").disable();
-    if (isPointLightState(light)) this.pointLight(folder, light);
+    if (isPlaced(light)) this.placed(folder, light);
     const remove = {
       remove: () => {
         this.state.lights.splice(this.state.selected, 1);
@@ -146,7 +168,7 @@ export class Panel {
     folder.add(remove, "remove").name("Remove");
   }
 
-  private pointLight(folder: GUI, light: Extract<LightState, { kind: "point" | "spot" }>): void {
+  private placed(folder: GUI, light: PlacedState): void {
     const { center, radius } = this.facts.bounds;
     const step = 10 ** Math.floor(Math.log10(radius / 100));
     const coordinates = (name: string, get: () => Triple, set: (place: Triple) => void) => {
@@ -167,10 +189,22 @@ export class Panel {
     };
     coordinates("Position", () => light.position, (place) => (light.position = place));
     folder.add(light, "a0", step, 4 * radius, step).name("a₀ (m)").onChange(this.relight);
-    folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
-    folder.add(light, "radius", 0.0001, radius, 0.0001).name("Radius (m)").onChange(this.relight);
+    if (light.kind !== "area") {
+      folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
+      folder.add(light, "radius", 0.0001, radius, 0.0001).name(light.kind === "sphere" ? "Least distance (m)" : "Radius (m)").onChange(this.relight);
+    }
+    if (light.kind === "sphere") folder.add(light, "size", step, radius, step).name("Size (m)").onChange(this.relight);
+    if (isAimed(light)) {
+      coordinates("Aim", () => light.target, (place) => (light.target = place));
+      const target = { on: false };
+      folder.add(target, "on").name("Handles move its aim").onChange(this.actions.moveTarget);
+    }
+    if (light.kind === "area") {
+      folder.add(light, "width", step, 2 * radius, step).name("Width (m)").onChange(this.relight);
+      folder.add(light, "height", step, 2 * radius, step).name("Height (m)").onChange(this.relight);
+      folder.add(light, "turn", -180, 180, 1).name("Turn (°)").onChange(this.relight);
+    }
     if (light.kind !== "spot") return;
-    coordinates("Aim", () => light.target, (place) => (light.target = place));
     folder
       .add(light, "inner", 0, 89, 0.1)
       .name("Inner half-angle (°)")
@@ -185,8 +219,6 @@ export class Panel {
         light.inner = Math.min(light.inner, light.outer);
         this.relight();
       });
-    const target = { on: false };
-    folder.add(target, "on").name("Handles move its aim").onChange(this.actions.moveTarget);
   }
 
   private picture(): void {
@@ -210,6 +242,7 @@ export class Panel {
     folder.add(this.state, "spectrum").name("Spectrum").onChange(this.redraw);
     const views = { ...(hasScene ? { Scene: VIEWS[0] } : {}), Mesh: VIEWS[1], Texels: VIEWS[2] };
     if (hasMesh) folder.add(this.state, "view", views).name("Show on").onChange(this.redraw);
+    if (hasMesh) folder.add(this.state, "cut").name("Cut walls open").onChange(this.redraw);
     folder.add(this.actions, "resetCamera").name("Reset view");
   }
 
@@ -222,15 +255,18 @@ export class Panel {
 
   private path(): void {
     const folder = (this.gui as GUI).addFolder("Path");
-    folder.add(this.state, "path", { None: PATHS[0], Turn: PATHS[1], Swing: PATHS[2] }).name("Path").onChange(this.relight);
+    const { hasFrames, named } = this.facts;
+    const paths = { None: PATHS[0], ...(named ? {} : { Turn: PATHS[1], Swing: PATHS[2] }), ...(hasFrames ? { "FRAMES.json": PATHS[3] } : {}) };
+    folder.add(this.state, "path", paths).name("Path").onChange(this.relight);
     folder.add(this.state, "seconds", 1, 60, 0.5).name("Period (s)").onChange(this.redraw);
     folder
       .add(this.state, "playing")
       .name("Play")
       .onChange(() => {
-        if (this.state.playing && this.state.path === "none") this.state.path = "turn";
+        if (this.state.playing && this.state.path === "none") this.state.path = firstPath(this.state);
         this.relight();
       });
+    folder.add(this.actions, "loadFrames").name("Load FRAMES.json");
     if (this.facts.hasMesh) folder.add(this.state, "turntable").name("Turntable").onChange(this.redraw);
   }
 

@@ -9,7 +9,7 @@ const WIDEST = (75 * Math.PI) / 180; // of a swing, off the zenith
 /** `light` after `turns` rounds of `path`; point lights turn about `center`, and swing along x by the scene's `radius`. */
 export function along(light: LightState, path: State["path"], turns: number, center: Triple, radius: number): LightState {
   const angle = 2 * Math.PI * turns;
-  if (path === "none" || light.kind === "environment") return light;
+  if (path === "none" || path === "frames" || light.kind === "environment" || light.kind === "named") return light;
   if (light.kind === "directional") {
     return { ...light, direction: rounded(path === "turn" ? turned(light.direction, angle) : swung(light.direction, angle)) };
   }

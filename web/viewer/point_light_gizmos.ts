@@ -1,4 +1,4 @@
-/** Point and spot lights drawn in the scene: a bulb each, handles on the selected one, a spot's cone; and directional lights' directions. */
+/** Lights drawn in the scene: a bulb each, handles on the selected one, a spot's cone, an area's rectangle; and directional lights' directions. */
 import {
   BufferAttribute,
   BufferGeometry,
@@ -16,8 +16,9 @@ import {
   type WebGLRenderer,
 } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
+import type { Triple } from "../src";
 import { fromThree, toThree } from "./frames";
-import { isPointLightState, type LightState, rounded, type SpotState } from "./light_state";
+import { type AreaState, isAimed, isPlaced, type LightState, rounded, sides, type SpotState } from "./light_state";
 import type { Bounds } from "./receivers";
 import type { Changed, State } from "./state";
 
@@ -25,8 +26,10 @@ const BULB = 0.013; // of the distance to the eye
 const SUN = 1.5; // scene radii from the middle
 
 export class PointLightGizmos {
-  /** What the handles of a spot move. */
+  /** What the handles of an aimed light move. */
   moving: "position" | "target" = "position";
+  /** Captured lights, each in the color of its error, #rrggbb; the compared one is larger. */
+  captured: readonly { position: Triple; color: string; marked: boolean }[] = [];
   private drawing = false; // the handles report every change, including those made by drawing
   private readonly overlay = new Scene();
   private readonly drawn = new Scene();
@@ -52,9 +55,9 @@ export class PointLightGizmos {
     });
     this.controls.addEventListener("objectChange", () => {
       const light = this.state.lights[this.state.selected];
-      if (!isPointLightState(light)) return;
+      if (!isPlaced(light)) return;
       const place = rounded(fromThree(this.proxy.position));
-      if (light.kind === "spot" && this.moving === "target") light.target = place;
+      if (isAimed(light) && this.moving === "target") light.target = place;
       else light.position = place;
       this.state.playing = false;
       changed({ lights: true });
@@ -72,26 +75,27 @@ export class PointLightGizmos {
     this.attach();
     for (const object of this.drawn.children) if (object instanceof LineSegments) object.geometry.dispose();
     this.drawn.clear();
+    for (const { position, color, marked } of this.captured) this.bulb(toThree(position), new Color(color), camera, marked ? 0.75 : 0.4);
     this.state.lights.forEach((light, i) => this.add(light, i === this.state.selected, camera, suns));
     renderer.render(this.drawn, camera);
     renderer.render(this.overlay, camera);
     this.drawing = false;
   }
 
-  /** Attach the handles to the selected point or spot light, or hide them. */
+  /** Attach the handles to the selected light if it has a place, or hide them. */
   private attach(): void {
     const light = this.state.lights[this.state.selected];
-    if (!isPointLightState(light) || !light.on) {
+    if (!isPlaced(light) || !light.on) {
       if (this.controls.object) this.controls.detach();
       return;
     }
-    if (!this.controls.dragging) this.proxy.position.copy(toThree(light.kind === "spot" && this.moving === "target" ? light.target : light.position));
+    if (!this.controls.dragging) this.proxy.position.copy(toThree(isAimed(light) && this.moving === "target" ? light.target : light.position));
     this.proxy.updateMatrixWorld(true);
     if (!this.controls.object) this.controls.attach(this.proxy);
   }
 
   private add(light: LightState, selected: boolean, camera: PerspectiveCamera, suns: boolean): void {
-    if (!light.on || light.kind === "environment") return;
+    if (!light.on || light.kind === "environment" || light.kind === "named") return;
     const color = new Color(light.color);
     if (light.kind === "directional") {
       if (!suns) return;
@@ -102,14 +106,27 @@ export class PointLightGizmos {
       this.lines([from.clone().lerp(to, 0.12), from.clone().lerp(to, 0.94)], color, selected ? 0.55 : 0.25);
       return;
     }
-    this.bulb(toThree(light.position), color, camera, selected ? 1.25 : 1);
+    if (light.kind === "area") return this.rectangle(light, color, selected);
+    this.bulb(toThree(light.position), color, camera, selected ? 1.25 : 1, light.kind === "sphere" ? light.size : 0);
     if (light.kind === "spot" && selected) this.cone(light, color);
   }
 
-  private bulb(at: Vector3, color: Color, camera: Camera, size: number): void {
+  /** Its outline, and an arrow's shaft along its axis. */
+  private rectangle(light: AreaState, color: Color, selected: boolean): void {
+    const [u, v] = sides(light).map(toThree);
+    const middle = toThree(light.position);
+    const corner = (a: number, b: number) => middle.clone().addScaledVector(u, a / 2).addScaledVector(v, b / 2);
+    const round = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+    const facing = u.clone().cross(v).normalize().multiplyScalar(0.5 * Math.max(light.width, light.height));
+    const shaft = [middle, middle.clone().add(facing)];
+    this.lines([...round.flatMap((from, i) => [from, round[(i + 1) % 4]]), round[0], round[2], round[1], round[3], ...shaft], color, selected ? 1 : 0.7);
+  }
+
+  /** A ball of `size` on the screen, of at least `radius`, m. */
+  private bulb(at: Vector3, color: Color, camera: Camera, size: number, radius = 0): void {
     const mesh = new Mesh(this.sphere, this.material(`bulb ${color.getHex()}`, () => new MeshBasicMaterial({ color })));
     mesh.position.copy(at);
-    mesh.scale.setScalar(size * BULB * at.distanceTo(camera.position));
+    mesh.scale.setScalar(Math.max(radius, size * BULB * at.distanceTo(camera.position)));
     this.drawn.add(mesh);
   }
 

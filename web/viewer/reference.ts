@@ -4,9 +4,17 @@ import type { FloatImage, Triple } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { dot } from "../src/matrix";
-import type { DirectionPoint } from "./direction_widget";
 
 const KEPT = 16;
+
+/** A captured light that can be placed: at infinity, or inside the scene (m, of unit irradiance at 1 m, inverse-square). */
+export interface BakedLight {
+  direction?: Triple;
+  position?: Triple;
+  role: "train" | "validation" | "holdout";
+  /** Number of its image. */
+  image: number;
+}
 
 export class References {
   private readonly images = new Map<number, Promise<FloatImage>>();
@@ -15,7 +23,7 @@ export class References {
 
   private constructor(
     private readonly folder: string,
-    readonly lights: readonly DirectionPoint[],
+    readonly lights: readonly BakedLight[],
   ) {}
 
   /** @throws SrbfError where the list is missing. */
@@ -24,20 +32,20 @@ export class References {
     return new References(folder, lights);
   }
 
-  nearest(direction: Triple): number {
-    const length = Math.hypot(...direction) || 1;
-    let best = 0;
-    this.lights.forEach((light, i) => {
-      if (dot(light.direction, direction) / length > dot(this.lights[best].direction, direction) / length) best = i;
-    });
-    return best;
+  /** Index of the light that is nearest to a direction or a position. */
+  nearest({ direction, position }: { direction?: Triple; position?: Triple }): number {
+    const away = (light: BakedLight): number => {
+      if (position && light.position) return Math.hypot(...light.position.map((x, k) => x - position[k]));
+      return direction && light.direction ? -dot(light.direction, direction) : Infinity;
+    };
+    return this.lights.reduce((best, light, i) => (away(light) < away(this.lights[best]) ? i : best), 0);
   }
 
   /** @throws SrbfError where it cannot be read. */
   image(index: number): Promise<FloatImage> {
     let image = this.images.get(index);
     if (!image) {
-      const name = `${this.folder}${index}.exr`;
+      const name = `${this.folder}${this.lights[index].image}.exr`;
       image = fetched(fetch.bind(window), name)
         .then((response) => response.arrayBuffer())
         .then((buffer) => decodeFloat(buffer, name));

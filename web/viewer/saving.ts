@@ -1,6 +1,6 @@
 /** Files that the page saves: a PNG, and FRAMES.json for `srbf relight --lights`. */
 import { encode } from "fast-png";
-import { aim, type LightState, linearColor } from "./light_state";
+import { aim, type LightState, linearColor, sides } from "./light_state";
 
 /** RGBA where anything is transparent, RGB otherwise. */
 export function savePng(name: string, image: { width: number; height: number; data: Uint8Array }): void {
@@ -20,7 +20,13 @@ function entry(light: LightState): Record<string, unknown> {
   const color = linearColor(light);
   if (light.kind === "directional") return { kind: "directional", direction: light.direction, color };
   if (light.kind === "environment") return { kind: "environment", file: light.file, color };
+  if (light.kind === "named") return { kind: "named", name: light.name, color };
+  if (light.kind === "area") {
+    const [u, v] = sides(light);
+    return { kind: "area", position: light.position, u, v, color, a0: light.a0 };
+  }
   const { position, a0, falloff, radius } = light;
+  if (light.kind === "sphere") return { kind: "sphere", position, size: light.size, color, a0, falloff, radius };
   if (light.kind === "point") return { kind: "point", position, color, a0, falloff, radius };
   const [inner, outer] = [(light.inner * Math.PI) / 180, (light.outer * Math.PI) / 180];
   return { kind: "spot", position, direction: aim(light), inner, outer, color, a0, falloff, radius };

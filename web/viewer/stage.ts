@@ -1,6 +1,8 @@
 /** The main picture: a mesh under an orbit camera, alone or in its scene, or texels as a picture to pan and zoom; point lights are drawn as gizmos. */
 import {
   type BufferGeometry,
+  DoubleSide,
+  FrontSide,
   type Material,
   Mesh,
   type Object3D,
@@ -177,6 +179,8 @@ export class Stage {
   private render(lights: readonly Light[], target: WebGLRenderTarget | null, width: number, height: number): void {
     const { renderer } = this;
     const behind = BACKGROUND.clone().multiplyScalar(1 / this.uniforms.toneMappingExposure.value); // so that exposure leaves it unchanged
+    for (const mesh of this.lit) (mesh.material as Material).side = this.state.cut ? FrontSide : DoubleSide;
+    this.surroundings?.cut(this.state.cut);
     const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;

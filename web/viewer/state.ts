@@ -1,11 +1,11 @@
 /** The page's state, and its URL: `#` followed by the state as JSON. */
 import { SrbfError, type Triple } from "../src";
-import { checkLight, directionalState, type LightState, round, rounded } from "./light_state";
+import { checkLight, directionalState, isDesigned, type LightState, round, rounded } from "./light_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
 export const SHOWS = ["picture", "false color", "negative", "map"] as const;
 export const COMPARES = ["off", "slider", "difference", "reference"] as const;
-export const PATHS = ["none", "turn", "swing"] as const;
+export const PATHS = ["none", "turn", "swing", "frames"] as const;
 export const TERMS = ["both", "direct", "indirect"] as const;
 export const VIEWS = ["scene", "mesh", "texels"] as const;
 
@@ -31,6 +31,8 @@ export interface State {
   split: number;
   /** The lit mesh in its scene, the mesh alone, or the lightmap's texels as a picture. */
   view: (typeof VIEWS)[number];
+  /** Whether surfaces are hidden that are seen from behind: a room's walls between the eye and what is inside. */
+  cut: boolean;
   /** The orbit camera's position and target, in the asset's world. */
   eye?: [Triple, Triple];
   /** Of pictures: screen pixels per texel, 0 to fit the window; and the texel in the middle. */
@@ -44,11 +46,15 @@ export interface State {
   turntable: boolean;
 }
 
-/** What the page shows of an asset at first. */
-export function firstState({ quantity, width, height }: { quantity: "irradiance" | "radiance"; width: number; height: number }, view: State["view"]): State {
+/** What the page shows of an asset at first; `own`: lights that it has in place of a sun. */
+export function firstState(
+  { quantity, width, height }: { quantity: "irradiance" | "radiance"; width: number; height: number },
+  view: State["view"],
+  own: LightState[] = [directionalState(rounded([-0.45, -0.5, 0.74]))],
+): State {
   return {
     asset: 0,
-    lights: [directionalState(rounded([-0.45, -0.5, 0.74]))],
+    lights: own,
     selected: 0,
     exposure: quantity === "radiance" || view === "scene" ? 1.65 : 0,
     tone: "linear",
@@ -60,6 +66,7 @@ export function firstState({ quantity, width, height }: { quantity: "irradiance"
     compare: "off",
     split: 0.5,
     view,
+    cut: own.some(({ kind }) => kind !== "directional"),
     zoom: 0,
     middle: [width / 2, height / 2],
     path: "none",
@@ -72,9 +79,14 @@ export function firstState({ quantity, width, height }: { quantity: "irradiance"
 /** Called with what changed of a state: `lights` when they must be relit, `panel` when controls must be redrawn. */
 export type Changed = (what?: { lights?: boolean; panel?: boolean }) => void;
 
+/** The path that playing starts where none was chosen. */
+export const firstPath = ({ lights }: State): State["path"] => (lights.some(({ kind }) => kind === "named") ? "frames" : "turn");
+
+/** Named lights that are as designed are left out. */
 export function encodeState(state: State): string {
+  const lights = state.lights.filter((light) => light.kind !== "named" || !isDesigned(light));
   const rounding = (_: string, value: unknown) => (typeof value === "number" ? round(value) : value);
-  return `#${encodeURIComponent(JSON.stringify(state, rounding)).replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
+  return `#${encodeURIComponent(JSON.stringify({ ...state, lights }, rounding)).replace(/%(2C|3A|7B|7D|5B|5D|22)/g, (c) => (c === "%22" ? "'" : decodeURIComponent(c)))}`;
 }
 
 /** The state in `hash`, with defaults from `plain`. @throws SrbfError in one line where it holds none. */
@@ -105,7 +117,7 @@ export function decodeState(hash: string, plain: State): State {
   one("view", choice(VIEWS));
   one("asset", (value: number) => Number.isInteger(value) && value >= 0);
   one("terms", choice(TERMS));
-  for (const key of ["errors", "spectrum", "turntable"] as const) one(key, (value: unknown) => typeof value === "boolean");
+  for (const key of ["errors", "spectrum", "turntable", "cut"] as const) one(key, (value: unknown) => typeof value === "boolean");
   one("eye", (value: unknown[]) => Array.isArray(value) && value.length === 2 && value.every(triple));
   one("zoom", number(0, 1e3));
   one("middle", (value: number[]) => Array.isArray(value) && value.length === 2 && value.every((x) => Number.isFinite(x)));
@@ -113,12 +125,26 @@ export function decodeState(hash: string, plain: State): State {
   one("seconds", number(0.1, 1e4));
   one("playing", (value: unknown) => typeof value === "boolean");
   if (given.lights !== undefined) {
-    if (!Array.isArray(given.lights) || given.lights.length > MOST_LIGHTS) throw new SrbfError("expected a list of lights in the page's address; the page uses its defaults");
-    state.lights = given.lights.map(checkLight);
+    const most = Math.max(MOST_LIGHTS, plain.lights.length);
+    if (!Array.isArray(given.lights) || given.lights.length > most) throw new SrbfError("expected a list of lights in the page's address; the page uses its defaults");
+    state.lights = fitting(given.lights.map(checkLight), plain.lights);
   }
   one("selected", number(-1, state.lights.length - 1));
   state.selected = Math.min(state.selected, state.lights.length - 1);
   return state;
+}
+
+/** `given` in place of the asset's own lights of the same names, or of all where it has no named ones. @throws SrbfError on lights of the other sort. */
+function fitting(given: LightState[], own: readonly LightState[]): LightState[] {
+  const named = own.some(({ kind }) => kind === "named");
+  const wrong = given.find((light) => (light.kind === "named") !== named || (light.kind === "named" && !own.some((one) => one.kind === "named" && one.name === light.name)));
+  if (wrong) {
+    const found = wrong.kind === "named" ? JSON.stringify(wrong.name) : `a ${wrong.kind} one`;
+    throw new SrbfError(`expected a light of this asset in the page's address, found ${found}; the page uses its defaults`);
+  }
+  if (!named) return given;
+  const changed = new Map(given.map((light) => [light.kind === "named" ? light.name : "", light]));
+  return own.map((light) => (light.kind === "named" && changed.get(light.name)) || light);
 }
 
 export const MOST_LIGHTS = 16;

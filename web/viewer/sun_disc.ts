@@ -1,5 +1,6 @@
 /** Directions over the disc of a sun that has a size, and the vectors across a direction. */
 import type { Triple } from "../src";
+import { cross } from "../src/matrix";
 
 // Sixteen points that fill the unit disc evenly and keep its area [Sobol1967], for suns that have a size.
 const DISC = [
@@ -21,8 +22,6 @@ export function discDirections(direction: Triple, angle: number): Triple[] {
 export function across(direction: Triple): Triple {
   return unit(cross(direction, Math.abs(direction[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
 }
-
-export const cross = (a: Triple, b: Triple): Triple => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 function unit(v: Triple): Triple {
   const length = Math.hypot(...v);

@@ -11,6 +11,7 @@ import {
   DirectionalLight,
   EquirectangularReflectionMapping,
   FloatType,
+  FrontSide,
   GLSL3,
   HalfFloatType,
   type IUniform,
@@ -27,6 +28,7 @@ import {
   RGBAFormat,
   Scene,
   ShaderMaterial,
+  type Side,
   Sphere,
   SphereGeometry,
   SpotLight,
@@ -47,6 +49,7 @@ const SAMPLES = 4;
 export class Surroundings {
   private readonly scene = new Scene();
   private readonly lit: Object3D[] = [];
+  private readonly sides = new Map<Material, Side>();
   private readonly target: WebGLRenderTarget;
   private readonly bounds: Sphere;
   private readonly daylight: Texture;
@@ -73,6 +76,10 @@ export class Surroundings {
         mesh.castShadow = true;
       } else if (isGlass(mesh.material)) mesh.receiveShadow = true;
       else mesh.castShadow = mesh.receiveShadow = true;
+      if (!isGlass(mesh.material)) {
+        mesh.material.shadowSide ??= mesh.material.side; // what is cut casts shadows all the same
+        this.sides.set(mesh.material, mesh.material.side);
+      }
     });
     this.target = new WebGLRenderTarget(1, 1, { type: HalfFloatType, samples: SAMPLES, minFilter: LinearFilter, magFilter: LinearFilter });
     renderer.shadowMap.autoUpdate = false; // a moving camera changes no shadows
@@ -88,6 +95,11 @@ export class Surroundings {
       if (mesh.isMesh) (mesh.material.userData.gltfExtensions?.SRBF_relighting_map ? receivers : others).push(mesh);
     });
     return receivers.length > 0 && others.length > 0;
+  }
+
+  /** Hide what is seen from behind, or show it as the file has it. */
+  cut(on: boolean): void {
+    for (const [material, side] of this.sides) material.side = on ? FrontSide : side;
   }
 
   /** Linear radiance over `background`, `width` x `height` pixels, row 0 at the bottom. */
@@ -124,6 +136,14 @@ export class Surroundings {
     for (const light of lights) {
       if (light.kind === "environment") {
         environment ??= light;
+        continue;
+      }
+      if (light.kind === "named") {
+        fill = Math.max(fill, ...light.color); // where it is in the scene is not known: only its light on the receivers is
+        continue;
+      }
+      if (light.kind === "area") {
+        fill += 0.3 * Math.max(...light.color); // three.js has no shadows of areas
         continue;
       }
       const made = light.kind === "directional" ? this.sun(light.direction, light.color) : this.pointLight(light, pointLights++ < SHADOWED_POINT_LIGHTS);

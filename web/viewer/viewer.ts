@@ -1,13 +1,15 @@
 /** The page: its state, lights, picture, comparison, and what it saves. */
 import { NoToneMapping, type Vector4, WebGLRenderer } from "three";
-import type { Light, Triple } from "../src";
+import { type Light, lightDomainOf, SrbfError, type Triple } from "../src";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, outsideLine } from "./asset_lights";
 import { bearing, legend, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
-import { type DirectionalState, environmentState, isPointLightState, lightOf, rounded } from "./light_state";
+import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, type PlacedState, rounded } from "./light_state";
 import { listen, tabled } from "./keys";
+import { Keyframes, readFrames } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
 import { mapPlace, mapRange } from "./map_range";
 import { element, lineOf, say } from "./messages";
@@ -45,6 +47,8 @@ export class Viewer {
   private readonly copy: Copy;
   private readonly comparison: Comparison;
   private readonly spectrum: SpectrumPlot;
+  private keyframes?: Keyframes;
+  private outside = "";
   private shining: Light[] = [];
   private readonly environments = new Map<string, Environment>();
   private lightsChanged = true;
@@ -96,6 +100,7 @@ export class Viewer {
       chooseEnvironment: () => pickFile(".exr,.hdr,.png", (file) => void this.environment(file)),
       savePng: () => this.savePicture(),
       saveFrames: () => saveFrames("FRAMES.json", [this.state.lights]),
+      loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
       savePath: () => this.savePath(),
       resetCamera: () => {
         this.stage.resetCamera();
@@ -105,7 +110,9 @@ export class Viewer {
         this.stage.gizmos.moving = on ? "target" : "position";
         changed();
       },
-    });
+    }, element("mixer"));
+    for (const name of ["directions", "bearing"]) element(name).hidden = lightDomainOf(asset.manifest) !== "directions";
+    element("chips").hidden = this.named;
     titles(element("title"), this.loaded.facts, this.subject);
     this.events(changed);
     for (const note of loaded.notes) say(note, "hint");
@@ -122,22 +129,31 @@ export class Viewer {
     return new Viewer(loaded, await subjects.get(index), subjects, renderer);
   }
 
+  /** Whether the lights are the scene's own, by name. */
+  private get named(): boolean {
+    return this.subject.asset.tables.names !== undefined;
+  }
+
   private panelFacts(): PanelFacts {
     return {
       maps: this.subject.maps,
-      hasPositions: this.subject.asset.position !== undefined,
+      kinds: kindsOf(this.subject.asset),
+      middle: middleOf(this.subject.asset),
       hasDirect: this.subject.hasDirect,
       assets: this.loaded.facts.assets.map(({ name }) => name),
       hasMesh: this.stage.canShowMesh,
       hasScene: this.stage.canShowScene,
       hasCapture: this.comparison.possible,
       bounds: this.receivers.bounds,
+      named: this.named,
+      hasFrames: this.keyframes !== undefined,
     };
   }
 
   /** The capture's lights, or else the centers of the basis. */
   private directionPoints(): readonly DirectionPoint[] {
-    return this.loaded.references?.lights ?? this.subject.centers.map((direction): DirectionPoint => ({ direction, role: "center" }));
+    const baked = this.loaded.references?.lights.filter((light): light is typeof light & DirectionPoint => light.direction !== undefined);
+    return baked?.length ? baked : this.subject.centers.map((direction): DirectionPoint => ({ direction, role: "center" }));
   }
 
   /** Show the asset that the state names, once it is loaded. */
@@ -171,7 +187,7 @@ export class Viewer {
 
   private firstState(): State {
     const { manifest } = this.subject.asset;
-    return firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels");
+    return firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", firstLights(this.subject.asset, this.receivers.bounds));
   }
 
   private readUrl(hash: string): void {
@@ -247,7 +263,15 @@ export class Viewer {
       this.stage.turn((Math.PI * Math.min(seconds, 0.25)) / this.state.seconds);
       this.changed({});
     }
-    if (this.playback.advance(seconds)) this.changed({ lights: true });
+    if (this.state.path === "frames") this.playFrames(seconds);
+    else if (this.playback.advance(seconds)) this.changed({ lights: true });
+  }
+
+  private playFrames(seconds: number): void {
+    if (this.keyframes) return this.changed({ lights: true, panel: this.keyframes.advance(seconds) });
+    this.state.playing = false;
+    say("drop a FRAMES.json on the page to play it", "hint");
+    this.changed({});
   }
 
   private relight(): void {
@@ -259,26 +283,46 @@ export class Viewer {
       this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
     }
     this.subject.relight(this.shining, terms, this.renderer);
-    const sun = this.sun();
-    if (comparing && sun && this.comparison.compared >= 0) this.comparison.measure(this.subject, sun, this.renderer);
+    this.tellOutside();
+    const light = this.comparable();
+    if (comparing && light && this.comparison.compared >= 0) this.comparison.measure(this.subject, light, this.renderer);
+  }
+
+  /** Say once that a light is outside the free places of an asset of lights inside the scene. */
+  private tellOutside(): void {
+    const line = outsideLine(this.subject.asset, this.state.lights);
+    if (line && !this.outside) say(line, "hint");
+    this.outside = line;
   }
 
   private comparing(): boolean {
-    return this.state.compare !== "off" && this.comparison.possible && this.sun() !== undefined;
+    return this.state.compare !== "off" && this.comparison.possible && this.comparable() !== undefined;
   }
 
-  /** The lights, or while comparing the baked light nearest to the directional one, in its color. */
+  /** The lights, or while comparing the baked light nearest to the selected one, in its color. */
   private lights(): Light[] {
-    const sun = this.sun();
-    if (!sun || !this.comparing()) {
+    const compared = this.comparable();
+    if (!compared || !this.comparing()) {
       this.comparison.off();
       this.directions.marked = -1;
-      if (this.state.compare !== "off") say("comparing needs a directional light: add one", "hint");
+      if (this.state.compare !== "off") say(`comparing needs a ${this.inCloud ? "point" : "directional"} light: add one`, "hint");
       return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
     }
-    const light = this.comparison.light(sun);
+    const light = this.comparison.light(compared);
     this.directions.marked = this.comparison.compared;
     return light ? [light] : [];
+  }
+
+  /** The light whose nearest baked one is compared with: the selected one, or the first that there is. */
+  private comparable(): DirectionalState | PlacedState | undefined {
+    if (!this.inCloud) return this.sun();
+    const selected = this.state.lights[this.state.selected];
+    return isPlaced(selected) ? selected : this.state.lights.find(isPlaced);
+  }
+
+  /** Whether lights shine inside the scene. */
+  private get inCloud(): boolean {
+    return inside(this.subject.asset);
   }
 
   private sun(): DirectionalState | undefined {
@@ -299,8 +343,10 @@ export class Viewer {
     uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
     uniforms.split.value = comparing && state.compare === "slider" ? state.split * this.renderer.domElement.clientWidth : 0;
     this.chooseMap();
-    this.stage.draw(this.shining);
     this.showErrors();
+    const placed = this.inCloud && (state.errors || comparing) ? (this.loaded.references?.lights ?? []) : [];
+    this.stage.gizmos.captured = capturedPlaces(placed, this.directions.errors, this.comparison.compared);
+    this.stage.draw(this.shining);
     this.directions.draw();
     this.showSpectrum();
     this.panel.refresh();
@@ -340,7 +386,8 @@ export class Viewer {
       .then(({ psnr, texels }) => {
         if (this.subject !== subject) return;
         this.directions.errors = psnr;
-        say(`PSNR of every baked light over ${texels} texels; rings mark held-out lights`, "hint");
+        const [worst, best] = [Math.min(...psnr), Math.max(...psnr)].map((value) => value.toFixed(1));
+        say(this.inCloud ? `PSNR of every captured point light over ${texels} texels: ${worst} dB red to ${best} dB blue` : `PSNR of every baked light over ${texels} texels; rings mark held-out lights`, "hint");
         this.changed({});
       })
       .catch((error) => {
@@ -420,26 +467,44 @@ export class Viewer {
     canvas.addEventListener("dblclick", (event) => this.place(event.offsetX, event.offsetY));
     canvas.addEventListener("webglcontextlost", () => say("the GPU context was lost: reload the page"));
     dragSplit(this.state, changed);
-    dropFiles((file) => void this.environment(file));
+    dropFiles((file) => void (file.name.endsWith(".json") ? this.frames(file) : this.environment(file)));
   }
 
   /** Move the selected point light, or add one, above what is seen at a place of the canvas. */
   private place(x: number, y: number): void {
-    const place = this.stage.pick(x, y);
+    const place = this.named ? undefined : this.stage.pick(x, y);
     if (!place) return;
     const light = this.state.lights[this.state.selected];
     const over = rounded([place[0], place[1], place[2] + ABOVE * this.stage.distance(place)]);
-    if (isPointLightState(light)) {
+    if (isPlaced(light)) {
       light.position = over;
-      if (light.kind === "spot") light.target = rounded(place as Triple);
+      if (isAimed(light)) light.target = rounded(place as Triple);
       this.changed({ lights: true });
     } else if (this.state.lights.length < MOST_LIGHTS) this.panel.add("point", over, over[2] - place[2]);
+  }
+
+  /** Play the frames of a file from now on. */
+  private async frames(file: File): Promise<void> {
+    this.wait();
+    try {
+      this.keyframes = new Keyframes(readFrames(await file.text(), file.name, this.inCloud ? "inverse-square" : "linear"), this.state);
+      this.keyframes.show(0);
+      const { frames } = this.keyframes;
+      Object.assign(this.state, { path: "frames", seconds: Math.max(0.1, frames.length / FRAMES_PER_SECOND), playing: frames.length > 1 });
+      this.panel.setFacts(this.panelFacts());
+      this.changed({ lights: true, panel: true });
+    } catch (error) {
+      say(lineOf(error));
+    } finally {
+      this.done();
+    }
   }
 
   /** Add a dropped environment map; the first one turns the other lights off. */
   private async environment(file: File): Promise<void> {
     this.wait();
     try {
+      if (!kindsOf(this.subject.asset).includes("environment") || this.named) throw new SrbfError("expected an asset of distant lights for an environment, found one of other lights");
       this.environments.set(file.name, await readEnvironment(file));
       const { lights } = this.state;
       const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);
@@ -460,7 +525,8 @@ export class Viewer {
   }
 
   private savePath(): void {
-    const { lights, selected, seconds } = this.state;
+    const { lights, path, selected, seconds } = this.state;
+    if (path === "frames" && this.keyframes) return saveFrames("FRAMES.json", this.keyframes.frames);
     const count = Math.max(1, Math.round(seconds * FRAMES_PER_SECOND));
     const frame = (i: number) => lights.map((light, j) => (j === selected ? this.playback.moved(light, i / count) : light));
     saveFrames("FRAMES.json", Array.from({ length: count }, (_, i) => frame(i)));

@@ -16,13 +16,14 @@ static class Responses
         try { manifest = SrbfManifest.Read(File.ReadAllText(Path.Combine(folder, "asset.json"))); }
         catch (FormatException error) { Console.WriteLine("refused " + error.Message); return; }
         Print("size", manifest.Width, manifest.Height, manifest.LayerFiles.Length, manifest.Scalars, manifest.Clusters, manifest.TableSize);
-        Print("centers", manifest.Centers);
+        if (!manifest.IsWeighted) Print("centers", manifest.Centers);
         string first = Path.Combine(folder, manifest.LayerFiles[0]);
         SrbfDds blocks = first.EndsWith(".dds") ? SrbfDds.Read(File.ReadAllBytes(first), first) : null;
         if (blocks != null) Print("blocks", blocks.Width, blocks.Height, blocks.Layers, blocks.Levels, blocks.Format);
         for (int i = 0; blocks != null && i < blocks.Layers; i++)
             for (int level = 0; level < blocks.Levels; level++) Print("level" + level, Array.ConvertAll(blocks.Data(i, level), b => (double)b));
         for (int i = 0; blocks == null && i < manifest.LayerFiles.Length; i++) Show("layer" + i, SrbfImage.Read(Path.Combine(folder, manifest.LayerFiles[i])));
+        if (manifest.IsWeighted) { Weighted(folder, manifest, arguments); return; }
         SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
         Show("table", table);
         if (manifest.ClusterFile != null) Show("clusters", SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)));
@@ -50,6 +51,32 @@ static class Responses
             if ((bits & 0x7C00) != 0x7C00 && SrbfImage.ToHalf(SrbfImage.FromHalf((ushort)bits)) != bits) halves.Add(bits);
         Print("wronghalves", halves.ToArray());
         Print("halves", SrbfImage.ToHalf(1.00048828125f), SrbfImage.ToHalf(1.0009766f), SrbfImage.ToHalf(-0.3333333f), SrbfImage.ToHalf(65519), SrbfImage.ToHalf(65520), SrbfImage.ToHalf(3e-8f), SrbfImage.ToHalf(0.99999f));
+    }
+
+    /// <summary>Named lights: three numbers per light, its color. A cloud: eight per light, its place, its color at 1 m, and a spot's cone angles or -1.</summary>
+    static void Weighted(string folder, SrbfManifest manifest, string[] arguments)
+    {
+        double[] n = Array.ConvertAll(arguments, text => { double value; return double.TryParse(text, NumberStyles.Float, CultureInfo.InvariantCulture, out value) ? value : 0; });
+        var places = new List<Vector>();
+        var colors = new List<Vector>();
+        SrbfLightTable table = manifest.LightTable(folder);
+        for (int i = 1; table != null && i + 2 < n.Length; i += 3) colors.Add(new Vector(n[i], n[i + 1], n[i + 2]));
+        if (table != null)
+        {
+            Print("weights", table.Weights(colors));
+            for (int i = 0; i < table.names.Length; i++) Console.WriteLine("index " + table.Index(table.names[i]));
+            try { table.Index("none"); } catch (ArgumentException error) { Console.WriteLine("told " + error.Message.Length); }
+            return;
+        }
+        for (int i = 1; i + 7 < n.Length; i += 8)
+        {
+            double share = n[i + 7] < 0 ? 1 : SrbfMath.FluxShare(n[i + 6], n[i + 7]);
+            places.Add(new Vector(n[i], n[i + 1], n[i + 2]));
+            colors.Add(new Vector(n[i + 3] * share, n[i + 4] * share, n[i + 5] * share));
+        }
+        int outside;
+        Print("weights", manifest.PositionTable(folder).Weights(places, colors, out outside));
+        Print("outside", outside);
     }
 
     static void Show(string name, SrbfImage image)

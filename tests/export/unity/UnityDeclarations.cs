@@ -27,6 +27,7 @@ namespace UnityEngine
     }
     public class Texture2DArray : Texture
     {
+        public int depth { get { return 1; } }
         public Texture2DArray(int width, int height, int depth, TextureFormat format, int mipCount, bool linear) { }
         public void SetPixelData<T>(T[] data, int mipLevel, int element, int sourceDataStartIndex = 0) { }
         public void Apply(bool updateMipmaps = true, bool makeNoLongerReadable = false) { }
@@ -40,7 +41,7 @@ namespace UnityEngine
     }
     public struct Vector3 { public float x, y, z; public Vector3 normalized { get { return this; } } public static Vector3 operator -(Vector3 v) { return v; } }
     public struct Vector4 { public float x, y, z, w; public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; } }
-    public struct Color { public float r, g, b, a; public Color linear { get { return this; } } public static Color operator *(Color c, float f) { return c; } public static Color operator *(Color a, Color b) { return a; } }
+    public struct Color { public float r, g, b, a; public static Color white { get { return new Color(); } } public Color linear { get { return this; } } public static Color operator *(Color c, float f) { return c; } public static Color operator *(Color a, Color b) { return a; } }
     public struct Matrix4x4
     {
         public static Matrix4x4 identity { get { return new Matrix4x4(); } }

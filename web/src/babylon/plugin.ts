@@ -24,6 +24,8 @@ export interface PluginOptions {
 
 /** Numbers that the plugins of an asset share. */
 export interface SharedFrame {
+  /** Whether layers are filtered between texels. */
+  readonly filtered: boolean;
   weights: Float32Array;
   pointLights: Float32Array;
   pointLightCount: number;
@@ -44,7 +46,7 @@ export class SrbfPlugin extends MaterialPluginBase {
     readonly frame: SharedFrame,
     private readonly options: Required<PluginOptions>,
   ) {
-    super(material, "Srbf", 200, { SRBF: true, ...shaderDefines(asset, 1) }, false, false);
+    super(material, "Srbf", 200, { SRBF: true, ...shaderDefines(asset, 1, frame.filtered) }, false, false);
     this.constants = constantVectors(asset);
     this.registerForExtraEvents = true; // so that hardBindForSubMesh is called
     this._pluginManager._addPlugin(this); // asks for the code at once, so not in the base's constructor
@@ -60,7 +62,7 @@ export class SrbfPlugin extends MaterialPluginBase {
   }
 
   override prepareDefines(defines: MaterialDefines): void {
-    Object.assign(defines, shaderDefines(this.asset, this.frame.room));
+    Object.assign(defines, shaderDefines(this.asset, this.frame.room, this.frame.filtered));
   }
 
   override getSamplers(samplers: string[]): void {

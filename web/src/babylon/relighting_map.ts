@@ -5,8 +5,9 @@ import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
 import { receiversFrom } from "../manifest";
-import { columnMajor, type Matrix4, multiplied, Z_UP_FROM_Y_UP } from "../matrix";
-import { frameValues, needFilterable, needPositions } from "../shader";
+import { asDesigned, setNamedLight } from "../named_lights";
+import { columnMajor, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
+import { frameValues, needPositions } from "../shader";
 import { type PluginOptions, type SharedFrame, SrbfPlugin } from "./plugin";
 import { BabylonTextures } from "./textures";
 
@@ -28,16 +29,17 @@ export class SrbfRelightingMap {
   private readonly frame: SharedFrame;
   private readonly plugins: SrbfPlugin[] = [];
 
-  /** @throws SrbfError on layers that must not be filtered (clustered eigen maps), and on block-compressed ones. */
+  /** `filter` of the layers; clusters are mixed in the shader, from four texels each. @throws SrbfError on block-compressed layers. */
   constructor(
     readonly asset: Asset,
     scene: Scene,
     options: { filter?: "linear" | "nearest" } = {},
   ) {
-    needFilterable(asset, "Babylon.js");
     this.worldFromScene = scene.useRightHandedSystem ? Z_UP_FROM_Y_UP : Z_UP_FROM_LEFT_HANDED;
-    this.textures = new BabylonTextures(asset, scene, options.filter ?? "linear");
-    this.frame = { weights: new Float32Array(0), pointLights: new Float32Array(16), pointLightCount: 0, room: 1, assetFromScene: new Float32Array(16) };
+    this.lights.push(...asDesigned(asset));
+    const filter = options.filter ?? "linear";
+    this.textures = new BabylonTextures(asset, scene, filter);
+    this.frame = { filtered: filter === "linear", weights: new Float32Array(0), pointLights: new Float32Array(16), pointLightCount: 0, room: 1, assetFromScene: new Float32Array(16) };
     this.update();
   }
 
@@ -56,6 +58,16 @@ export class SrbfRelightingMap {
     if (this.asset.alpha) material.transparencyMode = PBRMaterial.PBRMATERIAL_ALPHABLEND;
     this.plugins.push(new SrbfPlugin(material, this.asset, this.textures, this.frame, chosen));
     return material;
+  }
+
+  /**
+   * Dim, recolor or switch a light of the scene: `intensity` 1 as designed, as all are at first, 0 off; `color` linear Rec.709. Call `update` after it.
+   *
+   * @throws SrbfError on a name that the asset does not have.
+   */
+  setNamedLight(name: string, intensity = 1, color: Triple = [1, 1, 1]): this {
+    setNamedLight(this.asset, this.lights, name, intensity, color);
+    return this;
   }
 
   /** Update the uniforms to the current lights. */

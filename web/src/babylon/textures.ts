@@ -21,7 +21,7 @@ export class BabylonTextures {
     if (encoding === "bc7" || encoding === "bc1") {
       throw new SrbfError(`expected half, float or uint8 layers for Babylon.js, found ${encoding}; srbf export --target exr or png`);
     }
-    const sampling = filter === "linear" ? Texture.BILINEAR_SAMPLINGMODE : Texture.NEAREST_SAMPLINGMODE;
+    const sampling = filter === "linear" && asset.method.filterable(asset.manifest) ? Texture.BILINEAR_SAMPLINGMODE : Texture.NEAREST_SAMPLINGMODE;
     const plain = (data: ArrayBufferView, w: number, h: number, format: number, type: number) =>
       new RawTexture(data, w, h, format, scene, false, false, Texture.NEAREST_SAMPLINGMODE, type);
     const { tables, ambient } = asset;

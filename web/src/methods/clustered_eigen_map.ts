@@ -1,14 +1,10 @@
 /** Clustered eigen maps: scalar coefficient maps whose light functions depend on the cluster that a texel belongs to. */
 import { checkCoefficientMaps, readCoefficientMaps } from "../coefficient_maps";
-import { SrbfError } from "../errors";
 import type { AssetFiles } from "../files";
-import { checkSize } from "../image";
 import type { Manifest } from "../manifest";
-import { decodePng } from "../png";
 import shader from "../shaders/clustered_eigen_map.glsl";
-import type { N } from "../three/tsl/nodes";
+import { clusterAt, readClusters } from "../weighted_components";
 import type { Fail, Method, Tables } from "./method";
-import type { NodeKit } from "./node_kit";
 
 /** Keys of asset.json that this method adds to those of coefficient maps. */
 interface ClusteredManifest extends Manifest {
@@ -21,7 +17,7 @@ export const clusteredEigenMap: Method = {
   layerChannels: 4,
   mapsPerLayer: 4,
   mapsName: "components",
-  filterable: false, // a component means something else in the next cluster
+  filterable: () => false, // a component means something else in the next cluster
   shader,
 
   check(manifest: ClusteredManifest, layers: number, fail: Fail): void {
@@ -31,14 +27,8 @@ export const clusteredEigenMap: Method = {
 
   async read(files: AssetFiles, manifest: ClusteredManifest): Promise<Tables> {
     const { file } = manifest.cluster_index as { file: string };
-    const clusters = checkSize(decodePng(await files.bytes(file), file), manifest, file);
-    if (clusters.channels !== 1) throw new SrbfError(`expected one channel in ${file}, found ${clusters.channels}`);
+    const clusters = await readClusters(files, manifest, file);
     const tables = await readCoefficientMaps(files, manifest, clusterAt);
     return { ...tables, textures: { ...tables.textures, srbfClusters: clusters } };
   },
 };
-
-function clusterAt(kit: NodeKit, uv: N): N {
-  const { int, textureLoad } = kit.tsl;
-  return int(textureLoad(kit.texture("srbfClusters"), kit.texelAt(uv)).r.mul(255).add(0.5));
-}

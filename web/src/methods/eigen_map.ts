@@ -9,7 +9,7 @@ export const eigenMap: Method = {
   layerChannels: 4,
   mapsPerLayer: 4,
   mapsName: "components",
-  filterable: true,
+  filterable: () => true,
   shader,
   check: checkCoefficientMaps,
   read: (files, manifest) => readCoefficientMaps(files, manifest),

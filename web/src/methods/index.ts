@@ -1,10 +1,13 @@
 /** The methods that assets can have: the only list of them. */
 import { clusteredEigenMap } from "./clustered_eigen_map";
 import { eigenMap } from "./eigen_map";
+import { lightCloud } from "./light_cloud";
+import { lightMix } from "./light_mix";
 import type { Method } from "./method";
+import { namedMaps } from "./named_maps";
 import { relightingMap } from "./relighting_map";
 
-export const METHODS: readonly Method[] = [relightingMap, eigenMap, clusteredEigenMap];
+export const METHODS: readonly Method[] = [relightingMap, eigenMap, clusteredEigenMap, lightMix, namedMaps, lightCloud];
 
 export function methodNamed(name: unknown): Method | undefined {
   return METHODS.find((method) => method.name === name);

@@ -1,5 +1,5 @@
 /** What a method is to the rest of this package. A method is one file in this folder, one line in `index.ts`, and its shader in `../shaders`. */
-import type { DistantLight } from "../asset_frame";
+import type { LightsInAssetFrame } from "../asset_frame";
 import type { AssetFiles } from "../files";
 import type { ByteImage, FloatImage, HalfImage } from "../image";
 import type { Manifest } from "../manifest";
@@ -9,6 +9,11 @@ import type { NodeKit } from "./node_kit";
 
 /** Throws an SrbfError that names what the manifest should have and what it has. */
 export type Fail = (expected: string, found: unknown) => never;
+
+export interface ReadOptions {
+  /** Weights of point lights inside a scene by rays, as `srbf relight` has them, in place of the asset's table: some 10 ms a light. */
+  exact?: boolean;
+}
 
 export interface Method {
   /** `method` of asset.json. */
@@ -22,7 +27,7 @@ export interface Method {
   /** Name of its coefficient maps in a title, such as "maps". */
   readonly mapsName: string;
   /** Whether layers may be filtered between texels; otherwise a lightmap is drawn from them first, and that is filtered. */
-  readonly filterable: boolean;
+  filterable(manifest: Manifest): boolean;
   /**
    * GLSL ES 3.00 that declares the uniforms and `vec3 srbfSum(vec2 uv, float level, vec3 receiver)`, `srbfRelit` of the same parameters, and
    * `vec3 srbfRelitSurface(vec2 uv, vec3 receiver)`: see `shaderText`.
@@ -31,7 +36,7 @@ export interface Method {
   /** Check the keys of asset.json that only this method has; `layers` is the number of stored layers. */
   check(manifest: Manifest, layers: number, fail: Fail): void;
   /** Read the files that only this method has. @throws SrbfError on a damaged one. */
-  read(files: AssetFiles, manifest: Manifest): Promise<Tables>;
+  read(files: AssetFiles, manifest: Manifest, options?: ReadOptions): Promise<Tables>;
 }
 
 /** What a method has read of one asset: everything but its layers. Names of uniforms and textures are those of its shader. */
@@ -50,8 +55,14 @@ export interface Tables {
   readonly textures: Readonly<Record<string, FloatImage | HalfImage | ByteImage>>;
   /** Where the shader takes the projected weights from, as `srbfWeights`: an array of `width` vec4, or an RGBA32F texture. */
   readonly weights: { readonly kind: "uniform" | "texture"; readonly width: number; readonly height: number };
-  /** Sum over distant lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */
-  projectedWeights(lights: Iterable<DistantLight>): Float64Array;
+  /** Names of its lights, of assets of named ones. */
+  readonly names?: readonly string[];
+  /** Places of free space (m), of assets of lights inside the scene. */
+  readonly places?: readonly Triple[];
+  /** Whether point and spot lights are part of the projected weights; otherwise the shader adds them. */
+  readonly projectsPunctual?: boolean;
+  /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */
+  projectedWeights(lights: LightsInAssetFrame): Float64Array;
   /** `srbfSum` in three.js' node language: the light of all lights at `uv` (v downwards), before the clamp; `receiver` in the asset's frame, meters. */
   sum(kit: NodeKit, uv: N, receiver: N): N;
 }

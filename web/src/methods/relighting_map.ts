@@ -24,7 +24,7 @@ export const relightingMap: Method = {
   layerChannels: 3,
   mapsPerLayer: 1,
   mapsName: "maps",
-  filterable: true,
+  filterable: () => true,
   shader,
 
   check(manifest: RelightingMapManifest, layers: number, fail: Fail): void {
@@ -50,7 +50,7 @@ export const relightingMap: Method = {
       integers: {},
       textures: { srbfTable: table },
       weights: { kind: "uniform", width: k, height: 1 },
-      projectedWeights: (lights) => projectedWeights(centers, table.data, lights),
+      projectedWeights: ({ distant }) => projectedWeights(centers, table.data, distant),
       sum: (kit, uv, receiver) => sum(kit, table.width, uv, receiver),
     };
   },

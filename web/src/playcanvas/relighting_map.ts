@@ -4,8 +4,9 @@ import { type Asset, loadAsset, type LoadOptions } from "../asset";
 import { pointLightRoom, packedPointLights } from "../point_light";
 import type { Light } from "../lights";
 import { receiversFrom } from "../manifest";
+import { asDesigned, setNamedLight } from "../named_lights";
 import { columnMajor, type Matrix4, multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
-import { constantVectors, frameValues, needFilterable, needPositions } from "../shader";
+import { constantVectors, frameValues, needPositions } from "../shader";
 import { fragmentText, type ShaderOptions, vertexText } from "./shader";
 import { PlayCanvasTextures } from "./textures";
 
@@ -29,16 +30,19 @@ export class SrbfRelightingMap {
   worldFromScene: Matrix4 = Z_UP_FROM_Y_UP;
   readonly textures: PlayCanvasTextures;
   private readonly shown: Shown[] = [];
+  private readonly filtered: boolean;
   private room = 1;
 
-  /** @throws SrbfError on layers that must not be filtered (clustered eigen maps), and on block-compressed ones. */
+  /** `filter` of the layers; clusters are mixed in the shader, from four texels each. @throws SrbfError on block-compressed layers. */
   constructor(
     readonly asset: Asset,
     device: GraphicsDevice,
     options: { filter?: "linear" | "nearest" } = {},
   ) {
-    needFilterable(asset, "PlayCanvas");
-    this.textures = new PlayCanvasTextures(asset, device, options.filter ?? "linear");
+    this.lights.push(...asDesigned(asset));
+    const filter = options.filter ?? "linear";
+    this.filtered = filter === "linear";
+    this.textures = new PlayCanvasTextures(asset, device, filter);
   }
 
   /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
@@ -64,6 +68,16 @@ export class SrbfRelightingMap {
     this.compile(shown);
     this.update();
     return material;
+  }
+
+  /**
+   * Dim, recolor or switch a light of the scene: `intensity` 1 as designed, as all are at first, 0 off; `color` linear Rec.709. Call `update` after it.
+   *
+   * @throws SrbfError on a name that the asset does not have.
+   */
+  setNamedLight(name: string, intensity = 1, color: Triple = [1, 1, 1]): this {
+    setNamedLight(this.asset, this.lights, name, intensity, color);
+    return this;
   }
 
   /** Update the materials to the current lights. */
@@ -94,10 +108,10 @@ export class SrbfRelightingMap {
   private compile({ material, options }: Shown): void {
     const { manifest, layers } = this.asset;
     material.shaderDesc = {
-      uniqueName: `srbf ${manifest.method} ${manifest.quantity} ${layers.count} ${this.asset.alpha !== undefined} ${this.room} ${Object.values(options).join(" ")}`,
+      uniqueName: `srbf ${manifest.method} ${manifest.quantity} ${layers.count} ${this.asset.alpha !== undefined} ${this.filtered} ${this.room} ${Object.values(options).join(" ")}`,
       attributes: { aPosition: SEMANTIC_POSITION, aLightmapUv: options.channel === 0 ? SEMANTIC_TEXCOORD0 : SEMANTIC_TEXCOORD1 },
       vertexGLSL: vertexText(options),
-      fragmentGLSL: fragmentText(this.asset, this.room, options),
+      fragmentGLSL: fragmentText(this.asset, this.room, this.filtered, options),
     };
     material.update();
   }

@@ -26,7 +26,7 @@ void main(void) {
 }
 
 /** Outgoing light: albedo times irradiance over pi, or radiance. */
-export function fragmentText(asset: Asset, room: number, { receivers }: ShaderOptions): string {
+export function fragmentText(asset: Asset, room: number, filtered: boolean, { receivers }: ShaderOptions): string {
   // The engine reads the sizes of uniform arrays itself, and knows no products.
   const mapped = "texelFetch(srbfPositions, ivec2(vSrbfUv * vec2(textureSize(srbfPositions, 0))), 0).xyz";
   const light = `srbfRelitSurface(vSrbfUv, ${receivers === "map" ? mapped : "vSrbfReceiver"})`;
@@ -37,7 +37,7 @@ varying vec3 vSrbfReceiver;
 uniform vec3 srbfAlbedo;
 ${receivers === "map" ? "uniform highp sampler2D srbfPositions;" : ""}
 ${asset.alpha ? "uniform sampler2D srbfAlpha;" : ""}
-${shaderText(asset, room).replaceAll("4 * SRBF_POINT_LIGHTS", String(4 * room))}
+${shaderText(asset, room, filtered).replaceAll("4 * SRBF_POINT_LIGHTS", String(4 * room))}
 void main(void) {
     vec3 outgoing = ${asset.manifest.quantity === "irradiance" ? `srbfAlbedo * ${light} * 0.3183098861837907` : light};
     gl_FragColor = vec4(gammaCorrectOutput(toneMap(outgoing)), ${asset.alpha ? "textureLod(srbfAlpha, vSrbfUv, 0.0).r" : "1.0"});

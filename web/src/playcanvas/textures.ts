@@ -46,7 +46,7 @@ export class PlayCanvasTextures {
         levels: [data] as never,
       });
     this.samplers = {
-      srbfLayers: of(layers, width, height, FORMATS[encoding], filter === "linear", count),
+      srbfLayers: of(layers, width, height, FORMATS[encoding], filter === "linear" && asset.method.filterable(asset.manifest), count),
       srbfAmbient: of(ambient?.data ?? new Float32Array(4), ambient?.width ?? 1, ambient?.height ?? 1, PIXELFORMAT_RGBA32F),
     };
     for (const [name, image] of Object.entries(tables.textures)) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // An engine's material for clustered eigen maps: its uniforms, and srbfRelit, the light of all point and distant lights together.
-// A component has another meaning in another cluster: srbfRelit is the light of the texel that uv lies in, for redrawing the lightmap, and
-// level must be 0.
-#include "combine/mip_level.glsl"
+// A component has another meaning in another cluster, so layers are never filtered: srbfSum and srbfRelit are the light of the texel that uv
+// lies in, srbfRelitSurface with SRBF_FILTERED mixes the light of the four texels about it. There are no mip levels.
 #include "methods/clustered_eigen_map_lights.glsl"
 
 uniform highp sampler2DArray srbfLayers;
@@ -27,8 +26,13 @@ vec3 srbfRelit(vec2 uv, float level, vec3 receiver) {
     return srbfFinish(srbfSum(uv, level, receiver), textureLod(srbfAmbient, uv, 0.0).rgb);
 }
 
-// At a place on a surface, at the mip level that fits the pixel.
+// At a place on a surface.
 vec3 srbfRelitSurface(vec2 uv, vec3 receiver) {
-    vec2 place = uv * vec2(textureSize(srbfLayers, 0).xy);
-    return srbfRelit(uv, srbfMipLevel(dFdx(place), dFdy(place)), receiver);
+#ifdef SRBF_FILTERED
+    vec3 sum = srbfClusteredLightsFiltered(srbfLayers, srbfClusters, uv, 0, srbfWeights, srbfTable, srbfTableSize, srbfScale, srbfBias,
+                                           receiver, srbfPointLights, srbfPointLightCount);
+    return srbfFinish(sum, textureLod(srbfAmbient, uv, 0.0).rgb);
+#else
+    return srbfRelit(uv, 0.0, receiver);
+#endif
 }

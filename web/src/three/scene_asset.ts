@@ -3,7 +3,8 @@ import { type Light as ThreeLight, Matrix4 } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 import { type Light, moved } from "../lights";
-import { multiplied, Z_UP_FROM_Y_UP } from "../matrix";
+import { asDesigned, setNamedLight } from "../named_lights";
+import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
 import { rowsOf, threeMatrix } from "./rows";
 import { checkKind, lightOf, type SceneLight } from "./scene_lights";
@@ -16,9 +17,21 @@ export class SceneAsset {
   readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
   private readonly followed = new Set<SceneLight>();
 
-  constructor(readonly asset: Asset) {}
+  constructor(readonly asset: Asset) {
+    this.lights.push(...asDesigned(asset));
+  }
 
-  /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point and spot. */
+  /**
+   * Dim, recolor or switch a light of the scene: `intensity` 1 as designed, as all are at first, 0 off; `color` linear Rec.709.
+   *
+   * @throws SrbfError on a name that the asset does not have.
+   */
+  setNamedLight(name: string, intensity = 1, color: Triple = [1, 1, 1]): this {
+    setNamedLight(this.asset, this.lights, name, intensity, color);
+    return this;
+  }
+
+  /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point, spot and area. */
   follow(...lights: ThreeLight[]): this {
     for (const light of lights) {
       checkKind(light);
@@ -52,7 +65,8 @@ export class SceneAsset {
 
 /** Where materials take the light from. @throws SrbfError on `maps` for layers that must not be filtered. */
 export function sourceOf(asset: Asset, asked?: "maps" | "lightmap"): "maps" | "lightmap" {
-  const { filterable, name } = asset.method;
+  const { name } = asset.method;
+  const filterable = asset.method.filterable(asset.manifest);
   if (!filterable && asked === "maps") {
     throw new SrbfError(`expected source "lightmap" for ${name}, found "maps": its layers must not be filtered between texels`);
   }

@@ -1,15 +1,15 @@
 /** three.js lights as lights of the library, in three's world. */
-import { type DirectionalLight, type Light as ThreeLight, type PointLight, type SpotLight, Vector3 } from "three";
+import { type DirectionalLight, type Light as ThreeLight, type PointLight, type RectAreaLight, type SpotLight, Vector3 } from "three";
 import { SrbfError } from "../errors";
-import { directionalLight, type Light, pointLight, spotLight } from "../lights";
+import { areaLight, directionalLight, type Light, pointLight, spotLight } from "../lights";
 import type { Triple } from "../matrix";
 
-export type SceneLight = DirectionalLight | PointLight | SpotLight;
+export type SceneLight = DirectionalLight | PointLight | SpotLight | RectAreaLight;
 
 /**
  * A three.js light as a light of the library, in three's own units: a directional light's color * intensity (lux) is the irradiance; a point or spot light's (candela)
  * is the irradiance at 1 m. `decay` 2 is inverse-square down to 0.1 m, where three stops it, 1 is linear down to 0.01 m. A spot is full inside
- * angle * (1 - penumbra) and ends at angle. Invisible lights are left out.
+ * angle * (1 - penumbra) and ends at angle. A RectAreaLight's color * intensity (nit) is its radiance, towards its own -z. Invisible lights are left out.
  *
  * @throws SrbfError on another kind of light, a decay that is neither 1 nor 2, or a `distance` that cuts the light off.
  */
@@ -19,6 +19,13 @@ export function lightOf(light: SceneLight): Light | undefined {
   const color = triple(light.color.clone().multiplyScalar(light.intensity).toArray());
   const place = new Vector3().setFromMatrixPosition(light.matrixWorld);
   if (isDirectional(light)) return directionalLight(triple(place.sub(target(light)).toArray()), color);
+  if (isArea(light)) {
+    const [side, up] = [new Vector3(), new Vector3()];
+    light.matrixWorld.extractBasis(side, up, new Vector3());
+    const area = light.width * side.length() * light.height * up.length();
+    const sides = [up.multiplyScalar(light.height), side.multiplyScalar(light.width)].map((v) => triple(v.toArray()));
+    return areaLight(triple(place.toArray()), sides[0], sides[1], { color: triple(color.map((x) => x * area)) });
+  }
   const fade = { color, ...falloffOf(light) };
   if (isSpot(light)) {
     const axis = triple(target(light).sub(place).toArray());
@@ -29,9 +36,9 @@ export function lightOf(light: SceneLight): Light | undefined {
 
 /** @throws SrbfError where an asset cannot be relit by lights of this kind. */
 export function checkKind(light: ThreeLight): asserts light is SceneLight {
-  const known = light as Partial<Record<"isDirectionalLight" | "isPointLight" | "isSpotLight", boolean>>;
-  if (!(known.isDirectionalLight || known.isPointLight || known.isSpotLight)) {
-    throw new SrbfError(`expected a DirectionalLight, PointLight or SpotLight to follow, found ${light.type}; add others to lights yourself`);
+  const known = light as Partial<Record<"isDirectionalLight" | "isPointLight" | "isSpotLight" | "isRectAreaLight", boolean>>;
+  if (!(known.isDirectionalLight || known.isPointLight || known.isSpotLight || known.isRectAreaLight)) {
+    throw new SrbfError(`expected a DirectionalLight, PointLight, SpotLight or RectAreaLight to follow, found ${light.type}; add others to lights yourself`);
   }
 }
 
@@ -53,10 +60,14 @@ function isDirectional(light: SceneLight): light is DirectionalLight {
   return (light as DirectionalLight).isDirectionalLight === true;
 }
 
+function isArea(light: SceneLight): light is RectAreaLight {
+  return (light as RectAreaLight).isRectAreaLight === true;
+}
+
 function isSpot(light: SceneLight): light is SpotLight {
   return (light as SpotLight).isSpotLight === true;
 }
 
-function triple(numbers: number[]): Triple {
+function triple(numbers: readonly number[]): Triple {
   return [numbers[0], numbers[1], numbers[2]];
 }

@@ -12,7 +12,7 @@ import { VertexData } from "@babylonjs/core/Meshes/mesh.vertexData.js";
 import { Scene } from "@babylonjs/core/scene.js";
 import type { Triple } from "../../src";
 import { SrbfRelightingMap } from "../../src/babylon";
-import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { type Job, lightOfJson, type LightJson, mix, picture, upsideDown } from "./job";
 
 let engine: Engine | undefined;
 
@@ -22,8 +22,9 @@ export async function babylonMaterial(job: Job) {
   const scene = new Scene(engine);
   scene.useRightHandedSystem = job.rightHanded === true;
   scene.imageProcessingConfiguration.applyByPostProcess = true; // linear values in the target
-  const map = await SrbfRelightingMap.load(job.asset, scene, { filter: "nearest" });
-  map.lights.push(...job.lights.map(lightOfJson));
+  const map = await SrbfRelightingMap.load(job.asset, scene, { filter: (job.filter as "nearest") ?? "nearest" });
+  map.lights.push(...[...job.lights, ...((job.raw as LightJson[]) ?? [])].map(lightOfJson));
+  mix(job, map);
   const { width, height } = map.asset.manifest;
   const material = new PBRMaterial("quad", scene);
   material.albedoColor = Color3.FromArray(job.color as number[]);

@@ -1,12 +1,12 @@
 /** Jobs without a GPU: what the core computes and decodes. */
 import { frameValues, loadAsset } from "../../src";
 import { projectedWeights } from "../../src/weights";
-import { type Job, lightOfJson } from "./job";
+import { type Job, lightOfJson, type LightJson } from "./job";
 
-/** Projected weights in double precision, and the point lights' uniforms. */
+/** Projected weights in double precision, and the point lights' uniforms; `raw` lights are written by hand. */
 export async function host(job: Job) {
-  const asset = await loadAsset(job.asset, { verify: true });
-  const lights = job.lights.map(lightOfJson);
+  const asset = await loadAsset(job.asset, { verify: true, exact: job.exact === true });
+  const lights = [...job.lights, ...((job.raw as LightJson[]) ?? [])].map(lightOfJson);
   return { weights: [...projectedWeights(asset, lights)], pointLights: frameValues(asset, lights).pointLights };
 }
 

@@ -1,5 +1,5 @@
 /** Jobs that the tests send to a page, and their results. */
-import { directionalLight, environmentLight, type Light, pointLight, spotLight, type Triple } from "../../src";
+import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, sphereLight, spotLight, type Triple } from "../../src";
 
 export interface Job {
   run: string;
@@ -28,7 +28,19 @@ export function lightOfJson(json: LightJson): Light {
   if (json.kind === "spot") {
     return spotLight(json.position as Triple, json.direction as Triple, { inner: json.inner as number, outer: json.outer as number }, options);
   }
+  if (json.kind === "sphere") return sphereLight(json.position as Triple, json.size as number, options);
+  if (json.kind === "area") return areaLight(json.position as Triple, json.u as Triple, json.v as Triple, { color: json.color, a0: json.a0 as number });
+  if (json.kind === "named") return namedLight(json.name as string, json.color);
   return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color);
+}
+
+interface Mixed {
+  setNamedLight(name: string, intensity: number, color: Triple): unknown;
+}
+
+/** Set the named lights of a job: [name, intensity, color] each. */
+export function mix(job: Job, map: Mixed): void {
+  for (const [name, intensity, color] of (job.named as [string, number, Triple][]) ?? []) map.setNamedLight(name, intensity, color);
 }
 
 export function picture(width: number, height: number, pixels: Float32Array): Picture {

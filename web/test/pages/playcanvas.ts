@@ -2,7 +2,7 @@
 import * as pc from "playcanvas";
 import type { Triple } from "../../src";
 import { SrbfRelightingMap } from "../../src/playcanvas";
-import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { type Job, lightOfJson, type LightJson, mix, picture, upsideDown } from "./job";
 
 let app: pc.AppBase | undefined;
 
@@ -24,8 +24,9 @@ async function shared(): Promise<pc.AppBase> {
 export async function playcanvasMaterial(job: Job) {
   const own = await shared();
   const device = own.graphicsDevice;
-  const map = await SrbfRelightingMap.load(job.asset, device, { filter: "nearest" });
-  map.lights.push(...job.lights.map(lightOfJson));
+  const map = await SrbfRelightingMap.load(job.asset, device, { filter: (job.filter as "nearest") ?? "nearest" });
+  map.lights.push(...[...job.lights, ...((job.raw as LightJson[]) ?? [])].map(lightOfJson));
+  mix(job, map);
   const { width, height } = map.asset.manifest;
   const material = map.material({ albedo: job.color as Triple, ...(job.apply as object) });
   material.cull = pc.CULLFACE_NONE;

@@ -1,11 +1,13 @@
 /** Jobs for three.js' WebGPURenderer, on WebGPU or forced on WebGL2. */
 import * as THREE from "three";
-import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMaterial, RenderTarget, WebGPURenderer } from "three/webgpu";
+import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMaterial, RectAreaLightNode, RenderTarget, WebGPURenderer } from "three/webgpu";
+import { RectAreaLightTexturesLib } from "three/addons/lights/RectAreaLightTexturesLib.js";
 import { SrbfRelightingNodes } from "../../src/three/tsl";
 import { type Job, lightOfJson, picture, upsideDown } from "./job";
 import { addLights, facingCamera, quad } from "./three_scene";
 
 const MATERIALS = { MeshStandardMaterial: MeshStandardNodeMaterial, MeshLambertMaterial: MeshLambertNodeMaterial, MeshBasicMaterial: MeshBasicNodeMaterial };
+RectAreaLightNode.setLTC(RectAreaLightTexturesLib.init()); // as three.js asks of pages with area lights
 const renderers = new Map<string, WebGPURenderer>();
 
 async function rendererOf(job: Job): Promise<WebGPURenderer> {

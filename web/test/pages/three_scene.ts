@@ -1,11 +1,12 @@
 /** What the jobs of both three.js renderers share: a quad in the receivers' plane, a camera above it, and lights. */
 import * as THREE from "three";
 import type { Light, Triple } from "../../src";
-import { type Job, lightOfJson } from "./job";
+import { type Job, lightOfJson, mix } from "./job";
 
 interface Followed {
   lights: Light[];
   follow(...lights: THREE.Light[]): unknown;
+  setNamedLight(name: string, intensity: number, color: Triple): unknown;
 }
 
 /** The rectangle |x| <= half[0], |y| <= half[1] at z = half[2] of the asset's world, row 0 at +y, in three's y-up world. */
@@ -29,17 +30,19 @@ export function facingCamera(job: Job): THREE.OrthographicCamera {
   return camera;
 }
 
-/** `job.lights` as the library's, and `job.follow` as three's own: {type, color, intensity, position, target, angle, penumbra, decay}, y up. */
+/** `job.lights` as the library's, and `job.follow` as three's own: {type, color, intensity, position, target, angle, penumbra, decay, width, height}, y up. */
 export function addLights(job: Job, map: Followed, scene: THREE.Scene): void {
   map.lights.push(...job.lights.map(lightOfJson));
+  mix(job, map);
   for (const json of (job.follow as Record<string, unknown>[]) ?? []) {
     const kind = json.type as "SpotLight";
     const light = new THREE[kind]() as THREE.SpotLight;
     light.color.setRGB(...(json.color as [number, number, number]));
     light.intensity = json.intensity as number;
     light.position.set(...(json.position as [number, number, number]));
-    if (json.target) light.target.position.set(...(json.target as [number, number, number]));
-    for (const key of ["angle", "penumbra", "decay", "distance"] as const) if (key in json) light[key] = json[key] as number;
+    if (json.target && light.target) light.target.position.set(...(json.target as [number, number, number]));
+    for (const key of ["angle", "penumbra", "decay", "distance", "width", "height"] as const) if (key in json) light[key as "angle"] = json[key] as number;
+    if (json.type === "RectAreaLight") light.lookAt(...(json.target as [number, number, number]));
     scene.add(light);
     map.follow(light);
   }

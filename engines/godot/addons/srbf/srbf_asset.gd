@@ -2,7 +2,7 @@
 @tool
 class_name SrbfAsset
 extends Resource
-## An srbf asset as one resource: layers, tables, geometry, and the projected weights of distant lights.
+## An srbf asset as one resource: layers, tables, geometry, and the projected weights of distant lights, or of named ones, or of a cloud's.
 ##
 ## Directions and positions are in the asset's own frame, z up; SrbfRelight transforms Godot's y-up world into it.
 
@@ -40,6 +40,10 @@ extends Resource
 @export var w_table: Image
 @export var w_table_size: int
 @export var cluster_index: Image
+## Of light mixing: the scene's own lights by name.
+@export var light_table: SrbfLightTable
+## Of a light cloud: weights of point lights by their place.
+@export var position_table: SrbfPositionTable
 
 var _textures := {}
 var _table := PackedFloat32Array()  # red, green, blue of w_table
@@ -55,7 +59,7 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var asset := SrbfAsset.new()
 	asset.method = manifest.method
 	asset.quantity = manifest.quantity
-	asset.domain = manifest.domain
+	asset.domain = manifest.get("domain", "sphere")
 	asset.is_indirect = manifest.get("transport") == "indirect"
 	var receiver := _receiver_kind(manifest)
 	asset.is_view = receiver == "view"
@@ -63,7 +67,7 @@ static func read(manifest_path: String) -> SrbfAsset:
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
-	var layers: Array = manifest.maps if asset.method == "relighting-map" else manifest.planes
+	var layers: Array = manifest.maps if manifest.has("maps") else manifest.planes
 	asset.levels = int(layers[0].get("levels", 1))
 	var arrays := {}  # layers in one file, by its name
 	for layer in layers:
@@ -72,29 +76,35 @@ static func read(manifest_path: String) -> SrbfAsset:
 				arrays[layer.file] = SrbfDds.read(folder.path_join(layer.file))
 			asset.layer_images.append(arrays[layer.file][layer.layer] if layer.layer < arrays[layer.file].size() else null)
 		else:
-			asset.layer_images.append(_image(folder, layer.file))
+			asset.layer_images.append(image(folder, layer.file))
 		asset.scale.append(_vector4(layer.scale))
 		asset.bias.append(_vector4(layer.bias))
 	for name in ["position", "normal", "coverage", "ambient"]:
 		if manifest.has(name):
-			asset.set(name, _image(folder, manifest[name]))
-	if asset.method == "relighting-map":
-		asset.centers = _vectors(manifest.basis.centers)
-		asset.r_table = _image(folder, manifest.r_table.file)
-		asset.r_table.convert(Image.FORMAT_RF)
-	else:
+			asset.set(name, image(folder, manifest[name]))
+	if manifest.has("planes"):
 		asset.scalars = int(manifest.scalars)
 		asset.clusters = int(manifest.get("clusters", 1))
+	if manifest.has("cluster_index"):
+		asset.cluster_index = image(folder, manifest.cluster_index.file)
+		asset.cluster_index.convert(Image.FORMAT_R8)
+	if asset.is_weighted():
+		if asset.method == "light-cloud":
+			asset.position_table = SrbfPositionTable.read(folder, manifest)
+		else:
+			asset.light_table = SrbfLightTable.read(folder, manifest)
+	elif asset.method == "relighting-map":
+		asset.centers = _vectors(manifest.basis.centers)
+		asset.r_table = image(folder, manifest.r_table.file)
+		asset.r_table.convert(Image.FORMAT_RF)
+	else:
 		asset.centers = _vectors(manifest.light_basis.centers)
 		asset.spreads = PackedFloat64Array(manifest.light_basis.spreads)
-		var coefficients := _image(folder, manifest.light_coefficients.file)
+		var coefficients := image(folder, manifest.light_coefficients.file)
 		coefficients.convert(Image.FORMAT_RGBF)
 		asset.light_coefficients = coefficients.get_data().to_float32_array()
-		asset.w_table = _image(folder, manifest.w_table.file)
+		asset.w_table = image(folder, manifest.w_table.file)
 		asset.w_table_size = int(manifest.w_table.size)
-		if manifest.has("cluster_index"):
-			asset.cluster_index = _image(folder, manifest.cluster_index.file)
-			asset.cluster_index.convert(Image.FORMAT_R8)
 	if asset.layer_images.has(null):
 		return null
 	return asset
@@ -111,20 +121,27 @@ func layers() -> Texture2DArray:
 
 ## One of the images as a texture; null where the asset lacks it.
 func texture(name: StringName) -> ImageTexture:
-	var image: Image = get(name)
-	if image == null:
+	var pixels: Image = get(name)
+	if pixels == null:
 		return null
 	if not _textures.has(name):
-		_textures[name] = ImageTexture.create_from_image(image)
+		_textures[name] = ImageTexture.create_from_image(pixels)
 	return _textures[name]
+
+
+## Whether every light enters through the weights of a frame: named lights, and lights of a cloud. A texel's cost is that of one sun.
+func is_weighted() -> bool:
+	return method in ["light-mix", "named-maps", "light-cloud"]
 
 
 ## The first lines of a shader for this asset.
 func defines() -> String:
 	var kind := ("#define SRBF_IRRADIANCE\n" if quantity == "irradiance" else "") + ("#define SRBF_INDIRECT\n" if is_indirect and quantity == "irradiance" else "")
-	if method == "relighting-map":
+	if is_weighted():
+		kind += "#define SRBF_WEIGHTED\n"
+	if scalars == 0:
 		return kind + "#define SRBF_RELIGHTING_MAP\n#define SRBF_K %d\n#define SRBF_LAYERS %d\n" % [scale.size(), scale.size()]
-	var name := "SRBF_CLUSTERED_EIGEN_MAP" if method == "clustered-eigen-map" else "SRBF_EIGEN_MAP"
+	var name := "SRBF_CLUSTERED_EIGEN_MAP" if cluster_index else "SRBF_EIGEN_MAP"
 	return kind + "#define %s\n#define SRBF_COMPONENTS %d\n#define SRBF_LAYERS %d\n" % [name, scalars, scale.size()]
 
 
@@ -134,30 +151,6 @@ func weights(directions: PackedVector3Array, colors: PackedVector3Array, by_tabl
 	if method == "relighting-map":
 		return _map_weights(directions, colors)
 	return _table_weights(directions, colors) if by_table else _function_weights(directions, colors)
-
-
-## `weights` of a panorama as Godot has it, in linear radiance; `rotation` turns Godot's world into the asset's frame.
-func sky_weights(sky: Image, rotation: Basis) -> PackedVector4Array:
-	var upright := rotation.y.is_equal_approx(Vector3(0.0, 0.0, 1.0))
-	var directions := PackedVector3Array()
-	var colors := PackedVector3Array()
-	for row in sky.get_height():
-		var top := PI / 2.0 - row * PI / sky.get_height()
-		var bottom := PI / 2.0 - (row + 1) * PI / sky.get_height()
-		if domain == "hemisphere" and upright:  # a row that straddles the horizon ends there
-			top = maxf(top, 0.0)
-			bottom = maxf(bottom, 0.0)
-		var solid_angle := (sin(top) - sin(bottom)) * TAU / sky.get_width()
-		var height_angle := (top + bottom) / 2.0
-		for column in sky.get_width():
-			var azimuth := (column + 0.5) / sky.get_width() * TAU
-			var direction := Vector3(cos(height_angle) * sin(azimuth), sin(height_angle), -cos(height_angle) * cos(azimuth))
-			direction = rotation * direction
-			if solid_angle > 0.0 and (domain == "sphere" or upright or direction.z > 0.0):
-				var color := sky.get_pixel(column, row)
-				directions.append(direction)
-				colors.append(Vector3(color.r, color.g, color.b) * solid_angle)
-	return weights(directions, colors)
 
 
 func _map_weights(directions: PackedVector3Array, colors: PackedVector3Array) -> PackedVector4Array:
@@ -224,25 +217,6 @@ func point(texel: Vector2i) -> Vector3:
 	return to_godot(position.get_pixel(texel.x, texel.y))
 
 
-## Bounds of nine tenths of the covered texels along each axis, in Godot's frame, without what a view sees far away.
-func bounds() -> AABB:
-	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
-	for row in height:
-		for column in width:
-			if not coverage or coverage.get_pixel(column, row).r >= 0.5:
-				var place := point(Vector2i(column, row))
-				for axis in 3:
-					sides[axis].append(place[axis])
-	var low := Vector3.ZERO
-	var high := Vector3.ZERO
-	for axis in 3:
-		sides[axis].sort()
-		var count := sides[axis].size()
-		low[axis] = sides[axis][count / 20] if count else 0.0
-		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
-	return AABB(low, high - low)
-
-
 func _entry(texel: int) -> Vector3:
 	return Vector3(_table[3 * texel], _table[3 * texel + 1], _table[3 * texel + 2])
 
@@ -276,12 +250,13 @@ static func _receiver_kind(manifest: Dictionary) -> String:
 	return ""
 
 
-static func _image(folder: String, file: String) -> Image:
+## An image of an asset; null, with an error in the log, where it is missing.
+static func image(folder: String, file: String) -> Image:
 	var path := folder.path_join(file)
-	var image := Image.load_from_file(ProjectSettings.globalize_path(path))
-	if image == null:
+	var found := Image.load_from_file(ProjectSettings.globalize_path(path))
+	if found == null:
 		push_error("expected an image at %s, found none" % path)
-	return image
+	return found
 
 
 static func _transform(rows: Variant) -> Transform3D:

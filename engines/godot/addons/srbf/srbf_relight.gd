@@ -5,6 +5,11 @@ extends Node3D
 ##
 ## The node marks the asset's origin, rotation and scale. A light of energy 1 lights a white diffuse surface as Godot's
 ## own light does: π times its linear color as irradiance, at 1 m from an omni or spot light.
+##
+## An asset of named lights has its own: `set_light` dims, recolors and switches them, and Godot's lights do nothing. A light cloud follows
+## omni and spot lights, with the bounces of inverse-square light, omni_attenuation 2, over any range. A spot's bounces are
+## a rough approximation: those of a point light at its place with the share of the flux that is inside the cone. In a small room they
+## are off by 0.4 for a half-angle of 45°, by 0.6 for 20° (relative rms), where a point light's are off by 0.03.
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
 const RADIUS := 1e-4  # meters: least distance of a receiver from a light, as in Godot
@@ -23,6 +28,10 @@ const NO_CONE := Vector2(3.0, 4.0)  # above every 1 - cos: a point light
 @export_range(1, 64) var most_point_lights := 4
 ## Eigen maps: read directional lights' weights from the table of omni and spot lights; faster, for lights that move every frame.
 @export var suns_by_table := false
+## Named lights: intensities by name, 1 as the scene has a light set, which is also what a missing name means. See `set_light`.
+@export var intensities := {}
+## Named lights: colors by name, as of Godot's lights, on top of the scene's own; white where a name is missing.
+@export var colors := {}
 ## For canvas items, in stops.
 @export var exposure := 0.0
 
@@ -31,6 +40,7 @@ var _weights: ImageTexture
 var _environment_weights: PackedVector4Array
 var _environment_of := []
 var _last := []
+var _warned := {}
 
 
 func _ready() -> void:
@@ -55,6 +65,17 @@ func apply() -> void:
 			surface.material_override = made.spatial
 
 
+## Dim, recolor or switch one of the scene's own lights. `intensity` 1 is as the scene has it set, 0 off; `color` as of Godot's lights.
+func set_light(light_name: String, intensity := 1.0, color := Color.WHITE) -> void:
+	intensities[light_name] = intensity
+	colors[light_name] = color
+
+
+## The names that `set_light` takes; none where the asset follows Godot's lights.
+func light_names() -> PackedStringArray:
+	return asset.light_table.names if asset and asset.light_table else PackedStringArray()
+
+
 ## The materials in use, which hold the albedo of meshes.
 func materials() -> Array[ShaderMaterial]:
 	return _materials
@@ -74,11 +95,18 @@ func _process(_delta: float) -> void:
 		if not light is DirectionalLight3D:
 			now.append(_cone_of(light))
 			now.append(_decay(light))
+	if asset.light_table:
+		now.append_array([intensities.duplicate(), colors.duplicate()])
 	if now == _last:
 		return
 	_last = now
-	_set_distant_lights(found, asset_from_godot)
-	_set_point_lights(found, asset_from_godot)
+	if asset.light_table:
+		_give_weights(asset.light_table.weights(_mix()))
+	elif asset.position_table:
+		_give_weights(_cloud_weights(found, asset_from_godot))
+	else:
+		_set_distant_lights(found, asset_from_godot)
+		_set_point_lights(found, asset_from_godot)
 	for material in _materials:
 		material.set_shader_parameter("srbf_asset_from_world", asset_from_godot)
 		material.set_shader_parameter("srbf_exposure", exposure)
@@ -99,13 +127,64 @@ func _set_distant_lights(found: Array[Light3D], asset_from_godot: Transform3D) -
 			sums[i] += _environment_weights[i] * sky_energy
 	if asset.method == "relighting-map":
 		_give("srbf_weights", sums)
-		return
-	var image := Image.create_from_data(asset.scalars + 1, asset.clusters, false, Image.FORMAT_RGBAF, sums.to_byte_array())
+	else:
+		_give_weights(sums)
+
+
+## A row of weights per cluster, or one row of all maps', as a texture.
+func _give_weights(sums: PackedVector4Array) -> void:
+	var rows := asset.clusters if asset.scalars else 1
+	var image := Image.create_from_data(sums.size() / rows, rows, false, Image.FORMAT_RGBAF, sums.to_byte_array())
 	if _weights == null:
 		_weights = ImageTexture.create_from_image(image)
 		_give("srbf_weights", _weights)
 	else:
 		_weights.update(image)
+
+
+## Linear intensity times color of every named light.
+func _mix() -> PackedVector3Array:
+	for light_name in intensities.keys() + colors.keys():
+		if not light_name in asset.light_table.names:
+			_warn("expected a light of the asset, found %s; its lights are %s" % [light_name, ", ".join(asset.light_table.names)])
+	var mix := PackedVector3Array()
+	for light_name in asset.light_table.names:
+		var color: Color = colors.get(light_name, Color.WHITE)
+		color = color.srgb_to_linear()
+		mix.append(Vector3(color.r, color.g, color.b) * float(intensities.get(light_name, 1.0)))
+	return mix
+
+
+## Omni and spot lights by the table of places. The asset has bounces alone; Godot's light itself, range and shadows included, comes on top.
+func _cloud_weights(found: Array[Light3D], asset_from_godot: Transform3D) -> PackedVector4Array:
+	var places := PackedVector3Array()
+	var strengths := PackedVector3Array()
+	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # the asset's meters per meter of Godot's
+	for light in found:
+		if light is DirectionalLight3D:
+			_warn("expected omni and spot lights for a light cloud, found %s; it adds no indirect light" % light.name)
+			continue
+		if absf(_decay(light) - 2.0) > 0.01:
+			_warn("expected attenuation 2 for a light cloud, found %g at %s; its bounces are those of 2" % [_decay(light), light.name])
+		var place := asset_from_godot * light.global_position
+		if not asset.position_table.sees(place):
+			_warn("expected %s in the free space that was captured, found it elsewhere; its bounces are those of the places around" % light.name)
+		places.append(place)
+		strengths.append(irradiance(light) * (unit * unit * _flux_share(light)))
+	return asset.position_table.weights(places, strengths)
+
+
+## How much of a point light's flux a spot sends out: 1 of an omni light. The smooth step between its half-angles lets half through.
+static func _flux_share(light: Light3D) -> float:
+	var cone := _cone_of(light)
+	return (cone.x + cone.y) / 4.0 if light is SpotLight3D else 1.0
+
+
+## Once for each text, since lights may move in every frame.
+func _warn(text: String) -> void:
+	if not _warned.has(text):
+		_warned[text] = true
+		push_warning(text)
 
 
 ## An environment map's weights are the slowest, and change only with it.
@@ -125,7 +204,7 @@ func _update_environment(asset_from_godot: Transform3D) -> void:
 				image.set_pixel(column, row, image.get_pixel(column, row).srgb_to_linear())
 	while image.get_width() > SKY_WIDTH and image.get_height() > 1:
 		image.shrink_x2()
-	_environment_weights = asset.sky_weights(image, asset_from_godot.basis.orthonormalized())
+	_environment_weights = SrbfSky.weights(asset, image, asset_from_godot.basis.orthonormalized())
 
 
 func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
@@ -189,7 +268,9 @@ func _material(type: String, file: String) -> ShaderMaterial:
 		"srbf_ambient": asset.texture("ambient"),
 		"srbf_alpha": asset.texture("coverage") if asset.is_picture else null,
 	}
-	if asset.method == "relighting-map":
+	if asset.is_weighted():
+		constants.srbf_clusters = asset.texture("cluster_index")
+	elif asset.method == "relighting-map":
 		var centers := PackedVector4Array()
 		for center in asset.centers:
 			centers.append(Vector4(center.x, center.y, center.z, 0.0))

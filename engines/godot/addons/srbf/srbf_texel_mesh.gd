@@ -52,6 +52,25 @@ static func of(asset: SrbfAsset, longest := 4.0, most := 65536) -> ArrayMesh:
 	return mesh
 
 
+## Bounds of nine tenths of the covered texels along each axis, in Godot's frame, without what a view sees far away.
+static func bounds(asset: SrbfAsset) -> AABB:
+	var sides: Array[PackedFloat32Array] = [PackedFloat32Array(), PackedFloat32Array(), PackedFloat32Array()]
+	for row in asset.height:
+		for column in asset.width:
+			if not asset.coverage or asset.coverage.get_pixel(column, row).r >= 0.5:
+				var place := asset.point(Vector2i(column, row))
+				for axis in 3:
+					sides[axis].append(place[axis])
+	var low := Vector3.ZERO
+	var high := Vector3.ZERO
+	for axis in 3:
+		sides[axis].sort()
+		var count := sides[axis].size()
+		low[axis] = sides[axis][count / 20] if count else 0.0
+		high[axis] = sides[axis][count - 1 - count / 20] if count else 0.0
+	return AABB(low, high - low)
+
+
 ## Every `step`-th texel of a side, and the last one.
 static func _steps(size: int, step: int) -> PackedInt32Array:
 	var chosen := PackedInt32Array(range(0, size, step))

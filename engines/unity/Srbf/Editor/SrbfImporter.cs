@@ -29,6 +29,21 @@ namespace Srbf
             context.AddObjectToAsset("asset", asset);
             context.SetMainObject(asset);
             asset.layers = Add(context, "layers", Layers(manifest, folder));
+            asset.lightTable = manifest.LightTable(folder);
+            asset.positionTable = manifest.PositionTable(folder);
+            if (!manifest.IsWeighted) ReadFunctions(context, asset, manifest, folder);
+            if (manifest.ClusterFile != null)
+                asset.clusters = Add(context, "clusters", Texture(SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)), TextureFormat.R8, FilterMode.Point));
+            SrbfImage ambient = manifest.AmbientFile != null
+                ? SrbfImage.Read(Path.Combine(folder, manifest.AmbientFile))
+                : new SrbfImage { Width = 1, Height = 1, Channels = 3, Values = new float[3] };
+            asset.ambient = Add(context, "ambient", Texture(ambient, TextureFormat.RGBAHalf, FilterMode.Bilinear));
+            context.DependsOnSourceAsset(path);
+        }
+
+        /// <summary>What distant and point lights look up.</summary>
+        static void ReadFunctions(AssetImportContext context, SrbfAsset asset, SrbfManifest manifest, string folder)
+        {
             SrbfImage table = SrbfImage.Read(Path.Combine(folder, manifest.TableFile));
             if (asset.IsMaps)
             {
@@ -37,13 +52,6 @@ namespace Srbf
             }
             asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RGFloat : TextureFormat.RGBAHalf, FilterMode.Point));
             if (!asset.IsMaps) asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
-            if (manifest.ClusterFile != null)
-                asset.clusters = Add(context, "clusters", Texture(SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)), TextureFormat.R8, FilterMode.Point));
-            SrbfImage ambient = manifest.AmbientFile != null
-                ? SrbfImage.Read(Path.Combine(folder, manifest.AmbientFile))
-                : new SrbfImage { Width = 1, Height = 1, Channels = 3, Values = new float[3] };
-            asset.ambient = Add(context, "ambient", Texture(ambient, TextureFormat.RGBAHalf, FilterMode.Bilinear));
-            context.DependsOnSourceAsset(path);
         }
 
         static Texture2DArray Layers(SrbfManifest manifest, string folder)

@@ -14,7 +14,16 @@ namespace Srbf
         public int scalars, clusterCount;
         public double[] centers, spreads, assetFromWorld;
         public float[] rTable, lightCoefficients;
+        public SrbfLightTable lightTable;        // of named lights
+        public SrbfPositionTable positionTable;  // of a light cloud
 
         public bool IsMaps { get { return method == "relighting-map"; } }
+
+        public bool IsNamed { get { return lightTable != null && lightTable.names != null && lightTable.names.Length > 0; } }
+
+        public bool IsCloud { get { return positionTable != null && positionTable.rank > 0; } }
+
+        /// <summary>Texels in a row of weights: of a cluster the mean's and each component's, or one per map.</summary>
+        public int WeightColumns { get { return scalars > 0 ? scalars + 1 : layers.depth; } }
     }
 }

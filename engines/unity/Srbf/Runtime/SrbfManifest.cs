@@ -14,6 +14,14 @@ namespace Srbf
         public double[] Spreads;           // one for relighting maps, one per light function for coefficient maps
         public double[] AssetFromWorld;    // row-major 4 x 4
         public string TableFile, CoefficientsFile, ClusterFile, AmbientFile;
+        public string[] Names;             // of named lights
+        public string ValuesFile;          // light_values; null where each light has a map
+        public double ValuesScale;
+        public SrbfPositionTable Positions;  // of a light cloud, still without what its files hold
+        public string NodesFile, BasisFile, VisibilityFile;
+
+        /// <summary>Whether every light enters through the weights of a frame: named lights, and lights of a cloud.</summary>
+        public bool IsWeighted { get { return Names != null || Positions != null; } }
 
         /// <summary>Read asset.json's text; FormatException with what was expected and found.</summary>
         public static SrbfManifest Read(string text)
@@ -32,9 +40,12 @@ namespace Srbf
                 AmbientFile = json.ContainsKey("ambient") ? Text(json, "ambient") : null,
                 AssetFromWorld = json.ContainsKey("asset_from_world") ? Numbers(json["asset_from_world"]) : new double[] { 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1 },
             };
-            bool maps = manifest.Method == "relighting-map";
+            bool maps = json.ContainsKey("maps");
             var layers = (List<object>)json[maps ? "maps" : "planes"];
             manifest.LayerFiles = layers.ConvertAll(layer => Text(Member(layer), "file")).ToArray();
+            manifest.Scalars = maps ? 0 : (int)Number(json, "scalars");
+            manifest.ClusterFile = json.ContainsKey("cluster_index") ? Text(Member(json["cluster_index"]), "file") : null;
+            if (json.ContainsKey("light_domain") && manifest.ReadLights(json)) return manifest;
             var basis = Member(json[maps ? "basis" : "light_basis"]);
             if (Text(basis, "kind") != "gaussian") throw new FormatException("expected Gaussians, found " + Text(basis, "kind") + ": no shader relights them");
             manifest.Centers = Numbers(basis["centers"]);
@@ -47,10 +58,55 @@ namespace Srbf
                 return manifest;
             }
             manifest.Spreads = Numbers(basis["spreads"]);
-            manifest.Scalars = (int)Number(json, "scalars");
             manifest.CoefficientsFile = Text(Member(json["light_coefficients"]), "file");
-            manifest.ClusterFile = json.ContainsKey("cluster_index") ? Text(Member(json["cluster_index"]), "file") : null;
             return manifest;
+        }
+
+        /// <summary>The tables of named lights or of a cloud; false of another domain.</summary>
+        bool ReadLights(Dictionary<string, object> json)
+        {
+            string domain = Text(json, "light_domain");
+            if (domain == "named")
+            {
+                Names = ((List<object>)json["lights"]).ConvertAll(light => Text(Member(light), "name")).ToArray();
+                if (!json.ContainsKey("light_values")) return true;
+                ValuesFile = Text(Member(json["light_values"]), "file");
+                ValuesScale = Number(Member(json["light_values"]), "scale");
+            }
+            else if (domain == "cloud")
+            {
+                var table = Member(json["position_table"]);
+                Positions = new SrbfPositionTable
+                {
+                    origin = Numbers(table["origin"]),
+                    spacing = Number(table, "spacing"),
+                    nodes = Array.ConvertAll(Numbers(table["nodes"]), n => (int)n),
+                    fine = (int)Number(table, "fine"),
+                    rank = (int)Number(table, "rank"),
+                };
+                NodesFile = Text(Member(json["position_nodes"]), "file");
+                BasisFile = Text(Member(json["position_basis"]), "file");
+                VisibilityFile = Text(Member(json["position_visibility"]), "file");
+            }
+            return IsWeighted;
+        }
+
+        /// <summary>The table of named lights, from `folder`; null of another asset.</summary>
+        public SrbfLightTable LightTable(string folder)
+        {
+            if (Names == null) return null;
+            float[] values = ValuesFile == null ? new float[0] : SrbfImage.Read(System.IO.Path.Combine(folder, ValuesFile)).Values;
+            return new SrbfLightTable { names = Names, values = Array.ConvertAll(values, value => (float)(value * ValuesScale)) };
+        }
+
+        /// <summary>The table of a light cloud, from `folder`; null of another asset.</summary>
+        public SrbfPositionTable PositionTable(string folder)
+        {
+            if (Positions == null) return null;
+            Positions.nodeValues = SrbfImage.Read(System.IO.Path.Combine(folder, NodesFile)).Values;
+            Positions.basis = SrbfImage.Read(System.IO.Path.Combine(folder, BasisFile)).Values;
+            Positions.seen = Array.ConvertAll(SrbfImage.Read(System.IO.Path.Combine(folder, VisibilityFile)).Values, value => (byte)value);
+            return Positions;
         }
 
         /// <summary>All numbers of a list, nested lists flattened.</summary>

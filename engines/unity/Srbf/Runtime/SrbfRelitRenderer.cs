@@ -1,12 +1,24 @@
 // SPDX-License-Identifier: MIT
+using System;
 using System.Collections.Generic;
 using UnityEngine;
 
 namespace Srbf
 {
+    /// <summary>One of the scene's own lights: intensity 1 is as the scene has it set, 0 off; the color is on top of the scene's.</summary>
+    [Serializable]
+    public sealed class SrbfNamedLight
+    {
+        public string name;
+        public float intensity = 1;
+        public Color color = Color.white;
+    }
+
     /// <summary>
     /// Follows Unity's lights and sets the frame's weights in a renderer's material. All directional lights together cost one weight per map;
     /// each of the first eight point and spot lights costs one weight per map and pixel. Area lights, cookies, ranges and skies are ignored.
+    /// An asset of named lights has its own, see SetLight. A light cloud follows point and spot lights, any number at the cost of one, as
+    /// inverse-square light; a spot's bounces are approximate, see SrbfMath.FluxShare; directional lights add none.
     /// </summary>
     [ExecuteAlways]
     [RequireComponent(typeof(Renderer))]
@@ -26,6 +38,9 @@ namespace Srbf
         [Tooltip("Meters: least distance of a receiver from a point light.")]
         public float pointLightRadius = 0.05f;
 
+        [Tooltip("Named lights: those that are not as the scene has them set.")]
+        public List<SrbfNamedLight> mix = new List<SrbfNamedLight>();
+
         readonly List<DistantLight> far = new List<DistantLight>();
         readonly List<DistantLight> known = new List<DistantLight>();
         readonly Vector4[] pointLights = new Vector4[4 * MostPointLights];
@@ -34,6 +49,16 @@ namespace Srbf
         Texture2D rows;
         SrbfAsset weighed;
 
+        /// <summary>Dim, recolor or switch one of the scene's own lights; ArgumentException where the asset has none of that name.</summary>
+        public void SetLight(string lightName, float intensity, Color color)
+        {
+            asset.lightTable.Index(lightName);
+            SrbfNamedLight found = mix.Find(light => light.name == lightName);
+            if (found == null) mix.Add(found = new SrbfNamedLight { name = lightName });
+            found.intensity = intensity;
+            found.color = color;
+        }
+
         void LateUpdate()
         {
             if (asset == null) return;
@@ -41,19 +66,23 @@ namespace Srbf
             Matrix4x4 assetFromUnity = AssetFromUnity();
             far.Clear();
             int count = 0;
-            foreach (Light pointLight in lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
+            if (asset.IsNamed) AddNamed();
+            foreach (Light pointLight in asset.IsNamed ? new Light[0] : lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
             {
                 if (pointLight == null || !pointLight.isActiveAndEnabled) continue;
                 Color color = pointLight.color.linear * pointLight.intensity;
                 if (pointLight.useColorTemperature) color *= Mathf.CorrelatedColorTemperatureToRGB(pointLight.colorTemperature);
-                if (pointLight.type == LightType.Directional) far.Add(Far(assetFromUnity, pointLight, color));
-                else if ((pointLight.type == LightType.Point || pointLight.type == LightType.Spot) && count < MostPointLights) SetPointLight(assetFromUnity, pointLight, color, count++);
+                bool local = pointLight.type == LightType.Point || pointLight.type == LightType.Spot;
+                if (asset.IsCloud && local) far.Add(Inside(assetFromUnity, pointLight, color));
+                else if (asset.IsCloud) continue;
+                else if (pointLight.type == LightType.Directional) far.Add(Far(assetFromUnity, pointLight, color));
+                else if (local && count < MostPointLights) SetPointLight(assetFromUnity, pointLight, color, count++);
             }
             if (weighed != asset) GetComponent<Renderer>().SetPropertyBlock(null);  // arrays of a block never grow
             if (weighed != asset || Changed()) Weigh();
             GetComponent<Renderer>().GetPropertyBlock(block);
             block.SetTexture("_SrbfLayers", asset.layers);
-            block.SetTexture("_SrbfTable", asset.table);
+            if (asset.table != null) block.SetTexture("_SrbfTable", asset.table);
             block.SetTexture("_SrbfAmbient", asset.ambient);
             if (asset.clusters != null) block.SetTexture("_SrbfClusters", asset.clusters);
             if (asset.IsMaps) block.SetVectorArray("_SrbfWeights", weights);
@@ -89,6 +118,26 @@ namespace Srbf
             return new DistantLight { ToLight = new Vector(toLight.x, toLight.y, toLight.z).Normalized(), Color = new Vector(color.r, color.g, color.b) };
         }
 
+        /// <summary>A light inside the scene: its place instead of a direction, and its irradiance at 1 m.</summary>
+        DistantLight Inside(Matrix4x4 assetFromUnity, Light pointLight, Color color)
+        {
+            Vector3 place = assetFromUnity.MultiplyPoint3x4(pointLight.transform.position);
+            double share = pointLight.type == LightType.Spot ? SrbfMath.FluxShare(pointLight.innerSpotAngle, pointLight.spotAngle) : 1;
+            double strength = share * falloffDistance * falloffDistance;
+            return new DistantLight { ToLight = new Vector(place.x, place.y, place.z), Color = new Vector(color.r * strength, color.g * strength, color.b * strength) };
+        }
+
+        /// <summary>The colors of all named lights, in order. Like ambient light they are in Blender's units, an irradiance over pi.</summary>
+        void AddNamed()
+        {
+            foreach (string lightName in asset.lightTable.names)
+            {
+                SrbfNamedLight found = mix.Find(light => light.name == lightName);
+                Color color = found == null ? Color.white : found.color.linear * found.intensity;
+                far.Add(new DistantLight { Color = new Vector(color.r / Math.PI, color.g / Math.PI, color.b / Math.PI) });
+            }
+        }
+
         void SetPointLight(Matrix4x4 assetFromUnity, Light pointLight, Color color, int i)
         {
             Vector3 place = assetFromUnity.MultiplyPoint3x4(pointLight.transform.position), axis = assetFromUnity.MultiplyVector(pointLight.transform.forward).normalized;
@@ -112,16 +161,14 @@ namespace Srbf
             known.Clear();
             known.AddRange(far);
             weighed = asset;
-            float[] values = asset.IsMaps
-                ? SrbfMath.MapWeights(asset.centers, asset.rTable, far)
-                : SrbfMath.PlaneWeights(asset.centers, asset.spreads, asset.lightCoefficients, far);
+            float[] values = Values();
             if (asset.IsMaps)
             {
                 weights = new Vector4[values.Length / 4];
                 for (int i = 0; i < weights.Length; i++) weights[i] = new Vector4(values[4 * i], values[4 * i + 1], values[4 * i + 2], 1);
                 return;
             }
-            int width = asset.scalars + 1;
+            int width = asset.WeightColumns;
             if (rows == null || rows.width != width || rows.height != asset.clusterCount)
             {
                 if (rows != null) DestroyImmediate(rows);
@@ -129,6 +176,16 @@ namespace Srbf
             }
             rows.SetPixelData(values, 0);
             rows.Apply(false);
+        }
+
+        float[] Values()
+        {
+            int outside;
+            if (asset.IsNamed) return asset.lightTable.Weights(far.ConvertAll(light => light.Color));
+            if (asset.IsCloud) return asset.positionTable.Weights(far.ConvertAll(light => light.ToLight), far.ConvertAll(light => light.Color), out outside);
+            return asset.IsMaps
+                ? SrbfMath.MapWeights(asset.centers, asset.rTable, far)
+                : SrbfMath.PlaneWeights(asset.centers, asset.spreads, asset.lightCoefficients, far);
         }
     }
 }

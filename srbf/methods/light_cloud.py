@@ -1,0 +1,261 @@
+"""The light cloud: lights that move inside the scene, with bounces that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal, get_args
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
+from srbf.capture import Capture
+from srbf.encode.light_kernel_table import KernelTable, kernel_table
+from srbf.encode.position_table import FILES, PositionTable, position_table
+from srbf.errors import InputError
+from srbf.io.image import Encoding
+from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
+from srbf.lights import Light, NamedLight, PointLight
+from srbf.methods.light_table_maps import LightTableMaps, check_table_settings, encode_table, stored_values
+from srbf.methods.protocol import QUIET, FitRun, setting
+from srbf.solve.light_merging import Mean
+from srbf.visibility.cloud_lights import CloudLights, UnseenLights, unseen_lights
+from srbf.visibility.embree import has_embree
+
+Interpolation = Literal["auto", "fingerprint", "kernel"]
+VIRTUAL_LIGHTS = 600  # places whose responses the components are made for
+TRIED_CLUSTERS = (32, 64)
+MOST_TRIED = 64  # components of a candidate
+LEAST_TEXELS = 64  # per cluster of a candidate
+
+
+@dataclass(frozen=True)
+class LightCloud(LightTableMaps):
+    """Indirect light of lights inside the scene, at the cost of one distant light per texel [Kristensen2005].
+
+    T(p, x) ~ sum_k f_k(x) G_k(p),  G_k(p) ~ w_{m,0}(k) + sum_j a_j(p) w_{m,j}(k), m the cluster of p
+
+    Of a capture of patches, f_k is the irradiance that a light lays on patch k, so that any light is one: points, spots, areas, suns. Of a
+    cloud of captured point lights, either f_k is the same and G_k comes from ridge regression on the irradiance (`fingerprint`), or k are
+    the captured lights and f_k the kernel (1 - d/r)^4 over those that the light sees (`kernel`, the article's).
+
+    Parameters
+    ----------
+    clusters
+        1 to 256: a texel's index is a byte.
+    components
+        How many numbers per texel.
+    interpolation
+        Between captured point lights; `auto`: the one that predicts left-out lights better. Patches need none.
+    nearest
+        kernel: how many captured lights carry a light.
+    zones
+        kernel: parts of the scene, with merged lights and clusters of their own.
+    merge
+        kernel: lights that are alike in a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
+    merged
+        kernel: how many lights are left in each zone; `auto`: all pairs of a merged light are nearer than 1 in the article's metric.
+    encoding
+        Of the layers on disk: `half`, `float` or `uint8`.
+    seed
+        Of the clustering's random numbers.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> LightCloud(clusters=32).components
+    12
+    """
+
+    name: ClassVar[str] = "light-cloud"
+    order: ClassVar[int] = 5
+    domains: ClassVar[tuple[str, ...]] = ("cloud",)
+    tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", "cloud": "cloud.exr", **FILES}
+
+    clusters: int = setting(64, "How many clusters, at most 256.")
+    components: int = setting(12, "How many numbers per texel.")
+    interpolation: Interpolation = setting("auto", "Between captured point lights; auto: what predicts left-out lights better.")
+    nearest: int = setting(NEAREST, "kernel: captured lights that carry a light.")
+    zones: int = setting(1, "kernel: parts of the scene with merged lights of their own.")
+    merge: Literal["none"] | Mean = setting("none", "kernel: how lights that are alike in a zone become one.")
+    merged: Literal["auto"] | int = setting("auto", "kernel: lights left in each zone.", words=("auto",))
+    encoding: Encoding = setting("uint8", "Of the layers on disk.")
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_table_settings(self.components, self.clusters, self.encoding)
+        if self.interpolation not in get_args(Interpolation):
+            raise InputError(f"expected an interpolation of auto, fingerprint, kernel, found {self.interpolation!r}")
+        if self.merge not in ("none", *get_args(Mean)):
+            raise InputError(f"expected `merge` none, harmonic or arithmetic, found {self.merge!r}")
+        if self.nearest < 1 or self.zones < 1:
+            raise InputError(f"expected 1 or more `nearest` lights and `zones`, found {self.nearest} and {self.zones}")
+        if self.merged != "auto" and not self.merged >= 1:
+            raise InputError(f"expected `merged` auto or 1 or more lights, found {self.merged}")
+        if self.interpolation != "kernel" and (self.zones > 1 or self.merge != "none"):
+            raise InputError("expected `zones` and `merge` with `interpolation=kernel`, found another; add it")
+
+    def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
+        """Clusters from a texel sample, made for lights all over the free space; passes to assign, project and solve; a table of places.
+
+        Parameters
+        ----------
+        capture
+            Of patches, or of a cloud of point lights.
+        run
+            `stitch` closes the seams of the images.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where there are no train lights, or the capture lacks its scene.
+
+        Examples
+        --------
+        >>> LightCloud().encode(inside).manifest["interpolation"]["kind"]  # doctest: +SKIP
+        'patches'
+        """
+        inside = CloudLights.of(capture)
+        train = capture.indices("train")
+        kind: str = "patches"
+        report: dict[str, Any] = {}
+        if capture.kind == "patch":
+            mixtures = inside.received(inside.free[:VIRTUAL_LIGHTS])
+            asset = encode_table(self, capture, run, mixtures, self.clusters, self.seed)
+        else:
+            kernel = CloudKernel(capture.positions(train), inside.visible, self.nearest)
+            unseen = unseen_lights(capture, inside, self.seed) if self.interpolation != "kernel" else None
+            kind, report = self._chosen(unseen, kernel)
+            asset = encode_table(self, capture, run, np.eye(len(train)), self.clusters, self.seed, self.zones)
+            if kind == "fingerprint":
+                assert unseen is not None
+                found = asset.tables["light_values"].astype(np.float32) * np.float32(asset.manifest["light_values"]["scale"])
+                asset.tables["light_values"], entry = stored_values(unseen.prints.on_patches(found))
+                asset.manifest |= entry
+            else:
+                table = kernel_table(capture, asset, kernel, self.merge, self.merged, inside.visible)
+                asset.tables["light_values"], entry = stored_values(table.values)
+                asset.tables["cloud"] = table.image()
+                asset.manifest |= {**entry, "cloud": {"file": self.tables["cloud"]}}
+                report |= table.report()
+        asset.manifest["interpolation"] = {"kind": kind, **({"nearest": self.nearest} if kind == "kernel" else {})}
+        asset.manifest["source"]["fit"] |= report
+        asset.tables["cells"] = inside.cells.image()
+        asset.manifest["cells"] = {"file": self.tables["cells"]}
+        places = position_table(lambda at: _at_places(asset, at), inside.visible, inside.free)
+        asset.manifest |= places.manifest()
+        asset.tables |= places.tables()
+        return asset
+
+    def _chosen(self, unseen: UnseenLights | None, kernel: CloudKernel) -> tuple[str, dict[str, Any]]:
+        """(interpolation, relative errors at unseen lights that chose it)."""
+        if unseen is None:
+            return "kernel", {}
+        errors = {"fingerprint": unseen.fingerprint_error()}
+        if self.interpolation == "auto":
+            errors["kernel"] = unseen.kernel_error(kernel)
+        rule = "validation" if unseen.by_validation else "leave-one-light-out"
+        return min(errors, key=lambda name: errors[name]), {"interpolation_errors": errors, "chosen_by": rule}
+
+    def __str__(self) -> str:
+        return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
+
+    def on_sample(self, ratio: float) -> LightCloud:
+        """As many texels per cluster as there will be."""
+        return replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))
+
+    @classmethod
+    def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[LightCloud]:
+        """Bytes, four to a layer, and one for the cluster."""
+        components = min((size - 1) // 4 * 4, MOST_TRIED, numbers)
+        for clusters in TRIED_CLUSTERS:
+            if components >= 1 and (clusters * LEAST_TEXELS <= texels or clusters == TRIED_CLUSTERS[0]):
+                yield cls(clusters=clusters, components=components)
+
+    @classmethod
+    def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
+        manifest = reader.manifest
+        tables = {**super().read_tables(reader), "cells": reader.rows("cells", 2, 4)}
+        if "cloud" in manifest:
+            tables["cloud"] = reader.rows("cloud", max(manifest["cluster_zone"]) + 1, 4)
+        told = manifest["position_table"]
+        nx, ny, nz = told["nodes"]
+        functions = len(tables["light_values"])
+        fine = told["fine"]
+        tables["position_nodes"] = reader.table("position_nodes", (nx * ny * nz, told["rank"]), 1)[:, :, 0]
+        tables["position_basis"] = reader.table("position_basis", (told["rank"], functions), 3).astype(np.float16)
+        shape = (fine * (nz - 1) * fine * (ny - 1), 8 * fine * (nx - 1))
+        seen = np.round(reader.table("position_visibility", shape, 1)[:, :, 0] * 255)
+        return {**tables, "position_visibility": seen.astype(np.uint8)}
+
+    @classmethod
+    def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
+        """Of patches: the irradiance that all lights lay on them."""
+        return np.sum([CloudLights.of_asset(asset).on_patches(light) for light in lights], axis=0)
+
+    @classmethod
+    def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
+        """By rays where Embree is installed, else by the table of places, which point lights alone are in."""
+        if not lights:
+            return np.zeros((len(asset.tables["light_values"]), 3))
+        if any(isinstance(light, NamedLight) for light in lights):
+            raise InputError("expected lights inside the scene for a light cloud, found a named one; bake `light_set=named` to mix lights")
+        if not has_embree():
+            return np.sum([_from_table(asset, light) for light in lights], axis=0)
+        if asset.manifest["interpolation"]["kind"] != "kernel":
+            return super().projected_weights(asset, lights)
+        table = KernelTable.of(asset)
+        visible = CloudLights.of_asset(asset).visible
+        return np.sum([table.weights(_point(light), visible) for light in lights], axis=0)
+
+    @classmethod
+    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+        """Patches are columns of the table; point lights are relit as such."""
+        if any(capture.lights[i].kind != "patch" for i in lights):
+            return super().captured_responses(asset, capture, lights)
+        return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
+
+    @classmethod
+    def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        return cls.weighted(asset, _at_places(asset, coordinates))
+
+    @classmethod
+    def summary(cls, asset: Asset) -> str:
+        lights, kind = asset.tables["light_values"].shape[1], asset.manifest["interpolation"]["kind"]
+        what = {"patches": "patches", "fingerprint": "patches (from captured point lights)", "kernel": "point lights"}[kind]
+        return f"{lights} {what}, {asset.clusters} clusters of {asset.components} components"
+
+
+def _at_places(asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
+    lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
+    return np.stack([LightCloud.projected_weights(asset, [light]) for light in lights])
+
+
+def _from_table(asset: Asset, light: Light) -> Float64[ndarray, "F 3"]:
+    point = _point(light)
+    return PositionTable.of(asset.manifest, asset.tables).evaluate(np.array(point.position)) * (np.array(point.color) * point.a0**2)
+
+
+def _point(light: Light) -> PointLight:
+    """InputError for lights that are no isotropic point lights."""
+    if type(light).__name__ not in ("PointLight", "SphereLight") or light.falloff != "inverse-square":  # type: ignore[union-attr]
+        raise InputError(
+            "expected point lights of inverse-square falloff for a cloud of captured point lights or without embreex, found another; "
+            "capture patches for any light, and install embreex"
+        )
+    return light  # type: ignore[return-value]
+
+
+METHOD = LightCloud

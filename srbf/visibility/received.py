@@ -1,0 +1,125 @@
+"""What a light lays on the cells of the surfaces, by one shadow ray a cell and point of the light: its fingerprint."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float64
+from srbf.io.scene_glb import read_triangles
+from srbf.light_geometry import environment_samples, spot_cone
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.surface_cells import OFFSET, Cells
+
+SIDE = 4  # points per side of an area light
+DIRECTIONS = 512  # of an environment map
+
+
+@functools.lru_cache(maxsize=4)
+def occluders_of(scene: bytes) -> EmbreeTriangles:
+    """What casts shadows in a scene.glb, ready for rays; MissingLibraryError without embreex."""
+    triangles = read_triangles(scene)
+    return EmbreeTriangles(triangles.corners[triangles.occluders])
+
+
+class ReceivedLight:
+    """Irradiance of lights on N cells, shadowed by `occluders`."""
+
+    def __init__(self, cells: Cells, occluders: EmbreeTriangles) -> None:
+        self._cells, self._occluders = cells, occluders
+        self._normals = cells.normals.astype(np.float64)
+        places = cells.places.astype(np.float64)
+        lift = OFFSET * float(np.ptp(places, axis=0).max()) if len(places) else 0.0
+        self._places, self._starts = places, (places + lift * self._normals).astype(np.float32)
+        self._spread = cells.areas.astype(np.float64) / np.pi  # a cell is not a point: close by, r^2 is at least this
+
+    def irradiance(self, light: Light) -> Float64[ndarray, "N 3"]:
+        """On every cell, in the light's units; 0 for lights without a place or a direction."""
+        if isinstance(light, AreaLight):
+            return self._of_area(light)[:, None] * np.array(light.color)
+        if isinstance(light, PointLight):
+            return self._of_point(light)[:, None] * np.array(light.color)
+        if isinstance(light, DirectionalLight):
+            return self._from(np.array(light.direction))[:, None] * np.array(light.color)
+        if isinstance(light, EnvironmentLight):
+            return self._of_environment(light)
+        return np.zeros((len(self._places), 3))
+
+    def on_patches(self, light: Light) -> Float64[ndarray, "K 3"]:
+        """The mean irradiance of every patch."""
+        return patch_means(self._cells, self.irradiance(light))
+
+    def _of_point(self, light: PointLight) -> Float64[ndarray, " N"]:
+        """cos a0^2 / (r^2 + A / pi) of what sees the light, or a0 over the root for a linear falloff; times a spot's cone."""
+        place = np.array(light.position)
+        vector = place - self._places
+        squared = np.einsum("nk,nk->n", vector, vector)
+        distance = np.sqrt(np.maximum(squared, 1e-30))
+        cosine = np.einsum("nk,nk->n", vector, self._normals) / distance
+        near = np.maximum(squared, light.radius**2) + self._spread
+        strength = light.a0**2 / near if light.falloff == "inverse-square" else light.a0 / np.sqrt(near)
+        if isinstance(light, SpotLight):
+            along = -(vector @ np.array(light.direction)) / distance
+            strength = strength * spot_cone(along, np.cos(light.inner), np.cos(light.outer))
+        return self._shadowed(cosine * strength, place)
+
+    def _of_area(self, light: AreaLight) -> Float64[ndarray, " N"]:
+        """The mean of a grid of points, each a Lambertian emitter: cos_l cos a0^2 / (r^2 + A / pi)."""
+        u, v, center = np.array(light.u), np.array(light.v), np.array(light.position)
+        facing = np.cross(u, v)
+        facing /= np.linalg.norm(facing)
+        steps = (np.arange(SIDE) + 0.5) / SIDE - 0.5
+        total = np.zeros(len(self._places))
+        for s in steps:
+            for t in steps:
+                place = center + s * u + t * v
+                vector = place - self._places
+                squared = np.einsum("nk,nk->n", vector, vector)
+                unit = vector / np.sqrt(np.maximum(squared, 1e-30))[:, None]
+                strength = np.maximum(-(unit @ facing), 0) * light.a0**2 / (squared + self._spread)
+                total += self._shadowed(np.einsum("nk,nk->n", unit, self._normals) * strength, place)
+        return total / SIDE**2
+
+    def _of_environment(self, light: EnvironmentLight) -> Float64[ndarray, "N 3"]:
+        """A sum over about DIRECTIONS blocks of the map, each as a distant light from its middle."""
+        height, width = light.image.shape[:2]
+        rows = max(1, int(np.ceil(height / np.sqrt(DIRECTIONS / 2))))
+        columns = max(1, int(np.ceil(width / np.sqrt(DIRECTIONS * 2))))
+        directions, solid_angle = environment_samples(light.image, "sphere", light.rotation)
+        total = np.zeros((len(self._places), 3))
+        for top in range(0, height, rows):
+            for left in range(0, width, columns):
+                block = (slice(top, top + rows), slice(left, left + columns))
+                radiance = np.einsum("hwc,hw->c", light.image[block], solid_angle[block]) * np.array(light.color)
+                middle = np.einsum("hwk,hw->k", directions[block], solid_angle[block])
+                if radiance.any() and np.linalg.norm(middle) > 0:
+                    total += self._from(middle / np.linalg.norm(middle))[:, None] * radiance
+        return total
+
+    def _from(self, direction: Float64[ndarray, " 3"]) -> Float64[ndarray, " N"]:
+        cosine = self._normals @ direction
+        front = np.flatnonzero(cosine > 0)
+        toward = np.broadcast_to(direction, (len(front), 3))
+        result = np.zeros(len(cosine))
+        result[front] = cosine[front] * ~self._occluders.occluded(self._starts[front], toward, None)
+        return result
+
+    def _shadowed(self, amount: Float64[ndarray, " N"], place: Float64[ndarray, " 3"]) -> Float64[ndarray, " N"]:
+        """`amount` where it is above 0 and nothing stands between a cell and `place`."""
+        front = np.flatnonzero(amount > 0)
+        vector = place - self._starts[front]
+        distance = np.linalg.norm(vector, axis=1)
+        blocked = self._occluders.occluded(self._starts[front], vector / np.maximum(distance, 1e-30)[:, None], distance)
+        result = np.zeros(len(amount))
+        result[front[~blocked]] = amount[front[~blocked]]
+        return result
+
+
+def patch_means(cells: Cells, values: Float64[ndarray, "N 3"]) -> Float64[ndarray, "K 3"]:
+    """The mean over the cells of every patch, by area."""
+    count = cells.patch_count
+    area = np.maximum(np.bincount(cells.patches, cells.areas, count), 1e-30)
+    return np.stack([np.bincount(cells.patches, cells.areas * values[:, c], count) for c in range(3)], axis=1) / area[:, None]

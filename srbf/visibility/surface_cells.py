@@ -1,0 +1,161 @@
+"""Surfaces as cells: small parts of all that a light in free space can reach, by which it is measured what falls where.
+
+A cell has a place, a normal, an area and an albedo; it belongs to a patch, a group of cells that emits as one. Surfaces have two sides, and
+a side that no free place sees has no cell: what lies under a box or outside a closed room takes no light and gives none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.visibility.embree import EmbreeTriangles
+
+OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
+FIRST_PLACES = 192  # that most surfaces are seen from
+RAYS = 1 << 20  # traced at a time
+NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way
+DARK = 1e-3  # albedo below which nothing is reflected
+
+
+@dataclass(frozen=True, eq=False)
+class Fragments:
+    """Small triangles, T of them, wound so that the geometric normal points into the side that is meant; albedo (T, 3) linear."""
+
+    corners: Float32[ndarray, "T 3 3"]
+    albedo: Float32[ndarray, "T 3"]
+
+    @property
+    def normals(self) -> Float64[ndarray, "T 3"]:
+        """Unit normals; 0 of triangles without area."""
+        cross = self._cross
+        return cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
+
+    @property
+    def areas(self) -> Float64[ndarray, " T"]:
+        """In square meters."""
+        return np.linalg.norm(self._cross, axis=1) / 2
+
+    @property
+    def centers(self) -> Float64[ndarray, "T 3"]:
+        """Centroids, m."""
+        return self.corners.mean(axis=1, dtype=np.float64)
+
+    @property
+    def _cross(self) -> Float64[ndarray, "T 3"]:
+        corners = self.corners.astype(np.float64)
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+    def both_sides(self) -> Fragments:
+        """Every triangle twice, the second time turned over."""
+        return Fragments(np.concatenate([self.corners, self.corners[:, ::-1]]), np.concatenate([self.albedo, self.albedo]))
+
+    def at(self, chosen: ndarray) -> Fragments:
+        """Those of a mask or of indices."""
+        return Fragments(self.corners[chosen], self.albedo[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """N cells: place (m) on the surface, unit normal, exposed area (square meters), albedo, and the patch that each belongs to."""
+
+    places: Float32[ndarray, "N 3"]
+    normals: Float32[ndarray, "N 3"]
+    areas: Float32[ndarray, " N"]
+    albedo: Float32[ndarray, "N 3"]
+    patches: Int[ndarray, " N"]
+
+    @property
+    def patch_count(self) -> int:
+        return int(self.patches.max()) + 1 if len(self.patches) else 0
+
+    def with_patches(self, patches: Int[ndarray, " N"]) -> Cells:
+        """The same cells in other patches."""
+        return replace(self, patches=patches)
+
+    def image(self) -> Float32[ndarray, "2 N 4"]:
+        """As patches.exr holds them: (x, y, z, area) and (normal, patch)."""
+        first = np.concatenate([self.places, self.areas[:, None]], axis=1)
+        second = np.concatenate([self.normals, self.patches[:, None]], axis=1)
+        return np.stack([first, second]).astype(np.float32)
+
+    @staticmethod
+    def of_image(image: Float32[ndarray, "2 N 4"]) -> Cells:
+        """From `image`; the albedo, which a light's irradiance does not need, is 0."""
+        return Cells(
+            np.ascontiguousarray(image[0, :, :3]),
+            np.ascontiguousarray(image[1, :, :3]),
+            np.ascontiguousarray(image[0, :, 3]),
+            np.zeros((image.shape[1], 3), np.float32),
+            np.round(image[1, :, 3]).astype(np.int64),
+        )
+
+
+def exposed(fragments: Fragments, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"]) -> Bool[ndarray, " T"]:
+    """Which fragments are seen from any of the free places, on the side of their normal."""
+    found = np.zeros(len(fragments.corners), bool)
+    for places in (free[:FIRST_PLACES], free[FIRST_PLACES:]):
+        left = np.flatnonzero(~found)
+        if len(left) and len(places):
+            found[left] = lit(fragments.centers[left], fragments.normals[left], occluders, places).any(axis=1)
+    return found
+
+
+def lit(
+    points: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"]
+) -> Bool[ndarray, "n F"]:
+    """Which places light which points: in front of them, and nothing between."""
+    result = np.zeros((len(points), len(free)), bool)
+    scale = OFFSET * float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    starts = (points + scale * normals).astype(np.float32)
+    for begin in range(0, len(points), max(1, RAYS // max(1, len(free)))):
+        part = slice(begin, begin + max(1, RAYS // max(1, len(free))))
+        toward = free[None] - points[part, None]  # (b, F, 3)
+        front = np.einsum("bfk,bk->bf", toward, normals[part]) > 0
+        row, column = np.nonzero(front)
+        vector = free[column] - starts[part][row]
+        distance = np.linalg.norm(vector, axis=1)
+        blocked = occluders.occluded(starts[part][row], vector / np.maximum(distance, 1e-30)[:, None], distance)
+        result[part][row[~blocked], column[~blocked]] = True
+    return result
+
+
+def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T"]]:
+    """(cells of about `size` meters, the cell of every fragment): fragments of one voxel that face about the same way are one cell.
+
+    A cell's place is that of the fragment nearest to the mean, so that it lies on the surface. All are in patch 0.
+    """
+    centers, normals, areas = fragments.centers, fragments.normals, fragments.areas
+    major = np.abs(normals).argmax(axis=1)
+    facing = 2 * major + (np.take_along_axis(normals, major[:, None], 1)[:, 0] < 0)
+    across = np.floor((np.delete(normals, 0, 1) + 1) / 2 * NORMAL_BINS).astype(np.int64).clip(0, NORMAL_BINS - 1)
+    color = np.floor(fragments.albedo.mean(axis=1) * 4).astype(np.int64)
+    low = centers.min(axis=0) - size / 3  # no voxel's side in the plane of a wall at a round number
+    voxel = np.floor((centers - low) / size).astype(np.int64)
+    rough = np.abs(normals).max(axis=1) < 0.99  # curved or slanted: by its direction as well
+    keys = np.column_stack([voxel, facing, np.where(rough[:, None], across, 0), color])
+    _, owner = np.unique(keys, axis=0, return_inverse=True)
+    owner = owner.ravel()
+    count = int(owner.max()) + 1 if len(owner) else 0
+    area = np.bincount(owner, areas, count)
+    safe = np.maximum(area, 1e-30)[:, None]
+
+    def mean(values: ndarray) -> ndarray:
+        return np.stack([np.bincount(owner, areas * values[:, k], count) for k in range(3)], axis=1) / safe
+
+    middle, normal, albedo = mean(centers), mean(normals), mean(fragments.albedo)
+    off = np.linalg.norm(centers - middle[owner], axis=1)
+    order = np.lexsort((off, owner))
+    nearest = order[np.searchsorted(owner[order], np.arange(count))]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    cells = Cells(
+        centers[nearest].astype(np.float32),
+        normal.astype(np.float32),
+        area.astype(np.float32),
+        albedo.astype(np.float32),
+        np.zeros(count, np.int64),
+    )
+    return cells, owner

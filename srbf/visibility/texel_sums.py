@@ -1,0 +1,116 @@
+"""Sums of samples per texel, and which texels need more of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool, Float, Float32, Float64, Int
+
+REFINE_STEP = 0.02  # irradiance between samples of a texel, or between neighbors, from which a texel is refined
+NEIGHBOR_STEP = 0.2  # between neighbors: a shadow edge may cross a corner without samples
+EDGE_STEP = 0.03  # between samples of a texel, from which it is refined once more
+CLOSE, VERY_CLOSE = 0.3, 0.6  # of the brightest unshadowed sample of a texel, the difference to the darkest: beside a light
+MIN_DIFFUSE = 1e-12  # share
+COUNTS = 1e-5  # least importance of a sample whose difference to others counts
+
+
+@dataclass(frozen=True, eq=False)
+class TexelSums:
+    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance for any mixture; minimum and maximum.
+
+    `scale` (P,): the irradiance that texels have unshadowed, relative to the light's usual one. Then differences are those of what is
+    visible of the light, times `scale`; with None, of a sun, those of its irradiance. `sized`, of a light with a size: samples have
+    weights of their own; a texel's light is the weighted mean of what is visible, times the mean unshadowed irradiance.
+    """
+
+    height: int
+    width: int
+    scale: Float64[ndarray, " P"] | None
+    sized: bool
+    total: Float64[ndarray, "P 3"]
+    share: Float64[ndarray, "P 3"]
+    seen: Float64[ndarray, "P 3"]
+    weight: Float64[ndarray, "P 3"]
+    low: Float32[ndarray, "P 3"]
+    high: Float32[ndarray, "P 3"]
+    darkest: Float64[ndarray, " P"]
+    brightest: Float64[ndarray, " P"]
+
+    @staticmethod
+    def empty(height: int, width: int, scale: Float64[ndarray, " P"] | None, sized: bool = False) -> TexelSums:
+        """Of no sample."""
+        shape = (height * width, 3)
+        total, share = np.zeros(shape), np.zeros(shape)
+        seen = total if scale is None else np.zeros(shape)
+        weight = np.zeros(shape) if sized else share
+        low, high = np.full(shape, np.inf, np.float32), np.zeros(shape, np.float32)
+        return TexelSums(height, width, scale, sized, total, share, seen, weight, low, high, np.full(shape[0], np.inf), np.zeros(shape[0]))
+
+    def add(
+        self,
+        texel: Int[ndarray, " n"],
+        share: Float[ndarray, "n _"],
+        importance: Float64[ndarray, " n"],
+        visible: Float32[ndarray, "n 3"],
+        irradiance: Float64[ndarray, " n"],
+    ) -> None:
+        """Add samples: what each sees of the light, and its unshadowed irradiance."""
+        light = visible * irradiance[:, None].astype(np.float32)
+        every = np.broadcast_to(share, light.shape)
+        weight = every * importance[:, None] if self.sized else every
+        for channel in range(3):
+            plain, own = every[:, channel], weight[:, channel]
+            self._count(self.total, channel, texel, plain * (irradiance if self.sized else light[:, channel]))
+            self._count(self.share, channel, texel, plain)
+            if self.seen is not self.total:
+                self._count(self.seen, channel, texel, own * visible[:, channel])
+            if self.sized:
+                self._count(self.weight, channel, texel, own)
+        real = weight.max(axis=1) > COUNTS
+        measured = light if self.scale is None else visible
+        np.minimum.at(self.low, texel[real], measured[real])
+        np.maximum.at(self.high, texel[real], measured[real])
+        if self.scale is not None:
+            np.minimum.at(self.darkest, texel[real], irradiance[real])
+            np.maximum.at(self.brightest, texel[real], irradiance[real])
+
+    def mean(self) -> Float64[ndarray, "P 3"]:
+        """Mean light of every texel."""
+        mean = self.total / np.maximum(self.share, MIN_DIFFUSE)
+        return mean * self._visible() if self.sized else mean
+
+    def _visible(self) -> Float64[ndarray, "P 3"]:
+        return self.seen / np.maximum(self.weight, MIN_DIFFUSE)
+
+    @staticmethod
+    def _count(sums: Float64[ndarray, "P 3"], channel: int, texel: Int[ndarray, " n"], values: Float[ndarray, " n"]) -> None:
+        sums[:, channel] += np.bincount(texel, values, len(sums))
+
+    def ragged(self) -> Bool[ndarray, " P"]:
+        """Texels whose samples differ, or that differ from a neighbor."""
+        return (self._steps() > REFINE_STEP) | (self._spread() > REFINE_STEP) | self._beside_light(CLOSE)
+
+    def edges(self) -> Bool[ndarray, " P"]:
+        """Texels whose samples differ so much that a shadow's edge may cross them, or that lie right at a light."""
+        return (self._spread() > EDGE_STEP) | (self._steps() > NEIGHBOR_STEP) | self._beside_light(VERY_CLOSE)
+
+    def _beside_light(self, share: float) -> Bool[ndarray, " P"]:
+        """Bright texels that are large against their distance from the light."""
+        if self.scale is None:
+            return np.zeros(len(self.total), bool)
+        return (self.scale > 1) & (self.brightest - self.darkest > share * self.brightest)
+
+    def _spread(self) -> Float[ndarray, " P"]:
+        spread = np.maximum((self.high - self.low).max(axis=1), 0)  # 0 without samples
+        return spread if self.scale is None else spread * self.scale
+
+    def _steps(self) -> Float64[ndarray, " P"]:
+        """Largest difference of each texel to a neighbor."""
+        from scipy import ndimage
+
+        image = self._visible().max(axis=1).reshape(self.height, self.width)
+        steps = (ndimage.maximum_filter(image, 3) - ndimage.minimum_filter(image, 3)).ravel()
+        return steps if self.scale is None else steps * self.scale

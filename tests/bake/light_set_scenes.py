@@ -1,0 +1,163 @@
+"""Small scenes with lights inside them: `python light_set_scenes.py NAME OUT.blend`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+
+ODD_NAMES = ("Bulb, left=1", "Fenêtre/№ 2", "Tall  Screen")  # of lights: what flags, files and lists might trip over
+FACES = {
+    "Floor": (0, 1, 2, 3),
+    "Ceiling": (4, 7, 6, 5),
+    "West": (0, 3, 7, 4),
+    "East": (1, 5, 6, 2),
+    "South": (0, 4, 5, 1),
+    "North": (3, 2, 6, 7),
+}
+
+
+def material(name: str, shader: str, color: tuple[float, float, float], strength: float | None = None) -> Any:
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    nodes = made.node_tree.nodes
+    nodes.clear()
+    node = nodes.new(shader)
+    node.inputs["Color"].default_value = (*color, 1)
+    if strength is not None:
+        node.inputs["Strength"].default_value = strength
+    made.node_tree.links.new(node.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    return made
+
+
+def gray(value: float = 0.5) -> Any:
+    return material("Gray", "ShaderNodeBsdfDiffuse", (value, value, value))
+
+
+def mesh(name: str, corners: Any, faces: Any, made_of: Any, uv: bool = True) -> Any:
+    """An object of quads; its faces share its UV layer in columns."""
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(corners, [], faces)
+    if uv:
+        layer = data.uv_layers.new(name="UV")
+        for i, loop in enumerate(layer.uv):
+            x, y = ((0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98))[i % 4]
+            loop.vector = ((i // 4 + x) / len(faces), y)
+    data.materials.append(made_of)
+    obj = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def corners_of(low: tuple[float, float, float], high: tuple[float, float, float]) -> list[tuple[float, float, float]]:
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    return [(x, y, z) for z in (z0, z1) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+
+
+def light(name: str, kind: str, place: tuple[float, float, float], energy: float, **values: Any) -> Any:
+    obj = bpy.data.objects.new(name, bpy.data.lights.new(name, kind))
+    obj.location, obj.data.energy = place, energy
+    for key, value in values.items():
+        setattr(obj.data, key, value)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def walls(made_of: Any = None) -> None:
+    """A closed room of 3 x 2 x 2 m, floor apart from the rest, and a crate; a camera looks at the floor."""
+    places = corners_of((0, 0, 0), (3, 2, 2))
+    mesh("Floor", places, [FACES["Floor"]], made_of or gray())
+    mesh("Walls", places, [face for name, face in FACES.items() if name != "Floor"], made_of or gray())
+    mesh("Crate", corners_of((2, 1.2, 0), (2.5, 1.7, 0.6)), [face[::-1] for face in FACES.values()], made_of or gray(0.7))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.3, 0.3, 1.8), (0.9, 0, -0.9)
+    camera.data.lens = 20
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    bpy.context.scene.render.engine = "CYCLES"
+    bpy.context.scene.cycles.max_bounces = bpy.context.scene.cycles.diffuse_bounces = 4
+
+
+def room() -> None:
+    """The room with four lights in it: two bulbs, the first of them in a collection with a screen that emits, and a panel."""
+    walls()
+    first = light(ODD_NAMES[0], "POINT", (0.7, 0.7, 1.5), 20, shadow_soft_size=0.1)
+    light(ODD_NAMES[1], "SPOT", (2.2, 1.0, 1.8), 40, shadow_soft_size=0.1, color=(1, 0.5, 0.2))
+    screen = mesh(ODD_NAMES[2], [(0.02, 0.4, 0.6), (0.02, 1.4, 0.6), (0.02, 1.4, 1.4), (0.02, 0.4, 1.4)], [(0, 1, 2, 3)], gray())
+    screen.data.materials[0] = material("Glow", "ShaderNodeEmission", (0.2, 0.5, 1), 6)
+    panel = mesh("Panel", [(1, 0.5, 1.95), (1, 1.5, 1.95), (1.6, 1.5, 1.95), (1.6, 0.5, 1.95)], [(0, 1, 2, 3)], gray())
+    panel.data.materials[0] = material("Panel", "ShaderNodeEmission", (1, 0.9, 0.8), 4)
+    corner = bpy.data.collections.new("Corner seat")
+    bpy.context.scene.collection.children.link(corner)
+    for obj in (first, screen):
+        corner.objects.link(obj)
+    empty = bpy.data.collections.new("Nothing lit")
+    bpy.context.scene.collection.children.link(empty)
+    empty.objects.link(bpy.data.objects["Crate"])
+
+
+def unlit() -> None:
+    walls()
+
+
+def removed() -> None:
+    """The room without one of its lights."""
+    room()
+    bpy.data.objects.remove(bpy.data.objects[ODD_NAMES[1]])
+
+
+def metal() -> None:
+    walls(material("Steel", "ShaderNodeBsdfAnisotropic", (0.9, 0.9, 0.9)))
+
+
+def black() -> None:
+    walls(material("Black", "ShaderNodeBsdfDiffuse", (0, 0, 0)))
+
+
+def block() -> None:
+    """A solid block and nothing else: all of its bounds is inside."""
+    mesh("Floor", corners_of((0, 0, 0), (2, 2, 2)), [face[::-1] for face in FACES.values()], gray())
+
+
+def open_air() -> None:
+    """A plane with a crate on it, under no roof."""
+    mesh("Floor", corners_of((0, 0, 0), (3, 3, 0)), [FACES["Floor"]], gray())
+    mesh("Crate", corners_of((1, 1, 0), (2, 2, 0.8)), [face[::-1] for face in FACES.values()], gray(0.7))
+
+
+def crowd() -> None:
+    """The room under 300 point lights of one datablock."""
+    walls()
+    first = light("Star", "POINT", (0.2, 0.2, 1.8), 1.0)
+    for i in range(299):
+        star = bpy.data.objects.new("Star", first.data)
+        star.location = (0.1 + 0.14 * (i % 20), 0.1 + 0.12 * (i // 20), 1.8)
+        bpy.context.scene.collection.objects.link(star)
+
+
+def sphere() -> None:
+    """A sphere of radius 1 m seen from inside, of albedo 0.5, with bounces without end."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, radius=1)
+    ball = bpy.context.object
+    ball.name = "Sphere"
+    ball.data.flip_normals()
+    ball.data.materials.append(gray())
+    for face in ball.data.polygons:
+        face.use_smooth = True
+    cycles = bpy.context.scene.cycles
+    cycles.max_bounces = cycles.diffuse_bounces = 32
+
+
+SCENES: dict[str, Callable[[], None]] = {
+    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, sphere)
+}
+
+if __name__ == "__main__":
+    from blender_bake.ipc import leave
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    SCENES[sys.argv[1]]()
+    bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2], compress=False)
+    leave(0)

@@ -1,0 +1,105 @@
+"""Light sets: what flags mean, which settings exclude each other, what a resumed bake finds again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from srbf.bake.light_sets import CloudSet, FoundPlaces, NamedSet, parse_light_set
+from srbf.bake.settings import BakeSettings, Receiver, plan_lights
+from srbf.errors import InputError
+from srbf.visibility.patches import Patches
+from srbf.visibility.surface_cells import Cells, Fragments
+
+BOX = (0.0, 0.0, 0.0, 2.0, 2.0, 2.0)
+LIGHTMAP = Receiver("lightmap", "Floor")
+
+
+def found(lights: int = 5, tested: int = 6) -> FoundPlaces:
+    rng = np.random.default_rng(2)
+    image = rng.uniform(0.1, 1, (2, 12, 4)).astype(np.float32)
+    image[1, :, 3] = np.arange(12) % 4
+    corners = rng.uniform(0, 2, (30, 3, 3)).astype(np.float32)
+    patches = Patches(Cells.of_image(image), Fragments(corners, np.full((30, 3), 0.5, np.float32)), np.arange(30) % 4)
+    return FoundPlaces(rng.uniform(0, 2, (lights, 3)), rng.uniform(0, 2, (tested, 3)), rng.uniform(0, 2, (9, 3)), BOX, patches)
+
+
+def test_flags_mean_a_set() -> None:
+    assert parse_light_set("named", ["Hall"], 400, None, None, None) == NamedSet(("Hall",))
+    assert parse_light_set("cloud", (), 512, None, 0.5, "0,0,0,2,2,2") == CloudSet("cloud", 512, 0.5, BOX)
+    assert parse_light_set("patches", (), 512, None, None, None) == CloudSet("patches", 512)
+    assert parse_light_set("patches", (), 512, 64, None, None).count == 64  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("lamps", (), 400, None, None, None), "named, cloud, patches or point:SPACING, found 'lamps'"),  # words: ok
+        (("named", (), 400, 5, None, None), "`light_set=named` without `patches`"),
+        (("cloud", ("Hall",), 400, None, None, None), "`light_group` with `light_set=named`"),
+        (("patches", (), 400, None, 0.5, None), "`grid` with `light_set=cloud`"),
+        (("cloud", (), 400, None, None, "0,0,0,-1,1,1"), "each first value the smaller"),
+    ],
+)
+def test_other_flags_are_refused(arguments: tuple, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        parse_light_set(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"light_set": CloudSet("patches", 4)}, "`transport=indirect`"),
+        ({"light_set": NamedSet(), "keep_scene_lights": True}, "without `keep_scene_lights`"),
+        ({"light_set": NamedSet(), "samples": "auto"}, "a number of `samples`"),
+        ({"light_set": NamedSet(), "sun_angle": 0.1}, "without `light_list` and `sun_angle`"),
+    ],
+)
+def test_settings_that_exclude_each_other(settings: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        BakeSettings(LIGHTMAP, **settings)
+
+
+def test_lights_of_patches_are_tested_by_point_lights() -> None:
+    settings = BakeSettings(
+        LIGHTMAP, transport="indirect", light_set=CloudSet("patches", 4, found=found()), validation=2, holdout=3, holdout_samples=9
+    )
+    lights = plan_lights(settings)
+    assert [light.placed.json() for light in lights[:4]] == [{"kind": "patch", "patch": k} for k in range(4)]
+    assert [light.parts for light in lights[:4]] == [("response",)] * 4
+    assert [(light.kind, light.role) for light in lights[4:]] == [("point", "validation")] * 2 + [("point", "holdout")] * 3
+    assert all(light.has_direct and light.samples == 9 for light in lights[4:])
+    assert {light.seed for light in lights} and len({light.seed for light in lights}) == len(lights)
+
+
+def test_a_cloud_without_direct_light_renders_one_image_of_each_light() -> None:
+    cloud = CloudSet("cloud", 5, found=found())
+    apart = plan_lights(BakeSettings(LIGHTMAP, transport="indirect", light_set=cloud, validation=0, holdout=1))
+    assert [light.parts for light in apart] == [("indirect",)] * 5 + [("response", "direct")]
+    whole = plan_lights(BakeSettings(LIGHTMAP, light_set=cloud, validation=0, holdout=1))
+    assert {light.parts for light in whole} == {("response",)}
+
+
+def test_named_lights_are_all_there_are() -> None:
+    named = NamedSet((), (("Desk", ("Desk",)), ("Sun", ("Sun",))))
+    lights = plan_lights(BakeSettings(LIGHTMAP, light_set=named))
+    assert [light.placed.json()["name"] for light in lights] == ["Desk", "Sun"] and {light.role for light in lights} == {"train"}
+
+
+def test_a_set_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
+    known, path = CloudSet("cloud", 5, found=found()), tmp_path / "light_set.npz"
+    known.write(path, known.key("scene", 6, 1))
+    again = CloudSet("cloud", 5).read(path, known.key("scene", 6, 1))
+    assert again.is_known and again.record() == known.record()
+    assert not CloudSet("cloud", 5).read(path, known.key("another scene", 6, 1)).is_known
+    assert not CloudSet("cloud", 5).read(tmp_path / "missing.npz", "").is_known
+    path.write_bytes(path.read_bytes()[:-40])
+    assert not CloudSet("cloud", 5).read(path, known.key("scene", 6, 1)).is_known
+
+
+def test_what_is_not_known_yet_cannot_be_planned() -> None:
+    for unknown in (NamedSet(), CloudSet("cloud", 5)):
+        with pytest.raises(InputError, match="call with_light_set first"):
+            plan_lights(BakeSettings(LIGHTMAP, light_set=unknown))

@@ -1,0 +1,52 @@
+/** What captured lights add to the weights of an asset's functions, for lights that are no directions: named ones, patches, points of a cloud. */
+import { SrbfError } from "./errors";
+import { decodeFloat } from "./exr";
+import type { AssetFiles } from "./files";
+import type { Manifest } from "./manifest";
+import type { Fail } from "./methods/method";
+
+/** Keys of asset.json of methods whose functions are known at the captured lights alone. */
+export interface LightValuesManifest extends Manifest {
+  /** Value = stored times `scale`, 1 unless given. */
+  light_values?: { file: string; lights?: number; scale?: number };
+}
+
+/** Values of F functions at `count` lights, RGB: `data` is (F, count, 3), row by row. */
+export interface LightValues {
+  readonly functions: number;
+  readonly count: number;
+  readonly data: Float32Array;
+}
+
+export function checkLightValues({ light_values }: LightValuesManifest, fail: Fail): void {
+  if (typeof light_values?.file !== "string" || !Number.isFinite(light_values.scale ?? 1)) fail("light_values", light_values);
+}
+
+/** `count` columns of lights, by default as many as the manifest says. @throws SrbfError on a file of another size, or a damaged one. */
+export async function readLightValues(files: AssetFiles, manifest: LightValuesManifest, functions: number, count?: number): Promise<LightValues> {
+  const { file, lights, scale = 1 } = manifest.light_values as { file: string; lights?: number; scale?: number };
+  const image = decodeFloat(await files.bytes(file), file);
+  const columns = count ?? lights ?? image.width;
+  if (image.width !== columns || image.height !== functions || image.channels < 3) {
+    throw new SrbfError(`expected ${columns} x ${functions} RGB numbers in ${file}, found ${image.width} x ${image.height} x ${image.channels}`);
+  }
+  const data = new Float32Array(3 * columns * functions);
+  for (let i = 0; i < columns * functions; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + c];
+  return { functions, count: columns, data };
+}
+
+/** Sum over lights of color times values, (F, 3); `colors` (count, 3), or (n,) of gray ones, n <= count. */
+export function summed({ functions, count, data }: LightValues, colors: Float64Array): Float64Array {
+  if (colors.length <= count) colors = Float64Array.from({ length: 3 * count }, (_, i) => colors[Math.floor(i / 3)] ?? 0);
+  const out = new Float64Array(3 * functions);
+  for (let f = 0, at = 0; f < functions; ++f) {
+    let [r, g, b] = [0, 0, 0];
+    for (let light = 0; light < 3 * count; light += 3, at += 3) {
+      r += data[at] * colors[light];
+      g += data[at + 1] * colors[light + 1];
+      b += data[at + 2] * colors[light + 2];
+    }
+    out.set([r, g, b], 3 * f);
+  }
+  return out;
+}

@@ -1,0 +1,101 @@
+/** The light cloud: indirect light of lights inside the scene, from the responses to patches of its surfaces [Kristensen2005]. */
+import { SrbfError } from "../errors";
+import { decodeFloat } from "../exr";
+import type { AssetFiles } from "../files";
+import { type LightValues, readLightValues, summed } from "../light_values";
+import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
+import type { Triple } from "../matrix";
+import { Occluders } from "../occluders";
+import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
+import { Cells } from "../received_light";
+import { readOccluders } from "../triangles";
+import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
+import type { Fail, Method, ReadOptions, Tables } from "./method";
+
+/** Keys of asset.json that this method adds. */
+interface LightCloudManifest extends ComponentsManifest, PositionManifest {
+  cells?: { file: string };
+  interpolation?: { kind: string };
+  free_places?: Triple[];
+}
+
+const FAR = 1e4; // meters: how far a distant light's shadow rays go
+
+export const lightCloud: Method = {
+  name: "light-cloud",
+  ...WEIGHTED_COMPONENTS,
+
+  check(manifest: LightCloudManifest, layers: number, fail: Fail): void {
+    checkWeightedComponents(manifest, layers, fail);
+    checkPositionTable(manifest, fail);
+    if (!manifest.position_table && !hasRays(manifest)) fail("cells of patches and a scene, or a position_table", manifest.cells);
+  },
+
+  async read(files: AssetFiles, manifest: LightCloudManifest, { exact = false }: ReadOptions = {}): Promise<Tables> {
+    const functions = functionsOf(manifest);
+    const [parts, table, rays] = await Promise.all([
+      readWeightedComponents(files, manifest),
+      manifest.position_table && PositionTable.read(files, manifest, functions),
+      hasRays(manifest) ? Rays.read(files, manifest, functions) : undefined,
+    ]);
+    let known = new Map<string, Float64Array>(); // weights of white lights: those that have not moved are not computed again
+    const weightsOf = (light: Placed): Float64Array => {
+      const isotropic = light.kind === "point" || light.kind === "sphere";
+      if (table && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
+      if (rays) return rays.weights(light);
+      throw new SrbfError(`expected an asset of patches with cells.exr and scene.glb for a ${light.kind} light, found none: its table of positions holds inverse-square point lights`);
+    };
+    return {
+      ...parts,
+      places: manifest.free_places,
+      projectsPunctual: true,
+      projectedWeights({ areas, distant, punctual }) {
+        const out = new Float64Array(3 * functions);
+        const used = new Map<string, Float64Array>();
+        const suns = [...distant].map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
+        for (const light of [...punctual, ...areas, ...suns]) {
+          const key = JSON.stringify({ ...light, color: 1 });
+          const weights = known.get(key) ?? used.get(key) ?? weightsOf(light);
+          used.set(key, weights);
+          for (let i = 0; i < out.length; ++i) out[i] += weights[i] * light.color[i % 3];
+        }
+        known = used;
+        return out;
+      },
+    };
+  },
+};
+
+type Placed = PunctualLight | AreaLight | DirectionalLight;
+
+function hasRays({ cells, scene, interpolation }: LightCloudManifest): boolean {
+  return typeof cells?.file === "string" && typeof scene === "string" && interpolation?.kind !== "kernel"; // whose columns are captured lights, not patches
+}
+
+/** Weights by shadow rays to cells of the patches. */
+class Rays {
+  private constructor(
+    private readonly cells: Cells,
+    private readonly occluders: Occluders,
+    private readonly values: LightValues,
+  ) {}
+
+  static async read(files: AssetFiles, manifest: LightCloudManifest, functions: number): Promise<Rays> {
+    const { file } = manifest.cells as { file: string };
+    const scene = manifest.scene as string;
+    const [cells, corners, values] = await Promise.all([
+      files.bytes(file).then((buffer) => new Cells(decodeFloat(buffer, file), file)),
+      files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
+      readLightValues(files, manifest, functions),
+    ]);
+    if (cells.patches > values.count) throw new SrbfError(`expected cells of ${values.count} patches in ${file}, found ${cells.patches}`);
+    return new Rays(cells, new Occluders(corners), values);
+  }
+
+  /** Of a white light, (F, 3). */
+  weights(light: Placed): Float64Array {
+    const { cells, occluders, values } = this;
+    const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
+    return summed(values, received);
+  }
+}

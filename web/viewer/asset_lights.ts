@@ -1,0 +1,56 @@
+/** Which lights an asset can be relit by, and where those inside its scene may be. */
+import { type Asset, lightDomainOf, type Triple } from "../src";
+import { ends, heat } from "./direction_widget";
+import { isPlaced, type LightState, namedState, type PlacedState, pointState } from "./light_state";
+import type { BakedLight } from "./reference";
+import type { Bounds } from "./receivers";
+
+const OUTSIDE = 0.1; // of the longest side of the box about free places: the page says so of a light farther out
+const UNMEASURED = "#9fb2c8";
+
+export type AddedKind = Exclude<LightState["kind"], "named">;
+
+/** Whether lights shine inside the scene. */
+export const inside = ({ manifest }: Asset): boolean => lightDomainOf(manifest) === "cloud";
+
+/** Kinds of lights that one can add. */
+export function kindsOf(asset: Asset): readonly AddedKind[] {
+  if (inside(asset)) return ["point", "spot", "sphere", "area"];
+  return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
+}
+
+/** The scene's own lights, or one inside it; undefined: a sun. */
+export function firstLights(asset: Asset, { center, radius }: Bounds): LightState[] | undefined {
+  const { names } = asset.tables;
+  if (names) return names.map(namedState);
+  return inside(asset) ? [pointState(middleOf(asset) ?? [center[0], center[1], center[2] + 0.5 * radius], 0.5 * radius)] : undefined;
+}
+
+/** The place of free space that is nearest to its middle. */
+export function middleOf({ tables: { places = [] } }: Asset): Triple | undefined {
+  if (places.length === 0) return undefined;
+  const mean = [0, 1, 2].map((k) => places.reduce((sum, place) => sum + place[k], 0) / places.length);
+  const away = (place: Triple) => Math.hypot(...place.map((x, k) => x - mean[k]));
+  return places.reduce((best, place) => (away(place) < away(best) ? place : best));
+}
+
+/** A line on a light that is outside the free places, if there is one. */
+export function outsideLine({ tables: { places = [] } }: Asset, lights: readonly LightState[]): string {
+  if (places.length === 0) return "";
+  const box = (pick: (...values: number[]) => number) => [0, 1, 2].map((k) => places.reduce((end, place) => pick(end, place[k]), places[0][k]));
+  const [least, most] = [box(Math.min), box(Math.max)];
+  const margin = OUTSIDE * Math.max(...most.map((x, k) => x - least[k]));
+  const beyond = (light: PlacedState) => Math.max(...light.position.map((x, k) => Math.max(least[k] - x, x - most[k])));
+  const found = lights.findIndex((light) => light.on && isPlaced(light) && beyond(light) > margin);
+  if (found < 0) return "";
+  return `light ${found + 1} is ${beyond(lights[found] as PlacedState).toPrecision(2)} m outside the space that lights were captured in: its bounces are extrapolated`;
+}
+
+/** Where captured lights are inside the scene, in the colors of their errors (dB) once those are known. */
+export function capturedPlaces(lights: readonly BakedLight[], errors: readonly number[] | undefined, compared: number) {
+  const range = errors && ends(errors);
+  return lights.flatMap(({ position }, i) => {
+    const good = range && ((errors as number[])[i] - range[0]) / (range[1] - range[0]);
+    return position ? [{ position, color: good === undefined ? UNMEASURED : heat(1 - good), marked: i === compared }] : [];
+  });
+}

@@ -1,0 +1,114 @@
+/**
+ * Direct light of lights inside the scene by perspective shadow maps: six faces of a cube about a point light, one map of a narrow spot, several
+ * cubes over a sphere or an area.
+ */
+import type { WebGLRenderer, WebGLRenderTarget } from "three";
+import directFragment from "../../glsl/stages/direct_point.frag";
+import shadowVertex from "../../glsl/stages/point_shadow.vert";
+import heightFragment from "../../glsl/stages/point_shadow_nearness.frag";
+import transmittanceFragment from "../../glsl/stages/point_shadow_transmittance.frag";
+import { type AreaLight, pointLightUniforms, type PunctualLight, type Triple } from "../src";
+import { unit } from "../src/lights";
+import { cross } from "../src/matrix";
+import type { Caster } from "./shadow_casters";
+import { type LitTexels, ShadowMaps } from "./shadow_maps";
+import { across } from "./sun_disc";
+
+const FINE = 2048; // texels per side of a map of a light of one look
+const COARSE = 512; // of one of several looks
+const GUARD = 3; // texels past a face's edge, for filtering across it
+const WIDEST = (60 * Math.PI) / 180; // half-angle of a spot that one map holds
+const GRID = 4; // looks per side of an area
+const SPHERE_LOOKS = 12;
+const NEAREST = 1e-3; // meters: what is nearer casts no shadow
+const FACES: readonly (readonly [Triple, Triple, Triple])[] = [0, 1, 2].flatMap((axis) =>
+  [1, -1].map((sign) => {
+    const along = (k: number, value: number) => [0, 1, 2].map((i) => (i === k ? value : 0)) as unknown as Triple;
+    return [along((axis + 1) % 3, 1), along((axis + 2) % 3, 1), along(axis, sign)] as const; // across, up, ahead
+  }),
+);
+
+export class PointShadows {
+  private readonly uniforms = {
+    light: { value: [0, 0, 0] as number[] },
+    across: { value: [0, 0, 0] as number[] },
+    up: { value: [0, 0, 0] as number[] },
+    ahead: { value: [0, 0, 0] as number[] },
+    reach: { value: 1 },
+    nearest: { value: NEAREST },
+    face: { value: -1 },
+    lambertian: { value: 0 },
+    pointLight: { value: {} as object },
+  };
+  private readonly fine: ShadowMaps;
+  private readonly coarse: ShadowMaps;
+
+  /** Lights and casters are relative to `center`, in the asset's frame. */
+  constructor(
+    renderer: WebGLRenderer,
+    lit: LitTexels,
+    casters: readonly Caster[],
+    private readonly center: Triple,
+  ) {
+    const stages = { vertex: shadowVertex, height: heightFragment, transmittance: transmittanceFragment, direct: directFragment };
+    const maps = (size: number) => new ShadowMaps(renderer, lit, casters, stages, this.uniforms, size, 0);
+    this.fine = maps(FINE);
+    this.coarse = maps(COARSE);
+  }
+
+  /** Add the light of `light`, in the asset's frame, to `sum`. */
+  add(sum: WebGLRenderTarget, light: PunctualLight | AreaLight): void {
+    if (light.kind === "area") {
+      const { position, u, v, a0, color } = light;
+      const direction = unit(cross(u, v));
+      const base = { kind: "spot", direction, inner: Math.PI / 2, outer: Math.PI / 2, falloff: "inverse-square", radius: NEAREST, a0 } as const;
+      const steps = Array.from({ length: GRID }, (_, i) => (i + 0.5) / GRID - 0.5);
+      const places = steps.flatMap((s) => steps.map((t) => [0, 1, 2].map((k) => position[k] + s * u[k] + t * v[k]) as unknown as Triple));
+      for (const place of places) this.cube(sum, { ...base, position: place, color: shared(color, places.length) }, COARSE, 1);
+    } else if (light.kind === "sphere") {
+      const places = looks(light.position, light.size);
+      for (const position of places) this.cube(sum, { ...light, kind: "point", position, color: shared(light.color, places.length) }, COARSE);
+    } else if (light.kind === "spot" && light.outer <= WIDEST) this.cone(sum, light);
+    else this.cube(sum, light, FINE);
+  }
+
+  private cube(sum: WebGLRenderTarget, light: PunctualLight, size: number, lambertian = 0): void {
+    FACES.forEach((axes, face) => {
+      this.look(light, axes, size / (size - 2 * GUARD), face, lambertian);
+      (size === FINE ? this.fine : this.coarse).add(sum, light.color);
+    });
+  }
+
+  private cone(sum: WebGLRenderTarget, light: Extract<PunctualLight, { kind: "spot" }>): void {
+    const right = across(light.direction);
+    this.look(light, [right, cross(light.direction, right), light.direction], (Math.tan(light.outer) * FINE) / (FINE - 2 * GUARD), -1, 0);
+    this.fine.add(sum, light.color);
+  }
+
+  private look(light: PunctualLight, [right, up, ahead]: readonly [Triple, Triple, Triple], reach: number, face: number, lambertian: number): void {
+    const { uniforms, center } = this;
+    const position = light.position.map((x, k) => x - center[k]) as unknown as Triple;
+    const members = pointLightUniforms({ ...light, position, color: [1, 1, 1] });
+    if (lambertian) Object.assign(members, { versineInner: 3, versineOuter: 4 }); // the cosine is its cone
+    uniforms.pointLight.value = members;
+    uniforms.light.value = [...position];
+    uniforms.across.value = [...right];
+    uniforms.up.value = [...up];
+    uniforms.ahead.value = [...ahead];
+    uniforms.reach.value = reach;
+    uniforms.face.value = face;
+    uniforms.lambertian.value = lambertian;
+  }
+}
+
+const shared = (color: Triple, count: number) => color.map((x) => x / count) as unknown as Triple;
+
+/** Places evenly over a sphere, on a spiral. */
+function looks([x, y, z]: Triple, radius: number): Triple[] {
+  return Array.from({ length: SPHERE_LOOKS }, (_, i) => {
+    const height = 1 - (2 * i + 1) / SPHERE_LOOKS;
+    const turn = i * Math.PI * (3 - Math.sqrt(5));
+    const flat = Math.sqrt(1 - height * height);
+    return [x + radius * flat * Math.cos(turn), y + radius * flat * Math.sin(turn), z + radius * height];
+  });
+}
