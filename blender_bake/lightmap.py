@@ -34,7 +34,7 @@ class LightmapReceiver:
         self._irradiance = job["quantity"] == "irradiance"
         scene.render.bake.view_from = "ABOVE_SURFACE"
         self._height, self._width = job["height"], job["width"]
-        self._apart = job["transport"] == "indirect"
+        self._apart = job.get("transport") == "indirect"
         self._viewers = Viewers(scene, job["viewers"]) if job.get("viewers") else None
         if self._viewers is not None:
             self.renders |= {"toward"}

@@ -65,7 +65,7 @@ class VertexReceiver:
         mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
         mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
         select([self._object])
-        self._apart = job["transport"] == "indirect"
+        self._apart = job.get("transport") == "indirect"
         self._viewers = Viewers(scene, job["viewers"]) if job.get("viewers") else None
         if self._viewers is not None:
             self.renders |= {"toward"}

@@ -275,7 +275,7 @@ class Asset:
         return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some texels alone, without their geometry: to relight it, not to save.
+        """An asset of some texels alone, of their geometry with the normals only: to relight it, not to save.
 
         Parameters
         ----------
@@ -296,7 +296,8 @@ class Asset:
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
-        return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images={})
+        images = {name: self.images[name].reshape(-1, 3)[texels][None] for name in ("normal",) if name in self.images}
+        return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images=images)
 
     def bytes_per_texel(self) -> dict[str, int | float]:
         """What a shader reads of a texel's own data, by kind of light: its layers and its cluster's index.

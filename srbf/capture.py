@@ -123,8 +123,13 @@ class Capture(ReceiverImages):
         """Whether every light of the roles has a direct image."""
         return all(light.direct is not None for light in self.lights if light.role in roles)
 
-    def combined(self) -> Capture:
+    def combined(self, roles: Sequence[Role] = ROLES) -> Capture:
         """The same capture with the direct light added to every image; itself where it is combined.
+
+        Parameters
+        ----------
+        roles
+            Whose lights must have a direct image; images of others cannot be read.
 
         Returns
         -------
@@ -143,7 +148,7 @@ class Capture(ReceiverImages):
         """
         if self.transport == "combined":
             return self
-        if not self.has_direct:
+        if not self.has_direct_of(roles):
             raise ManifestError(f"expected a direct image of every light in {self.folder}, found lights without; bake it again")
         return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
 
@@ -251,7 +256,7 @@ class Capture(ReceiverImages):
     def of_harmonics(self) -> Capture:
         """A capture whose lights are the harmonics of this one's, light by light, K of each: T of K L columns."""
         lights = (replace(light, file=file, direct=None, harmonics=()) for light in self.lights for file in light.harmonics)
-        manifest = {key: value for key, value in self.manifest.items() if key not in ("harmonics", "direct")}
+        manifest = {key: value for key, value in self.manifest.items() if key != "harmonics"}
         return Capture(self.folder, manifest, tuple(lights))
 
     def image(self, index: int) -> Float32[ndarray, "H W 3"]:

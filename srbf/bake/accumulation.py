@@ -107,7 +107,7 @@ class Accumulation:
         """The sum of `light`; an empty one where its file is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
             passes, samples = (int(n) for n in stored["counts"])
-            arrays = [stored[name] if name in stored else None for name in PARTS]
+            arrays = [stored.get(name) for name in PARTS]
             return Sum(passes, samples, *arrays)
         return NOTHING
 

@@ -36,6 +36,8 @@ BEFORE_IMAGES = (
     LOG,
     ACCUMULATION,
     FORMER,
+    LIGHT_SET_FILE,
+    PATCHES_FILE,
     "lights",
     "direct",
     "harmonics",

@@ -29,6 +29,7 @@ PLACES = 1024  # random free places: where the components of a fit are made for,
 LIGHT_SET_FILE = "light_set.npz"  # in the capture's folder: what was found of the scene, so that a resumed bake has the same
 PATCHES_FILE = "patches.exr"
 MOST_NAMES = 4096
+MOST_LIGHTS = 20_000  # of a cloud, or patches
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,8 @@ class CloudSet:
     found: FoundPlaces | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
-        if self.count < 1:
-            raise InputError(f"expected 1 or more {'patches' if self.kind == 'patches' else 'lights'}, found {self.count}")
+        if not 1 <= self.count <= MOST_LIGHTS:
+            raise InputError(f"expected 1 to {MOST_LIGHTS} {'patches' if self.kind == 'patches' else 'lights'}, found {self.count}")
         if self.spacing is not None and not (np.isfinite(self.spacing) and self.spacing > 0):
             raise InputError(f"expected a spacing of point lights above 0 m, found {self.spacing:g}")
 
@@ -203,9 +204,9 @@ class CloudSet:
         with files.atomic_path(path) as temporary, open(temporary, "wb") as file:
             np.savez(file, key=np.array(key), **self._known.arrays())
 
-    def key(self, scene_sha256: str, tested: int, seed: int) -> str:
-        """What the places found depend on."""
-        return json.dumps([scene_sha256, self.question(tested, seed)])
+    def key(self, scene_sha256: str, tested: int, seed: int, scene: str | None = None) -> str:
+        """What the places found depend on; `scene`: which one of the .blend."""
+        return json.dumps([scene_sha256, scene, self.question(tested, seed)])
 
     def read(self, path: Path, key: str) -> CloudSet:
         """With the places of a file that `write` wrote; unchanged where there is none, or one of another bake or damaged."""
@@ -215,7 +216,7 @@ class CloudSet:
         return self
 
 
-FINGERPRINT_PATCHES = 1024  # by which the lights of a cloud are told apart
+FINGERPRINT_PATCHES = 1024  # which see the lights of a cloud differently
 
 LightSet = NamedSet | CloudSet
 

@@ -90,6 +90,7 @@ def arguments(settings: BakeSettings) -> list[str]:
         "holdout-samples": settings.holdout_samples,
         "quantity": settings.quantity,
         "transport": settings.transport,
+        "gloss": settings.gloss,
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",

@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
-from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet
+from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet, NamedSet
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
@@ -211,12 +211,13 @@ class _Passes:
         self._lights = plan_lights(bake.settings)
         self._order = render_order(self._lights)
         self._scratch = self._folder / SCRATCH
-        judged = len(self._lights)
+        # Named lights may each light a room of their own: their first ones do not tell whether any reaches the receiver.
+        judged = 0 if isinstance(self._settings.light_set, NamedSet) else len(self._lights)
         if shard is not None:
             self._order = shard.of(self._order)
             self._lights = sorted(self._order, key=lambda light: light.index)
             self._scratch /= shard.scratch
-            judged = len(self._lights) if len(self._lights) >= FIRST_LIGHTS else 0
+            judged = len(self._lights) if judged and len(self._lights) >= FIRST_LIGHTS else 0
         self._images = CaptureImages(bake.folder, reporter.say)
         self._accumulation = Accumulation(bake.folder, self._lights)
         self._auto = bake.settings.samples == "auto"
@@ -416,13 +417,16 @@ class _Passes:
             files.write_json(self._folder / MANIFEST, manifest)
 
     def _write_light_set(self) -> None:
-        """What a cloud knows of the scene: for a fit, and for a bake that goes on later."""
-        light_set = self._settings.light_set
-        if isinstance(light_set, CloudSet) and not (self._folder / LIGHT_SET_FILE).is_file():
-            assert light_set.found is not None
-            write_image(self._folder / PATCHES_FILE, light_set.found.patches.cells.image(), "float")
-            tested = self._settings.validation + self._settings.holdout
-            light_set.write(self._folder / LIGHT_SET_FILE, light_set.key(self._identity["scene_sha256"], tested, self._settings.seed))
+        """What a cloud knows of the scene: for a fit, and for a bake that is resumed. Again where it is gone or damaged."""
+        settings, light_set = self._settings, self._settings.light_set
+        if not isinstance(light_set, CloudSet):
+            return
+        assert light_set.found is not None
+        patches, path = self._folder / PATCHES_FILE, self._folder / LIGHT_SET_FILE
+        key = light_set.key(self._identity["scene_sha256"], settings.validation + settings.holdout, settings.seed, settings.scene)
+        if not (patches.is_file() and replace(light_set, found=None).read(path, key).is_known):
+            write_image(patches, light_set.found.patches.cells.image(), "float")
+            light_set.write(path, key)
 
     def _record(self, blender: str) -> None:
         """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""
@@ -452,6 +456,7 @@ class _Passes:
             self._record(event["blender"])
             self._images.require_receiver(event)
         elif kind == "scene":
+            self._write_light_set()  # before the bake counts as begun: resumed, it has the same lights
             self._record(event["blender"])
             self._facts = event
         elif kind == "file":

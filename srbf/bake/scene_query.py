@@ -156,7 +156,8 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
     tested = settings.validation + settings.holdout
     if isinstance(light_set, CloudSet):
         require_scene(bake.scene)
-        kept = light_set.read(bake.folder / LIGHT_SET_FILE, light_set.key(files.sha256_of(bake.scene), tested, settings.seed))
+        key = light_set.key(files.sha256_of(bake.scene), tested, settings.seed, settings.scene)
+        kept = light_set.read(bake.folder / LIGHT_SET_FILE, key)
         if kept.is_known:
             return replace(bake, settings=replace(settings, light_set=kept))
     found = _ask(bake, light_set.question(tested, settings.seed), say)
@@ -167,7 +168,8 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
             raise InputError(f"expected lights in {bake.scene}, found none: no light object, no emission and a black world; add one")
         if len(entries) > MOST_NAMES:
             raise InputError(f"expected at most {MOST_NAMES} named lights, found {len(entries)}; gather them by `light_group`")
-        say(f"{len(entries)} named lights: {', '.join(name for name, _ in entries[:SHOWN])}{', …' if len(entries) > SHOWN else ''}")
+        shown = ", ".join(repr(name) for name, _ in entries[:SHOWN])
+        say(f"{len(entries)} named lights: {shown}{', …' if len(entries) > SHOWN else ''}")
         known = replace(light_set, entries=entries)
     else:
         known = _with_places(light_set, found, settings.seed, say)

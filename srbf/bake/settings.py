@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -325,7 +325,7 @@ class BakeSettings:
 
     def record(self) -> dict[str, Any]:
         """JSON for the manifest; a light list by its checksum, since its path may differ from machine to machine."""
-        record = asdict(replace(self, light_set=None))
+        record: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         record["receiver"] = self.receiver.record()
         record["no_shadow"] = list(self.no_shadow)
         for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None), ("gloss", None)):

@@ -10,6 +10,9 @@ from srbf.basis.exitant_harmonics import lifted, projection_of_each
 from srbf.sphere import fibonacci
 
 CHUNK = 1 << 12  # receivers at a time
+RIDGE = (
+    0.03  # of a fit to few samples: a lobe as wide as Phong's of exponent 12 is 42 % off at order 3, at best 40 %, with 1/100 of the noise
+)
 HALF_SPHERE = 2  # directions for each harmonic: those behind a surface are turned above it
 
 
@@ -35,6 +38,6 @@ def project(images: Float32[ndarray, "H W N"], normals: Float32[ndarray, "H W 3"
         normal = facing[rows] / np.linalg.norm(facing[rows], axis=1, keepdims=True)
         shape = (len(rows), len(viewers), 3)
         from_where = lifted(np.broadcast_to(viewers, shape), np.broadcast_to(normal[:, None], shape))
-        result[rows] = projection_of_each(from_where, order) @ seen[rows]
+        result[rows] = projection_of_each(from_where, order, RIDGE) @ seen[rows]
     result[~known, 0] = seen[~known].mean(axis=1) * np.sqrt(4 * np.pi)
     return result.reshape(height, width, -1)

@@ -84,10 +84,14 @@ def lifted(viewers: Float[ndarray, "*n 3"], normals: Float[ndarray, "*n 3"]) -> 
 
 
 def projection_of_each(directions: Float[ndarray, "P S 3"], order: int, ridge: float = RIDGE) -> Float64[ndarray, "P K S"]:
-    """`projection` where each receiver was seen from S directions of its own, all above it and of equal weight."""
+    """`projection` where each receiver was seen from S directions of its own, all above it and of equal weight, with noise.
+
+    The ridge of a function of degree l is l times `ridge`: what looks alike from everywhere stays as it is.
+    """
     seen = harmonics(directions, order)  # (P, S, K)
     share = 4 * pi / max(seen.shape[1], 1)
-    gram = share * np.swapaxes(seen, 1, 2) @ seen + ridge * np.eye(seen.shape[2])
+    degrees = np.repeat(np.arange(order + 1), 2 * np.arange(order + 1) + 1)
+    gram = share * np.swapaxes(seen, 1, 2) @ seen + ridge * np.diag(np.maximum(degrees, RIDGE))
     return np.linalg.solve(gram, share * np.swapaxes(seen, 1, 2))
 
 

@@ -18,6 +18,7 @@ from srbf.cli.values import COUNT, COUNT_OR_NONE
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
 from srbf.evaluation.random_mixes import mix_errors
+from srbf.evaluation.viewer_errors import viewer_errors, viewer_line
 from srbf.fitting.options import method_for
 from srbf.light_domain import domain_of_capture
 from srbf.relighting.direct_light import Added, chosen
@@ -90,6 +91,8 @@ def evaluate(
         _add_means(result)
     if domain_of_capture(images).kind == "named" and direct in (None, "none"):
         result["mixes"] = mix_errors(opened, images).as_dict()
+    if "harmonics" in opened.manifest and images.gloss is not None:
+        result["viewers"] = viewer_errors(opened, images)
     _print_errors(result, json)
 
 
@@ -109,13 +112,15 @@ def _print_errors(result: dict[str, Any], json: bool) -> None:
     mean = f"{'mean':>8}" if with_mean else ""
     typer.echo(f"{'role':<14}{'lights':>7}{'rmse':>12}{'relative':>10}{mean}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
     for role, error in result.items():
-        if role not in ("lights", "mixes"):
+        if role not in ("lights", "mixes", "viewers"):
             count = sum(light["role"] == role for light in result["lights"])
             mean = f"{error['relative_rmse_mean']:>8.4f}" if with_mean else ""
             typer.echo(
                 f"{role:<14}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{mean}{error['psnr']:>10.2f}"
                 f"{error['psnr_pooled']:>8.2f}{error['peak']:>8.3g}"
             )
+    for role, error in result.get("viewers", {}).items():
+        typer.echo(f"{role} lights toward random viewers: {viewer_line(error)}")
     if "mixes" in result:
         mixes = result["mixes"]
         typer.echo(

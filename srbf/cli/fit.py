@@ -16,6 +16,7 @@ from srbf.cli.terminal import note, progress_bar
 from srbf.compute.dask_client import Cluster, checked
 from srbf.encode.row_blocks import fit_tiles
 from srbf.evaluation.errors_by_role import TrainErrorAccumulator, evaluate
+from srbf.evaluation.viewer_errors import viewer_errors, viewer_line
 from srbf.fitting.options import encode, method_for
 from srbf.io.files import check_replaceable
 from srbf.methods import FitRun, method_of
@@ -61,6 +62,7 @@ def fit(
     with progress_bar("evaluate") as update:
         errors = evaluate(asset, opened, update, watch=watch)
     asset.manifest["error"] = {role: error for role, error in errors.items() if role != "lights"}
+    toward = viewer_errors(asset, opened) if "harmonics" in asset.manifest else {}
     asset.save(output, force)
     note(f"fitted {_summary(asset)} to {asset.manifest['source']['fit']['train_lights']} lights in {fitted - started:.1f} s")
     if "seams" in asset.manifest:
@@ -71,6 +73,8 @@ def fit(
     for role, error in asset.manifest["error"].items():
         texels = f" (of {error['texels']} texels)" if "texels" in error else ""
         note(f"{role}: PSNR {error['psnr']:.2f} dB, relative RMSE {error['relative_rmse']:.4f}{texels}")
+    for role, error in toward.items():
+        note(f"{role} lights toward random viewers: {viewer_line(error)}")
 
 
 def _solve_rows(cluster: Cluster, capture: Capture, lights: list[int], matrix: Any, ridge: float, progress: Any) -> Any:

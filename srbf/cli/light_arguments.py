@@ -39,6 +39,11 @@ def parse_point(text: str, a0: float, falloff: Falloff) -> PointLight:
     return PointLight(_xyz(n, 0), a0=a0, falloff=falloff, **_color(n, 3))
 
 
+def parse_viewer(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z`: a place in the world, m."""
+    return _xyz(_numbers(text, (3, 3), "`viewer` X,Y,Z"), 0)
+
+
 def parse_spot(text: str, a0: float, falloff: Falloff) -> SpotLight:
     """`X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]`: position, where it shines, half-angles in radians, color."""
     n = _numbers(text, (8, 11), "`spot` X,Y,Z,DX,DY,DZ,INNER,OUTER[,R,G,B]")

@@ -16,7 +16,7 @@ from srbf.cli.group import Command
 from srbf.cli.values import COUNT, Number
 from srbf.fitting.auto_method import DEFAULT_BUDGET
 from srbf.fitting.options import AUTO, check_settings
-from srbf.registry import all_methods, method_names
+from srbf.registry import all_methods, method_named, method_names
 
 
 class FitCommand(Command):
@@ -96,15 +96,17 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
         texts.setdefault(f"{own.metadata['help'].rstrip('.')} ({own.default})", []).append(method)
     shared = len(texts) == 1 and len(owners) == len(all_methods())
     help_text = "; ".join(text if shared else f"{', '.join(methods)}: {text}" for text, methods in texts.items()) + "."
-    words = tuple(dict.fromkeys(word for _, own, _ in owners for word in own.metadata["words"]))
+    told = tuple(dict.fromkeys(word for _, own, _ in owners for word in own.metadata["words"]))
     hints = {hint for _, _, hint in owners}
-    if words:
-        parser = Number(words=words)
+    if told:
+        parser = Number(words=told)
         return Annotated[
-            Any, typer.Option(_flag(entry), parser=parser, metavar="|".join((*words, "NUMBER")), help=help_text, show_default=False)
+            Any, typer.Option(_flag(entry), parser=parser, metavar="|".join((*told, "NUMBER")), help=help_text, show_default=False)
         ]
     if hints == {bool}:
-        return Annotated[bool | None, typer.Option(_flag(entry), help=help_text, show_default=False)]
+        implied = any(entry.name in method_named(method).implied_by for method, _, _ in owners)
+        words = _flag(entry) if implied else f"{_flag(entry)}/--no-{_flag(entry).removeprefix('--')}"
+        return Annotated[bool | None, typer.Option(words, help=help_text, show_default=False)]
     if hints == {int}:
         return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", parser=COUNT, help=help_text, show_default=False)]
     choices = tuple(dict.fromkeys(choice for hint in hints for choice in _choices(hint)))

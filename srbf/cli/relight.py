@@ -19,6 +19,7 @@ from srbf.cli.light_arguments import (
     parse_point,
     parse_sphere,
     parse_spot,
+    parse_viewer,
     read_environment,
     read_frames,
     with_falloff,
@@ -36,6 +37,7 @@ from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
 
 FRAMES_MARKER = "0000.exr"
+Viewer = tuple[float, float, float] | None
 
 
 def relight(
@@ -93,6 +95,14 @@ def relight(
         Literal["none", "ray", "shadow-map"] | None,
         typer.Option(help="Direct light added to an indirect asset; default: ray, without embreex shadow-map.", show_default=False),
     ] = None,
+    viewer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Where glossy surfaces are seen from, m; default: each from straight above itself.",
+            show_default=False,
+        ),
+    ] = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
     alpha: Annotated[
@@ -117,6 +127,7 @@ def relight(
             *(parse_area(text, reference_distance) for text in area or []),
             *map(parse_named, light or []),
         ]
+        seen_from = None if viewer is None else parse_viewer(viewer)
     has_light = bool(placed or environment)
     if lights is not None and has_light:
         raise typer.BadParameter("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
@@ -126,6 +137,8 @@ def relight(
         raise typer.BadParameter(
             "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --environment or --ambient-only"
         )
+    if viewer is not None and renderer == "gl":
+        raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
     picture = lights is None and output.suffix.lower() == ".png"
     if lights is None and output.suffix.lower() not in (".exr", ".png"):
         raise typer.BadParameter(f"expected an output named .exr or .png, found {output.name!r}")
@@ -134,7 +147,7 @@ def relight(
     if lights is not None:
         opened = Asset.open(asset)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
-        _relight_frames(opened, output, frames, direct, renderer, alpha, force)
+        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
@@ -145,7 +158,7 @@ def relight(
     for line in outside_domain(opened, placed):
         note(line)
     with Added(opened, chosen(opened, direct)) as added:
-        (image,) = _render(opened, [placed], renderer, added)
+        (image,) = _render(opened, [placed], renderer, added, seen_from)
         for line in added.notes(placed):
             note(line)
     if picture:
@@ -156,7 +169,14 @@ def relight(
 
 
 def _relight_frames(
-    opened: Asset, output: Path, frames: list[list[Light]], direct: Direct | None, renderer: str, alpha: Alpha, force: bool
+    opened: Asset,
+    output: Path,
+    frames: list[list[Light]],
+    direct: Direct | None,
+    renderer: str,
+    alpha: Alpha,
+    force: bool,
+    viewer: Viewer,
 ) -> None:
     """An image of each frame's lights in the folder `output`."""
     opacity = alpha_of(opened)
@@ -168,7 +188,7 @@ def _relight_frames(
         for number, frame in enumerate(frames):
             for line in outside_domain(opened, frame):
                 note(f"frame {number}: {line}")
-        for number, image in enumerate(_render(opened, frames, renderer, added)):
+        for number, image in enumerate(_render(opened, frames, renderer, added, viewer)):
             write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
             update(number + 1, len(frames))
         for line in added.notes([light for frame in frames for light in frame]):
@@ -182,9 +202,9 @@ def check_image_output(path: Path, force: bool) -> None:
         check_replaceable(path, False, "")
 
 
-def _render(asset: Asset, frames: list[list[Light]], renderer: str, added: Added) -> Iterator[np.ndarray]:
+def _render(asset: Asset, frames: list[list[Light]], renderer: str, added: Added, viewer: Viewer) -> Iterator[np.ndarray]:
     if renderer == "numpy":
-        yield from (methods.relight(asset, lights, added.response(lights)) for lights in frames)
+        yield from (methods.relight(asset, lights, added.response(lights), viewer) for lights in frames)
     else:
         with Relighter(asset) as relighter:
             yield from (relighter.relight(lights, direct=added.response(lights)) for lights in frames)

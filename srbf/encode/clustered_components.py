@@ -20,6 +20,9 @@ from srbf.solve.streamed_product import StreamedProduct, in_tasks
 FEATURES = 48  # numbers per texel by which it finds its cluster
 
 
+Refine = Callable[[ndarray, ndarray], ndarray]
+
+
 class RowSpace(Protocol):
     """Rows of T as n vectors of M numbers that can be compared, and the way back: see `weighted_rows.LightSpace`."""
 
@@ -66,12 +69,14 @@ def clustered_components(
     on_image: OnImage,
     progress: Callable[[int], None],
     zones: Zones | None = None,
+    refine: Refine = lambda projected, index: projected,
 ) -> ClusteredComponents:
     """Clusters grow axis by axis on the sample, then every texel joins the cluster that holds it best.
 
     One pass over the train images assigns the texels, another projects them: `on_image` sees each image in the first, `progress` counts
-    the images of both. `stitch` closes the seams of the images, since components of two clusters cannot be compared, and what its texels
-    show is read once more: both sides then agree as well as their clusters hold them.
+    the images of both. `refine(components, index)` may change the components of texels before they get their ranges. `stitch` closes the
+    seams of the images, since components of two clusters cannot be compared, and what its texels show is read once more: both sides then
+    agree as well as their clusters hold them.
     """
     train = capture.indices("train")
     features, _ = principal_axes(space.centered, FEATURES)
@@ -93,7 +98,7 @@ def clustered_components(
     for first, block in capture.stream(train):
         product.add(first, block)
         progress(len(train) + first + len(block))
-    projected, covered = product.result, capture.coverage().ravel() > 0
+    projected, covered = refine(product.result, index[:texels]), capture.coverage().ravel() > 0
     del product
     if stitch is None:
         return ClusteredComponents(*_in_own_range(projected, index, covered, space, found), cluster_zone=of_zone)

@@ -15,7 +15,7 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.solve.kernel_ridge import KernelPath
 
 RIDGES = tuple(float(r) for r in 10.0 ** np.arange(-8, 1.1, 0.5))  # of the kernel's mean variance
-SCALES = (32, 64, 128, 256, 512)  # patches, and all of them
+SCALES = (1, 8, 32, 64, 128, 256, 512)  # groups of patches, and each patch by itself; the first keeps the energy
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
-from srbf.capture import COVERED, Capture
+from srbf.capture import COVERED, Capture, CombinedCapture
 from srbf.captured_light import ROLES, Role
 from srbf.compute.threads import each, one_blas_thread
 from srbf.errors import InputError
@@ -194,7 +194,9 @@ def evaluate(
     >>> errors["holdout"]["psnr"] > 20  # dB
     True
     """
-    reference, peak_source = _references(asset, capture, direct)
+    if direct != "none" and capture.transport == "indirect":  # train lights inside the scene have no direct images
+        roles = [role for role in roles if capture.has_direct_of([role])]
+    reference, peak_source = _references(asset, capture, direct, roles)
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
     covered = _covered(capture)
@@ -247,9 +249,11 @@ def evaluate(
 
 
 def lights_of_peak(capture: Capture) -> list[int]:
-    """The lights whose images define the peak: the train lights; of patches, which are no lights, the point lights that test them."""
+    """The lights whose images define the peak: the train lights. Patches are no lights, and train lights inside a scene have no direct
+    images: the point lights that test them stand in."""
     train = capture.indices("train")
-    if capture.kind != "patch":
+    lacking = isinstance(capture, CombinedCapture) and any(capture.lights[i].direct is None for i in train)
+    if capture.kind != "patch" and not lacking:
         return train
     return [*capture.indices("validation"), *capture.indices("holdout")] or train
 
@@ -285,7 +289,7 @@ def _energy(values: Float32[ndarray, "n 3"]) -> float:
     return sum(float(np.dot(piece, piece)) for piece in (flat[start : start + FLOAT32_SUM] for start in range(0, len(flat), FLOAT32_SUM)))
 
 
-def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture, Capture]:
+def _references(asset: Asset, capture: Capture, direct: Direct, roles: Sequence[Role]) -> tuple[Capture, Capture]:
     """(the capture to compare with, the capture that defines the peak)."""
     if asset.transport == "combined":
         if direct != "none":
@@ -300,7 +304,7 @@ def _references(asset: Asset, capture: Capture, direct: Direct) -> tuple[Capture
                 "add its direct light: `direct=ray` or shadow-map"
             )
         return capture, whole
-    return capture.combined(), whole
+    return capture.combined(roles), whole if capture.has_direct else capture.combined(roles)
 
 
 def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], samples: int, peak: float) -> RoleError:

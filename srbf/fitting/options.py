@@ -77,10 +77,13 @@ def method_for(
 ) -> Method:
     """The method with its settings; `auto`, the default, tries what fits into `budget` or reaches `psnr` on a sample of the capture.
 
-    Without a `method` the settings imply it: `k` relighting maps, `components` an eigen map, `clusters` a clustered one.
+    Without a `method` the capture implies it, where it is of glossy surfaces, or the settings: `k` relighting maps, `components` an eigen
+    map, `clusters` a clustered one.
     InputError on a setting that the method does not have, on values out of range, and on a capture whose lights it cannot fit.
     """
     settings = {} if settings is None else settings
+    if method is None:
+        method = next((m.name for m in all_methods() if m.is_made_for(capture) and set(settings) <= set(m.settings())), None)
     name = check_settings(method, settings)
     if name == AUTO:
         return within_budget(capture, say=say, **settings)

@@ -11,10 +11,21 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.capture import Capture
+from srbf.errors import InputError
 from srbf.light_domain.protocol import LightDomain
 from srbf.lights import AreaLight, Falloff, Light, PointLight
 
 MARGIN = 0.1  # of a box's longest side, m: a light this far outside the places is told of
+
+
+def isotropic(light: Light) -> PointLight:
+    """A point or sphere light of inverse-square falloff, InputError for others: all that a cloud of captured point lights can be."""
+    if type(light).__name__ not in ("PointLight", "SphereLight") or light.falloff != "inverse-square":  # type: ignore[union-attr]
+        raise InputError(
+            "expected point lights of inverse-square falloff for a cloud of captured point lights or without embreex, found another; "
+            "capture patches for any light, and install embreex"
+        )
+    return light  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

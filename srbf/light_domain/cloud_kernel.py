@@ -110,6 +110,11 @@ class CloudKernel:
         return lights, distances
 
 
+def all_visible(origins: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Of a scene in which nothing lies between any two places."""
+    return np.ones(len(origins), bool)
+
+
 class Fade:
     """Weights of one moving light over time: captured lights that it begins or ceases to see come and go over `seconds`.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
@@ -24,6 +25,7 @@ __all__ = [
     "method_of",
     "outside_domain",
     "projected_weights",
+    "radiance_to",
     "relight",
     "responses",
 ]
@@ -81,7 +83,12 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     return [moved(light, asset.asset_from_world) for light in lights]
 
 
-def relight(asset: Asset, lights: Sequence[Light], direct: Float32[ndarray, "H W 3"] | None = None) -> Float32[ndarray, "H W 3"]:
+def relight(
+    asset: Asset,
+    lights: Sequence[Light],
+    direct: Float32[ndarray, "H W 3"] | None = None,
+    viewer: tuple[float, float, float] | None = None,
+) -> Float32[ndarray, "H W 3"]:
     """max(0, sum over lights + direct) + ambient, for any number of lights of any kind at once.
 
     Parameters
@@ -92,6 +99,8 @@ def relight(asset: Asset, lights: Sequence[Light], direct: Float32[ndarray, "H W
         Of the world.
     direct
         (H, W, 3) float32: the direct light that an indirect asset leaves out, as `srbf.relighting.direct_light` gives it.
+    viewer
+        Where glossy surfaces are seen from in the world, m; None: each from straight above itself.
 
     Returns
     -------
@@ -110,7 +119,7 @@ def relight(asset: Asset, lights: Sequence[Light], direct: Float32[ndarray, "H W
     >>> bool((relight(asset, [sun]) == np.maximum(linear_response(asset, [sun]), 0)).all())  # of an asset without ambient
     True
     """
-    total = linear_response(asset, lights)
+    total = linear_response(asset, lights) if viewer is None else radiance_to(asset, lights, viewer)
     return finish(asset, total if direct is None else total + direct)
 
 
@@ -143,6 +152,40 @@ def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "
     True
     """
     return method_of(asset).linear_response(asset, in_asset_frame(asset, lights))
+
+
+def radiance_to(asset: Asset, lights: Sequence[Light], viewer: tuple[float, float, float]) -> Float32[ndarray, "H W 3"]:
+    """`linear_response` of glossy surfaces as seen from a place.
+
+    Parameters
+    ----------
+    asset
+        Of the method glossy-cloud.
+    lights
+        Of the world.
+    viewer
+        Where it is seen from in the world, m.
+
+    Returns
+    -------
+    ndarray
+        (H, W, 3) float32, which may be negative.
+
+    Raises
+    ------
+    InputError
+        On an asset that looks alike from everywhere.
+
+    Examples
+    --------
+    >>> from srbf.methods import radiance_to
+    >>> radiance_to(asset, [], (0.0, -2.0, 1.0))
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected an asset of glossy surfaces for `viewer`, found a relighting-map one, ...
+    """
+    matrix = np.asarray(asset.asset_from_world, np.float64)
+    x, y, z = (matrix[:3, :3] @ np.asarray(viewer, np.float64) + matrix[:3, 3]).tolist()
+    return method_of(asset).radiance_to(asset, in_asset_frame(asset, lights), (x, y, z))
 
 
 def responses(asset: Asset, coordinates: Float64[ndarray, "b d"]) -> Float32[ndarray, "b H W 3"]:

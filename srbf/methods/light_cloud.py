@@ -17,15 +17,15 @@ from srbf.encode.light_kernel_table import KernelTable, kernel_table
 from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.errors import InputError
 from srbf.io.image import Encoding
+from srbf.light_domain.cloud import isotropic
 from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
 from srbf.lights import Light, NamedLight, PointLight
 from srbf.methods.light_table_maps import LightTableMaps, check_table_settings, encode_table, stored_values
 from srbf.methods.protocol import QUIET, FitRun, setting
 from srbf.solve.light_merging import Mean
-from srbf.visibility.cloud_lights import CloudLights, UnseenLights, unseen_lights
+from srbf.visibility.cloud_lights import CloudLights, Interpolation, chosen_interpolation, unseen_lights
 from srbf.visibility.embree import has_embree
 
-Interpolation = Literal["auto", "fingerprint", "kernel"]
 VIRTUAL_LIGHTS = 600  # places whose responses the components are made for
 TRIED_CLUSTERS = (32, 64)
 MOST_TRIED = 64  # components of a candidate
@@ -58,6 +58,8 @@ class LightCloud(LightTableMaps):
         kernel: lights that are alike in a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
     merged
         kernel: how many lights are left in each zone; `auto`: all pairs of a merged light are nearer than 1 in the article's metric.
+    smooth
+        Average components over neighbors on the surface that differ by no more than the capture's noise.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
     seed
@@ -86,6 +88,7 @@ class LightCloud(LightTableMaps):
     zones: int = setting(1, "kernel: parts of the scene with merged lights of their own.")
     merge: Literal["none"] | Mean = setting("none", "kernel: how lights that are alike in a zone become one.")
     merged: Literal["auto"] | int = setting("auto", "kernel: lights left in each zone.", words=("auto",))
+    smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     seed: int = 0
 
@@ -137,8 +140,11 @@ class LightCloud(LightTableMaps):
         else:
             kernel = CloudKernel(capture.positions(train), inside.visible, self.nearest)
             unseen = unseen_lights(capture, inside, self.seed) if self.interpolation != "kernel" else None
-            kind, report = self._chosen(unseen, kernel)
-            asset = encode_table(self, capture, run, np.eye(len(train)), self.clusters, self.seed, self.zones)
+            kind, report = chosen_interpolation(self.interpolation, unseen, kernel)
+            mixtures = np.eye(len(train))
+            if kind == "fingerprint" and unseen is not None:  # sums of captured lights have less noise than single ones
+                mixtures = unseen.prints.weights(inside.received(inside.free[:VIRTUAL_LIGHTS]))
+            asset = encode_table(self, capture, run, mixtures, self.clusters, self.seed, self.zones, _captured_columns)
             if kind == "fingerprint":
                 assert unseen is not None
                 found = asset.tables["light_values"].astype(np.float32) * np.float32(asset.manifest["light_values"]["scale"])
@@ -158,16 +164,6 @@ class LightCloud(LightTableMaps):
         asset.manifest |= places.manifest()
         asset.tables |= places.tables()
         return asset
-
-    def _chosen(self, unseen: UnseenLights | None, kernel: CloudKernel) -> tuple[str, dict[str, Any]]:
-        """(interpolation, relative errors at unseen lights that chose it)."""
-        if unseen is None:
-            return "kernel", {}
-        errors = {"fingerprint": unseen.fingerprint_error()}
-        if self.interpolation == "auto":
-            errors["kernel"] = unseen.kernel_error(kernel)
-        rule = "validation" if unseen.by_validation else "leave-one-light-out"
-        return min(errors, key=lambda name: errors[name]), {"interpolation_errors": errors, "chosen_by": rule}
 
     def __str__(self) -> str:
         return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
@@ -218,7 +214,7 @@ class LightCloud(LightTableMaps):
             return super().projected_weights(asset, lights)
         table = KernelTable.of(asset)
         visible = CloudLights.of_asset(asset).visible
-        return np.sum([table.weights(_point(light), visible) for light in lights], axis=0)
+        return np.sum([table.weights(isotropic(light), visible) for light in lights], axis=0)
 
     @classmethod
     def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
@@ -238,24 +234,20 @@ class LightCloud(LightTableMaps):
         return f"{lights} {what}, {asset.clusters} clusters of {asset.components} components"
 
 
+def _captured_columns(asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+    """Responses to captured point lights while these are still the columns of the table."""
+    train = capture.indices("train")
+    return LightCloud.columns(asset, [train.index(i) for i in lights])
+
+
 def _at_places(asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
     lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
     return np.stack([LightCloud.projected_weights(asset, [light]) for light in lights])
 
 
 def _from_table(asset: Asset, light: Light) -> Float64[ndarray, "F 3"]:
-    point = _point(light)
+    point = isotropic(light)
     return PositionTable.of(asset.manifest, asset.tables).evaluate(np.array(point.position)) * (np.array(point.color) * point.a0**2)
-
-
-def _point(light: Light) -> PointLight:
-    """InputError for lights that are no isotropic point lights."""
-    if type(light).__name__ not in ("PointLight", "SphereLight") or light.falloff != "inverse-square":  # type: ignore[union-attr]
-        raise InputError(
-            "expected point lights of inverse-square falloff for a cloud of captured point lights or without embreex, found another; "
-            "capture patches for any light, and install embreex"
-        )
-    return light  # type: ignore[return-value]
 
 
 METHOD = LightCloud

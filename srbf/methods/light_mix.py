@@ -38,6 +38,8 @@ class LightMix(LightTableMaps):
         1 to 256: a texel's index is a byte; 1 needs none.
     components
         How many numbers per texel; at most three per light are kept.
+    smooth
+        Average components over neighbors on the surface that differ by no more than the capture's noise.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
     seed
@@ -60,6 +62,7 @@ class LightMix(LightTableMaps):
 
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
+    smooth: bool = setting(False, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     seed: int = 0
 

@@ -7,7 +7,7 @@ product; a texel then costs the same under any number of lights, and the shader 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any, ClassVar, get_args
 
@@ -19,6 +19,7 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import COVERED, Capture
 from srbf.encode.clustered_components import Zones, clustered_components
+from srbf.encode.component_filter import without_noise
 from srbf.encode.dilation import nearest_covered
 from srbf.encode.light_values import light_values
 from srbf.encode.mixed_rows import MixedSpace
@@ -46,6 +47,8 @@ class LightTableMaps(ComponentMaps):
 
     tables: ClassVar[dict[str, str]] = {"light_values": VALUES_FILE, "cluster_index": "cluster_index.png"}
     filterable: ClassVar[bool] = False
+
+    smooth: bool = True  # take the noise of few samples out of the components
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
@@ -90,11 +93,19 @@ class LightTableMaps(ComponentMaps):
 
 
 def encode_table(
-    method: LightTableMaps, capture: Capture, run: FitRun, mixtures: Float64[ndarray, "V L"], clusters: int, seed: int, zones: int = 1
+    method: LightTableMaps,
+    capture: Capture,
+    run: FitRun,
+    mixtures: Float64[ndarray, "V L"],
+    clusters: int,
+    seed: int,
+    zones: int = 1,
+    respond: Callable[[Asset, Capture, Sequence[int]], ndarray] | None = None,
 ) -> Asset:
     """Clusters and components by the responses to V mixtures of the captured lights, then the table of all of them, in three passes.
 
-    With `zones`, every cluster is of one part of the scene, by the receivers' positions; `cluster_zone` of the manifest says which.
+    `respond`: what an asset of this table shows under lights of the capture, by default the method's `captured_responses`. With `zones`,
+    every cluster is of one part of the scene, by the receivers' positions; `cluster_zone` of the manifest says which.
     The manifest has no keys of the table's own meaning yet. InputError without train lights, or with more components than numbers per
     texel. Peak memory: that of a clustered eigen map, and 12 (V + L) bytes per sampled texel.
     """
@@ -108,7 +119,16 @@ def encode_table(
     steps = 3 * len(train)
     parts = zones_of(capture, texels, zones)
     found = clustered_components(
-        capture, space, clusters, components, seed, run.stitch, run.on_image, lambda images: run.progress(images, steps), parts
+        capture,
+        space,
+        clusters,
+        components,
+        seed,
+        run.stitch,
+        run.on_image,
+        lambda images: run.progress(images, steps),
+        parts,
+        refinement(capture) if method.smooth else lambda projected, index: projected,
     )
     clusters = max(1, clusters, 0 if found.cluster_zone is None else len(found.cluster_zone))
     own = stored_components(capture, method.encoding, found.components, found, run.stitch)
@@ -127,8 +147,23 @@ def encode_table(
     asset.tables["light_values"], entry = stored_values(values)
     manifest |= entry
     if run.stitch is not None and own.unstitched is not None:
-        manifest["seams"] = seam_report(asset, capture, run.stitch, own.unstitched, method.captured_responses, own.unstitched_index)
+        manifest["seams"] = seam_report(
+            asset, capture, run.stitch, own.unstitched, respond or method.captured_responses, own.unstitched_index
+        )
     return asset
+
+
+def refinement(capture: Capture) -> Callable[[ndarray, ndarray], ndarray]:
+    """What takes the noise of a capture out of components, see `component_filter`; nothing does without positions and normals."""
+    positions, normals = capture.geometry("position"), capture.geometry("normal")
+    covered = capture.coverage().ravel() >= COVERED
+
+    def refine(components: ndarray, index: ndarray) -> ndarray:
+        if positions is None or normals is None:
+            return components
+        return without_noise(components, index, covered, positions.reshape(-1, 3), normals.reshape(-1, 3))
+
+    return refine
 
 
 def zones_of(capture: Capture, texels: Int[ndarray, " n"], count: int) -> Zones | None:

@@ -93,6 +93,11 @@ class Method(ABC):
         """Names of its settings."""
         return tuple(entry.name for entry in fields(cls))  # type: ignore[arg-type]
 
+    @classmethod
+    def is_made_for(cls, capture: Capture) -> bool:
+        """Whether it is the method of a capture where none is named."""
+        return False
+
     @abstractmethod
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
         """The asset of a capture. InputError where the settings do not suit it; numerical trouble is data in `source.fit`."""
@@ -124,6 +129,14 @@ class Method(ABC):
     @abstractmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The sum over lights of the asset's frame, before the clamp and without ambient: linear in every light's color."""
+
+    @classmethod
+    def radiance_to(cls, asset: Asset, lights: Sequence[Light], viewer: tuple[float, float, float]) -> Float32[ndarray, "H W 3"]:
+        """`linear_response` as seen from a place (m) in the asset's frame; InputError where the asset knows one viewer alone."""
+        raise InputError(
+            f"expected an asset of glossy surfaces for `viewer`, found a {cls.name} one, which looks alike from everywhere; "
+            "bake with `light_set=cloud` and `gloss=3`, and fit that"
+        )
 
     @classmethod
     @abstractmethod

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64
+from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.encode.fingerprint import Fingerprints, scales_of
@@ -23,6 +25,7 @@ from srbf.visibility.surface_cells import Cells
 
 SAMPLE_TEXELS = 4096  # by which unseen lights are judged
 LEAST_VALIDATION = 4
+Interpolation = Literal["auto", "fingerprint", "kernel"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +130,29 @@ class UnseenLights:
         return float(np.sqrt(np.mean(np.maximum(squares, 0) / np.maximum(own, 1e-30))))
 
 
-def unseen_lights(capture: Capture, inside: CloudLights, seed: int = 0) -> UnseenLights:
-    """Of the train lights of a cloud; the ridge of the fingerprints is chosen by left-out lights."""
+def chosen_interpolation(wanted: Interpolation, unseen: UnseenLights | None, kernel: CloudKernel) -> tuple[str, dict[str, Any]]:
+    """(interpolation, relative errors at unseen lights that chose it); the kernel where nothing is known of `unseen` lights."""
+    if unseen is None:
+        return "kernel", {}
+    errors = {"fingerprint": unseen.fingerprint_error()}
+    if wanted == "auto":
+        errors["kernel"] = unseen.kernel_error(kernel)
+    rule = "validation" if unseen.by_validation else "leave-one-light-out"
+    return min(errors, key=lambda name: errors[name]), {"interpolation_errors": errors, "chosen_by": rule}
+
+
+def unseen_lights(
+    capture: Capture, inside: CloudLights, seed: int = 0, rows_of: Callable[[Int[ndarray, " n"]], Float32[ndarray, "n M C"]] | None = None
+) -> UnseenLights:
+    """Of the train lights of a cloud; the ridge of the fingerprints is chosen by left-out lights.
+
+    `rows_of`: what receivers show under the train and validation lights, by default their images' colors.
+    """
     train, validation = capture.indices("train"), capture.indices("validation")
     places = capture.positions(train)
     received = inside.received(places)
-    rows = capture.sample([*train, *validation], sampled_texels(capture, SAMPLE_TEXELS))
+    texels = sampled_texels(capture, SAMPLE_TEXELS)
+    rows = capture.sample([*train, *validation], texels) if rows_of is None else rows_of(texels)
     flat = rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
     gram = (flat @ flat.T).astype(np.float64)
     cells = inside.cells

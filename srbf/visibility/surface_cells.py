@@ -15,7 +15,7 @@ from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.visibility.embree import EmbreeTriangles
 
 OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
-FIRST_PLACES = 192  # that most surfaces are seen from
+STAGES = (16, 192)  # places that most surfaces are seen from
 RAYS = 1 << 20  # traced at a time
 NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way
 DARK = 1e-3  # albedo below which nothing is reflected
@@ -97,7 +97,8 @@ class Cells:
 def exposed(fragments: Fragments, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"]) -> Bool[ndarray, " T"]:
     """Which fragments are seen from any of the free places, on the side of their normal."""
     found = np.zeros(len(fragments.corners), bool)
-    for places in (free[:FIRST_PLACES], free[FIRST_PLACES:]):
+    for first, last in zip((0, *STAGES), (*STAGES, len(free)), strict=True):
+        places = free[first:last]
         left = np.flatnonzero(~found)
         if len(left) and len(places):
             found[left] = lit(fragments.centers[left], fragments.normals[left], occluders, places).any(axis=1)

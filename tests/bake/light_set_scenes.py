@@ -36,15 +36,14 @@ def gray(value: float = 0.5) -> Any:
     return material("Gray", "ShaderNodeBsdfDiffuse", (value, value, value))
 
 
-def mesh(name: str, corners: Any, faces: Any, made_of: Any, uv: bool = True) -> Any:
-    """An object of quads; its faces share its UV layer in columns."""
+def mesh(name: str, corners: Any, faces: Any, made_of: Any) -> Any:
+    """An object of quads, without the corners that they leave; its faces share its UV layer in columns."""
     data = bpy.data.meshes.new(name)
-    data.from_pydata(corners, [], faces)
-    if uv:
-        layer = data.uv_layers.new(name="UV")
-        for i, loop in enumerate(layer.uv):
-            x, y = ((0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98))[i % 4]
-            loop.vector = ((i // 4 + x) / len(faces), y)
+    used = sorted({corner for face in faces for corner in face})
+    data.from_pydata([corners[corner] for corner in used], [], [[used.index(corner) for corner in face] for face in faces])
+    for i, loop in enumerate(data.uv_layers.new(name="UV").uv):
+        x, y = ((0.02, 0.02), (0.98, 0.02), (0.98, 0.98), (0.02, 0.98))[i % 4]
+        loop.vector = ((i // 4 + x) / len(faces), y)
     data.materials.append(made_of)
     obj = bpy.data.objects.new(name, data)
     bpy.context.scene.collection.objects.link(obj)
@@ -98,6 +97,24 @@ def room() -> None:
     empty.objects.link(bpy.data.objects["Crate"])
 
 
+def shining_metal(obj: Any, color: tuple[float, float, float], strength: float) -> None:
+    """Give an object a metal that emits, by a Principled BSDF in a node group."""
+    group = bpy.data.node_groups.new("Shining metal", "ShaderNodeTree")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    metal = group.nodes.new("ShaderNodeBsdfPrincipled")
+    values = {"Metallic": 1.0, "Base Color": (0.9, 0.9, 0.9, 1), "Emission Color": (*color, 1), "Emission Strength": strength}
+    for name, value in values.items():
+        metal.inputs[name].default_value = value
+    group.links.new(metal.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    made = bpy.data.materials.new("Shining metal")
+    made.use_nodes = True
+    made.node_tree.nodes.clear()
+    node = made.node_tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    made.node_tree.links.new(node.outputs[0], made.node_tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    obj.data.materials[0] = made
+
+
 def unlit() -> None:
     walls()
 
@@ -128,13 +145,21 @@ def open_air() -> None:
 
 
 def crowd() -> None:
-    """The room under 300 point lights of one datablock."""
+    """The room under 100 point lights of one datablock."""
     walls()
     first = light("Star", "POINT", (0.2, 0.2, 1.8), 1.0)
-    for i in range(299):
+    for i in range(99):
         star = bpy.data.objects.new("Star", first.data)
         star.location = (0.1 + 0.14 * (i % 20), 0.1 + 0.12 * (i // 20), 1.8)
         bpy.context.scene.collection.objects.link(star)
+
+
+def cellar() -> None:
+    """The room with a light, and under its floor 30 others."""
+    walls()
+    light("Upstairs", "POINT", (1.5, 1, 1.5), 20)
+    for i in range(30):
+        light(f"Cellar {i:02}", "POINT", (0.1 * i, 1, -1), 20)
 
 
 def sphere() -> None:
@@ -144,14 +169,12 @@ def sphere() -> None:
     ball.name = "Sphere"
     ball.data.flip_normals()
     ball.data.materials.append(gray())
-    for face in ball.data.polygons:
-        face.use_smooth = True
     cycles = bpy.context.scene.cycles
     cycles.max_bounces = cycles.diffuse_bounces = 32
 
 
 SCENES: dict[str, Callable[[], None]] = {
-    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, sphere)
+    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere)
 }
 
 if __name__ == "__main__":

@@ -282,7 +282,9 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
         assert flag in flags
     named = {flag.partition("=")[0].removeprefix("--").replace("-", "_") for flag in flags}
     missing = (
-        set(BakeSettings.__dataclass_fields__) - named - {"width", "height", "light_list", "points", "light_set", "denoise", "no_shadow"}
+        set(BakeSettings.__dataclass_fields__)
+        - named
+        - {"width", "height", "light_list", "points", "light_set", "denoise", "no_shadow", "gloss"}
     )
     assert not missing and "--no-cast-shadow=Roof" in flags
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
@@ -312,3 +314,6 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
 def test_a_job_of_a_light_set_says_what_it_is(light_set: NamedSet | CloudSet, expected: list[str]) -> None:
     flags = arguments(BakeSettings(Receiver("lightmap", "A"), transport="indirect", light_set=light_set))
     assert set(expected) <= set(flags)
+    if light_set.kind == "cloud":
+        glossy = BakeSettings(Receiver("lightmap", "A"), light_set=light_set, quantity="radiance", gloss=2)
+        assert {*expected, "--gloss=2", "--quantity=radiance"} <= set(arguments(glossy))

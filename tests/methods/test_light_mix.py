@@ -32,7 +32,7 @@ def capture(tmp_path_factory) -> Capture:
 
 @pytest.fixture(scope="module", params=["one cluster", "clusters", "maps"])
 def asset(request, capture: Capture) -> Asset:
-    method = {"one cluster": LightMix(1, 20), "clusters": LightMix(4, 12, "half"), "maps": NamedMaps()}[request.param]
+    method = {"one cluster": LightMix(1, 20), "clusters": LightMix(4, 12, encoding="half"), "maps": NamedMaps()}[request.param]
     return method.encode(capture)
 
 

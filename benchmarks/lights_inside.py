@@ -1,0 +1,136 @@
+"""`python benchmarks/lights_inside.py SCENE.blend CAPTURE ASSET`: bounces of lights inside against Cycles, by kind of light.
+
+Lights at random free places that no bake saw: points, points 5 to 20 cm off a surface, spots of 25 to 35 degrees, areas of 0.6 x 0.3 m.
+Every reference is rendered twice, so that its noise drops out: relative RMSE = sqrt(sum (a - r1)(a - r2) / sum r1 r2). Pooled over lights,
+their mean, the mean without the worst 1 % of texels, the ratio of energies, and the noise of one reference.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf.asset import Asset
+from srbf.bake.job import base_job
+from srbf.bake.settings import BakeSettings, Receiver
+from srbf.bake.worker import Worker
+from srbf.capture import COVERED, Capture
+from srbf.lights import AreaLight, Light, PointLight, SpotLight
+from srbf.methods import linear_response
+from srbf.visibility.cloud_lights import CloudLights
+
+CLEARANCE = 0.1  # m
+NEAR = (0.05, 0.2)
+SIDES = (0.6, 0.3)
+
+
+def placed(capture: Capture, kind: str, count: int, rng: np.random.Generator) -> list[Light]:
+    """`count` random lights of a kind, in the free space of a capture."""
+    inside = CloudLights.of(capture)
+    cells = inside.cells
+    lights: list[Light] = []
+    while len(lights) < count:
+        place = inside.free[rng.integers(len(inside.free))] + rng.uniform(-0.02, 0.02, 3)
+        off = np.linalg.norm(cells.places - place, axis=1).min()
+        direction = rng.normal(size=3)
+        direction /= np.linalg.norm(direction)
+        if kind == "near":
+            cell = rng.choice(len(cells.places), p=cells.areas / cells.areas.sum())
+            place = cells.places[cell] + rng.uniform(*NEAR) * cells.normals[cell]
+            clear = inside.visible(np.repeat(place[None], 32, axis=0), place + 0.04 * rng.normal(size=(32, 3)))
+            if not clear.all():
+                continue
+        elif off < CLEARANCE + (0.4 if kind == "area" else 0.0):
+            continue
+        x, y, z = (float(value) for value in place)
+        if kind == "spot":
+            outer = float(rng.uniform(np.radians(25), np.radians(35)))
+            lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=tuple(direction), inner=outer, outer=outer))
+        elif kind == "area":
+            u = np.cross(direction, [0.3, 0.5, 0.8])
+            u /= np.linalg.norm(u)
+            lights.append(AreaLight((x, y, z), u=tuple(SIDES[0] * u), v=tuple(SIDES[1] * np.cross(direction, u))))
+        else:
+            lights.append(PointLight((x, y, z), falloff="inverse-square"))
+    return lights
+
+
+def message(light: Light) -> dict[str, Any]:
+    """As the worker takes it."""
+    if isinstance(light, SpotLight):
+        return {"kind": "spot", "position": light.position, "direction": light.direction, "outer": light.outer}
+    if isinstance(light, AreaLight):
+        return {"kind": "area", "position": light.position, "u": light.u, "v": light.v}
+    assert isinstance(light, PointLight)
+    return {"kind": "point", "position": light.position}
+
+
+def rendered(scene: Path, capture: Capture, lights: list[Light], samples: int) -> np.ndarray:
+    """(2, N, H, W, 3): the indirect light of every light, twice."""
+    receiver = capture.manifest["source"]["settings"]["receiver"]
+    chosen = Receiver(receiver["kind"], receiver["name"], receiver.get("uv_layer"), tuple(receiver.get("also", ())))
+    settings = BakeSettings(chosen, capture.width, capture.height, quantity=capture.quantity, transport="indirect")
+    images = []
+    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
+        scratch = Path(name)
+        requests = [
+            {
+                "light": {"index": i, **message(light)},
+                "samples": samples,
+                "seed": 7919 * (i + len(lights) * again) + 11,
+                "region": None,
+                "channels": ["indirect"],
+            }
+            for again in range(2)
+            for i, light in enumerate(lights)
+        ]
+        job = {**base_job(scene, settings, scratch), "transmittances": {}, "requests": requests}
+        with Worker(job, scratch, scratch / "bake.log", None) as worker:
+            for event in worker.events(print):
+                if event["event"] == "rendered":
+                    images.append(np.load(scratch / event["files"]["indirect"]))
+    return np.array(images).reshape(2, len(lights), capture.height, capture.width, 3)
+
+
+def row(relit: np.ndarray, first: np.ndarray, second: np.ndarray) -> str:
+    """One line of the table; arrays (N, n, 3)."""
+    products, power = (relit - first) * (relit - second), first * second
+    by_light = np.sqrt(np.maximum(products.sum(axis=(1, 2)) / power.sum(axis=(1, 2)), 0))
+    pooled = np.sqrt(max(products.sum() / power.sum(), 0))
+    trimmed = []
+    for own, whole in zip(products.sum(axis=2), power.sum(axis=2), strict=True):
+        kept = np.argsort(np.abs(own))[: int(0.99 * len(own))]
+        trimmed.append(np.sqrt(max(own[kept].sum() / whole[kept].sum(), 0)))
+    noise = np.sqrt(((first - second) ** 2).sum() / 2 / power.sum())
+    energy = relit.sum() / ((first.sum() + second.sum()) / 2)
+    return f"{pooled:8.3f}{by_light.mean():8.3f}{by_light.max():8.3f}{np.mean(trimmed):14.3f}{energy:9.3f}{noise:8.3f}"
+
+
+def main() -> None:
+    """Print a row per kind of light."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("scene", type=Path)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("assets", type=Path, nargs="+")
+    parser.add_argument("--lights", type=int, default=12)
+    parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--kinds", default="point,near,spot,area")
+    asked = parser.parse_args()
+    capture = Capture.open(asked.capture)
+    covered = capture.coverage() >= COVERED
+    print(f"{'asset':>24}{'light':>8}{'pooled':>8}{'mean':>8}{'worst':>8}{'without 1 %':>14}{'energy':>9}{'noise':>8}")
+    for kind in asked.kinds.split(","):
+        lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
+        first, second = rendered(asked.scene, capture, lights, asked.samples)[:, :, covered]
+        for path in asked.assets:
+            asset = Asset.open(path)
+            relit = np.stack([linear_response(asset, [light])[covered] for light in lights])
+            print(f"{path.name:>24}{kind:>8}{row(relit, first, second)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,46 @@
+"""Commands on the scenes of light_set_scenes.py, and the names of their lights."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from typer.testing import CliRunner, Result
+
+from srbf.cli import app
+
+NAMES = ["Bulb, left=1", "Fenêtre/№ 2", "Panel", "Tall  Screen"]  # as ODD_NAMES, and the panel
+
+
+def srbf(*words: object) -> Result:
+    """The command line in this process; bakes run in a worker's."""
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def done(*words: object) -> Result:
+    result = srbf(*words)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def refused(words: list[object], status: int = 1) -> str:
+    """The one line of a command that fails."""
+    result = srbf(*words)
+    (line,) = [line for line in result.stderr.splitlines() if ": expected" in line or "cannot" in line]
+    assert result.exit_code == status and "Traceback" not in result.output, result.output
+    return line
+
+
+def scenes_in(folder: Path) -> Callable[[str], Path]:
+    """The .blend of a scene of light_set_scenes.py, built when first asked for."""
+
+    def build(name: str) -> Path:
+        path = folder / f"{name}.blend"
+        if not path.exists():
+            script = Path(__file__).with_name("light_set_scenes.py")
+            subprocess.run([sys.executable, str(script), name, str(path)], check=True, capture_output=True, timeout=120)
+        return path
+
+    return build
