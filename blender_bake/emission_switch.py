@@ -13,7 +13,7 @@ VALUE = "srbf on"
 EMITS = {  # nodes that emit, and the pairs of (strength, color) by which they do
     EMISSION: (("Strength", "Color"),),
     "ShaderNodeBsdfPrincipled": (("Emission Strength", "Emission Color"),),
-    "ShaderNodeVolumePrincipled": (("Emission Strength", "Emission Color"), ("Blackbody Intensity", "Blackbody Tint")),
+    "ShaderNodeVolumePrincipled": (("Emission Strength", "Emission Color"), ("Blackbody Intensity", "Blackbody Tint")),  # words: ok
 }
 
 

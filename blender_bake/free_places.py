@@ -31,7 +31,7 @@ CLOSED = 0.5  # share of places that are enclosed, from which a scene is closed
 BURIED = 12  # of the first rays from a place, from which it is in a solid if they meet the backs of faces
 FACING = 4  # of the first rays that meet the fronts of faces, and none a back: a place in the air
 TRUSTED = 0.05  # share of such places, from which faces are taken to point out of solids
-SURVEYED = 256  # places by which these are told
+SURVEYED = 256  # places that these shares are of
 SURVEY, TRAIN, RANDOM, PLACES = range(4)  # streams of random numbers
 
 

@@ -80,7 +80,7 @@ class NamedLights:
     def aim(self, name: str | None) -> None:
         """Let the light `name` alone shine, as the scene has it; None: no light. WorkerError for an unknown one."""
         if name is not None and name not in self._entries:
-            raise WorkerError(f"expected a light {name!r} in scene {self._scene.name!r}, found {_listed(self._entries)}; bake it anew")
+            raise WorkerError(f"expected a light {name!r} in scene {self._scene.name!r}, found {_listed(self._entries)}; bake it again")
         self._shine([] if name is None else [self._entries[name]])
 
     def all_on(self) -> None:

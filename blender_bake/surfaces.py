@@ -18,7 +18,7 @@ from blender_bake.without_triangles import is_only_volume
 
 MOST = 400_000  # fragments, unless the scene has more triangles
 PER_SQUARE = 6.0  # fragments per square of the longest edge, about
-SCALES = 20  # steps of scale, per factor e, within which instances are divided alike
+SCALES = 20  # steps of scale, per factor e, within which instances are divided in the same way
 
 
 @dataclass

@@ -45,7 +45,7 @@ def room_faces() -> list[np.ndarray]:
     return [*walls, *box_faces((-0.35, 0.3), (0.3, 0.3, 0.6), 0.3), *box_faces((0.4, -0.3), (0.3, 0.3, 0.3), -0.3)]
 
 
-def room(size: int, panes: np.ndarray | None = None, tint: float = 0.5, **sampling: object) -> Receivers:
+def room(size: int, panes: np.ndarray | None = None, passed: float = 0.5, **sampling: object) -> Receivers:
     """The room's lightmap of `size` squared texels; `panes` (T, 3, 3): translucent walls that are no receivers."""
     position, normal = np.zeros((size, size, 3), np.float32), np.zeros((size, size, 3), np.float32)
     coverage = np.zeros((size, size), np.float32)
@@ -70,7 +70,7 @@ def room(size: int, panes: np.ndarray | None = None, tint: float = 0.5, **sampli
     panes = np.zeros((0, 3, 3), np.float32) if panes is None else panes
     every = np.concatenate([opaque, panes])
     lightmap = np.concatenate([np.array(flat, np.float32), np.full((len(panes), 3, 2), np.nan, np.float32)])
-    curve = np.stack([np.zeros((KNOTS, 3), np.float32), np.full((KNOTS, 3), tint, np.float32)])
+    curve = np.stack([np.zeros((KNOTS, 3), np.float32), np.full((KNOTS, 3), passed, np.float32)])
     material = (np.arange(len(every)) >= len(opaque)).astype(int)
     triangles = Triangles(every, flat_normals(every), material, np.ones(len(every), bool), curve, lightmap)
     images = {"position": position, "normal": normal, "coverage": coverage}

@@ -161,7 +161,7 @@ class CaptureImages:
         every = self._clipped(light, dilate(harmonics, self._nearest))
         for k, file in enumerate(light.harmonics_files):
             own = every[:, :, 3 * k : 3 * k + 3]
-            if k == 0 and self._residual is not None:  # what shines still, alike toward all viewers
+            if k == 0 and self._residual is not None:  # what still shines, the same toward all viewers
                 own = own - self._residual * np.float32(np.sqrt(4 * np.pi))
             write_image(self._folder / file, own, "half")
 

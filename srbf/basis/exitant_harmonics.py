@@ -56,7 +56,7 @@ def projection(
 
     The functions are free below the horizon, where no viewer sees them; so a clamped cosine, which needs infinitely many terms on the
     sphere, is one term. On a hemisphere they are nearly dependent (condition of the normal equations: 250 at order 2, 6e3 at 3, 1.5e5
-    at 4): `ridge` is the weight of the energy on the whole sphere, which keeps coefficients of neighboring normals alike, and tells what
+    at 4): `ridge` is the weight of the energy on the whole sphere, which keeps coefficients of neighboring normals close, and tells what
     to do where fewer than K viewers are above the horizon. `weights` are solid angles (sr); by default all share 4 pi. With `normals`
     None the whole sphere counts, and P is 1.
     """
@@ -86,7 +86,7 @@ def lifted(viewers: Float[ndarray, "*n 3"], normals: Float[ndarray, "*n 3"]) -> 
 def projection_of_each(directions: Float[ndarray, "P S 3"], order: int, ridge: float = RIDGE) -> Float64[ndarray, "P K S"]:
     """`projection` where each receiver was seen from S directions of its own, all above it and of equal weight, with noise.
 
-    The ridge of a function of degree l is l times `ridge`: what looks alike from everywhere stays as it is.
+    The ridge of a function of degree l is l times `ridge`: what looks the same from everywhere stays as it is.
     """
     seen = harmonics(directions, order)  # (P, S, K)
     share = 4 * pi / max(seen.shape[1], 1)

@@ -99,7 +99,8 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
     told = tuple(dict.fromkeys(word for _, own, _ in owners for word in own.metadata["words"]))
     hints = {hint for _, _, hint in owners}
     if told:
-        parser = Number(words=told)
+        whole = any(int in get_args(hint) for hint in hints)
+        parser = Number(whole=True, low=1, words=told) if whole else Number(words=told)
         return Annotated[
             Any, typer.Option(_flag(entry), parser=parser, metavar="|".join((*told, "NUMBER")), help=help_text, show_default=False)
         ]

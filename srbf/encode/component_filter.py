@@ -72,12 +72,12 @@ def without_noise(
         noise = 1 / np.maximum(2 * variance[own[part]], 1e-20)
         others = values[neighbor[part]]
         apart = np.einsum("bks,bs->bk", (others - design @ fit.slopes) ** 2, noise) / values.shape[1]
-        alike = known[part] * np.exp(-SHARPNESS * np.maximum(apart - 1, 0))
+        agreeing = known[part] * np.exp(-SHARPNESS * np.maximum(apart - 1, 0))
         alone = np.einsum("bs,bs->b", (values[part] - fit.slopes[:, 0]) ** 2, noise) / values.shape[1] / (1 + fit.leverage)
         is_outlier = alone > OUTLIER
-        agreed = alike.sum(axis=1) / np.maximum(known[part].sum(axis=1), 1)
+        agreed = agreeing.sum(axis=1) / np.maximum(known[part].sum(axis=1), 1)
         whole = np.concatenate([design, np.broadcast_to([1.0, 0, 0], (len(design), 1, 3))], axis=1)
-        weight = np.concatenate([alike, np.where(is_outlier, 0.0, 1.0)[:, None]], axis=1)
+        weight = np.concatenate([agreeing, np.where(is_outlier, 0.0, 1.0)[:, None]], axis=1)
         smooth = _fit(whole, np.concatenate([others, values[part, None]], axis=1), weight).slopes[:, 0]
         chosen = enough[part] & (agreed > AGREED)
         result[part] = np.where(chosen[:, None], smooth, values[part])

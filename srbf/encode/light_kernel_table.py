@@ -1,4 +1,4 @@
-"""The article's interpolation as an asset keeps it: captured lights of each zone, merged where they are alike, and their functions."""
+"""The article's interpolation as an asset keeps it: captured lights of each zone, merged where they are similar, and their functions."""
 
 from __future__ import annotations
 
@@ -101,12 +101,12 @@ def kernel_table(
         if merge == "arithmetic":
             result[rows, : counts[zone]] = merged(values[rows], group, "arithmetic")
     if merge == "harmonic":
-        _solve_harmonic(capture, asset, groups, cluster_zone, index, covered, result)
+        _solve_harmonic(values, asset, groups, cluster_zone, index, covered, result)
     return KernelTable(result, own, counts, zones, kernel.nearest)
 
 
 def _solve_harmonic(
-    capture: Capture,
+    values: Float32[ndarray, "F L 3"],
     asset: Asset,
     groups: list[Int[ndarray, " L"]],
     cluster_zone: Int[ndarray, " C"],
@@ -114,14 +114,18 @@ def _solve_harmonic(
     covered: ndarray,
     result: Float32[ndarray, "F N 3"],
 ) -> None:
-    """Least squares of each cluster's responses, merged by the harmonic mean, on its stored components."""
-    train, size = capture.indices("train"), asset.components + 1
+    """Least squares of each cluster's responses, merged by the harmonic mean, on its stored components.
+
+    They are the asset's responses, not the captured ones: one sample that is 0 by chance would make the harmonic mean 0.
+    """
+    size = asset.components + 1
     planes = asset.coefficients().transpose(0, 3, 1, 2).reshape(-1, asset.height * asset.width)[: asset.components]
     for number, zone in enumerate(cluster_zone):
         texels = np.flatnonzero(covered & (index[: len(covered)] == number))
         if not len(texels):
             continue
-        rows = merged(capture.sample(train, texels), groups[zone], "harmonic")  # (n, G, 3)
         design = np.concatenate([np.ones((1, len(texels))), planes[:, texels].astype(np.float64)])
+        fitted = np.einsum("sn,slc->nlc", design, values[number * size : (number + 1) * size].astype(np.float64), optimize=True)
+        rows = merged(np.maximum(fitted, 0), groups[zone], "harmonic")  # (n, G, 3)
         solved = np.linalg.pinv(design @ design.T, rcond=1e-9, hermitian=True) @ (design @ rows.reshape(len(texels), -1))
         result[number * size : (number + 1) * size, : rows.shape[1]] = solved.reshape(size, -1, 3)

@@ -14,7 +14,7 @@ from srbf.arrays import Float32, Float64
 class MixedSpace:
     """Sampled rows as n vectors of 3 V numbers, X (T - mean), X (V, L) the mixtures; mean (L, 3) of the sample.
 
-    Noise of single images averages out in mixtures, and what is alike under all virtual lights costs no component.
+    Noise of single images averages out in mixtures, and what is the same under all virtual lights costs no component.
     """
 
     mixtures: Float64[ndarray, "V L"]

@@ -195,7 +195,7 @@ def evaluate(
     True
     """
     if direct != "none" and capture.transport == "indirect":  # train lights inside the scene have no direct images
-        roles = [role for role in roles if capture.has_direct_of([role])]
+        roles = [role for role in roles if capture.indices(role) and capture.has_direct_of([role])] or roles
     reference, peak_source = _references(asset, capture, direct, roles)
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")

@@ -19,7 +19,7 @@ PLACES = 24  # of the cloud, over which the weights of no light in particular ar
 
 
 def weights_shape(asset: Asset) -> tuple[int, int]:
-    """(rows, columns) of the texture of weights: a row a cluster, the mean's weight first; of maps one row."""
+    """(rows, columns) of the texture of weights: a row per cluster, the mean's weight first; of maps one row."""
     return (asset.clusters, asset.components + 1) if "scalars" in asset.manifest else (1, len(asset.stored))
 
 

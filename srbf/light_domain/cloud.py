@@ -15,7 +15,7 @@ from srbf.errors import InputError
 from srbf.light_domain.protocol import LightDomain
 from srbf.lights import AreaLight, Falloff, Light, PointLight
 
-MARGIN = 0.1  # of a box's longest side, m: a light this far outside the places is told of
+MARGIN = 0.1  # of a box's longest side, m: a light this far outside the places is reported
 
 
 def isotropic(light: Light) -> PointLight:

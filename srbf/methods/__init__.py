@@ -174,7 +174,7 @@ def radiance_to(asset: Asset, lights: Sequence[Light], viewer: tuple[float, floa
     Raises
     ------
     InputError
-        On an asset that looks alike from everywhere.
+        On an asset that looks the same from everywhere.
 
     Examples
     --------

@@ -52,6 +52,8 @@ class GlossyCloud(LightTableMaps):
         Between captured lights; `auto`: the one that predicts left-out lights better, `kernel` for combined transport.
     nearest
         kernel: how many captured lights carry a light.
+    smooth
+        Average components over neighbors on the surface that differ by no more than the capture's noise.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
     seed
@@ -84,6 +86,7 @@ class GlossyCloud(LightTableMaps):
     components: int = setting(16, "How many numbers per texel.")
     interpolation: Interpolation = setting("auto", "Between captured point lights; auto: what predicts left-out lights better.")
     nearest: int = setting(NEAREST, "kernel: captured lights that carry a light.")
+    smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     seed: int = 0
 

@@ -55,7 +55,7 @@ class LightCloud(LightTableMaps):
     zones
         kernel: parts of the scene, with merged lights and clusters of their own.
     merge
-        kernel: lights that are alike in a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
+        kernel: similar lights of a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
     merged
         kernel: how many lights are left in each zone; `auto`: all pairs of a merged light are nearer than 1 in the article's metric.
     smooth
@@ -86,7 +86,7 @@ class LightCloud(LightTableMaps):
     interpolation: Interpolation = setting("auto", "Between captured point lights; auto: what predicts left-out lights better.")
     nearest: int = setting(NEAREST, "kernel: captured lights that carry a light.")
     zones: int = setting(1, "kernel: parts of the scene with merged lights of their own.")
-    merge: Literal["none"] | Mean = setting("none", "kernel: how lights that are alike in a zone become one.")
+    merge: Literal["none"] | Mean = setting("none", "kernel: how similar lights of a zone become one.")
     merged: Literal["auto"] | int = setting("auto", "kernel: lights left in each zone.", words=("auto",))
     smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")

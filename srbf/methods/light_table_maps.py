@@ -1,4 +1,4 @@
-"""Component maps whose functions are a table: a value per function and captured light (or patch), weighed once a frame.
+"""Component maps whose functions are a table: a value per function and captured light (or patch), weighed once per frame.
 
 What light mixing and the light cloud share. A frame's lights become one weight per function and color on the CPU, by one small matrix
 product; a texel then costs the same under any number of lights, and the shader is that of distant lights.
@@ -130,7 +130,7 @@ def encode_table(
         parts,
         refinement(capture) if method.smooth else lambda projected, index: projected,
     )
-    clusters = max(1, clusters, 0 if found.cluster_zone is None else len(found.cluster_zone))
+    clusters = clusters if found.cluster_zone is None else len(found.cluster_zone)
     own = stored_components(capture, method.encoding, found.components, found, run.stitch)
     assert own.index is not None
     if clusters == 1:

@@ -134,7 +134,7 @@ class Method(ABC):
     def radiance_to(cls, asset: Asset, lights: Sequence[Light], viewer: tuple[float, float, float]) -> Float32[ndarray, "H W 3"]:
         """`linear_response` as seen from a place (m) in the asset's frame; InputError where the asset knows one viewer alone."""
         raise InputError(
-            f"expected an asset of glossy surfaces for `viewer`, found a {cls.name} one, which looks alike from everywhere; "
+            f"expected an asset of glossy surfaces for `viewer`, found a {cls.name} one, which looks the same from everywhere; "
             "bake with `light_set=cloud` and `gloss=3`, and fit that"
         )
 

@@ -45,7 +45,7 @@ def adaptive_cluster(
     k-means (Lloyd) first. Then in each iteration the mean and the eigenvalues of each cluster's scatter are found, axes are given one by
     one to the cluster of the largest eigenvalue n + 1 over its number of vectors, that is the error that the axis saves per vector, and
     vectors are reassigned with these numbers of axes. The average grows evenly over `iterations`; then vectors are reassigned until none
-    changes its cluster, at most as often again. The article only adds axes; here each iteration gives all of them anew, because
+    changes its cluster, at most as often again. The article only adds axes; here each iteration gives all of them again, because
     vectors move to clusters with many axes, and the average would end above `axes` (by 1 to 11 % where vectors have no clusters).
     Assignment uses `features` only, an orthonormal map that keeps most of the vectors' energy; the final means and axes use the complete
     vectors. Cost of an iteration: C eigenproblems of D^3, and the assignment.

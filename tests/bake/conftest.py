@@ -2,33 +2,19 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from building import ROOT, built
 from surfaces import check_normals
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 
-ROOT = Path(__file__).parents[2]
-SCENES = ROOT / "data" / "scenes"
 sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them in
-
-
-def built(script: str, folder: Path) -> Callable[[str], Path]:
-    """The .blend of a named scene of a script of data/scenes, built when first asked for."""
-
-    def build(name: str) -> Path:
-        path = folder / f"{name}.blend"
-        if not path.exists():
-            subprocess.run([sys.executable, str(SCENES / script), name, str(path)], check=True, capture_output=True, timeout=120)
-        return path
-
-    return build
 
 
 @pytest.fixture(scope="session")

@@ -97,7 +97,7 @@ def test_places_are_in_the_rooms_off_their_walls() -> None:
     assert facts["open_share"] == 0
 
 
-def test_an_open_scene_keeps_what_sees_the_sky() -> None:
+def test_an_open_scene_keeps_what_sees_no_surface() -> None:
     facts = ask("open", places=300)
     points = np.array(facts["places"])
     assert (points[:, 2] > 2).any() and ((points[:, 0] > 3.5) & (points[:, 1] > 1.7)).any()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bpy_process import in_blender
-from conftest import built
+from building import built
 from faults import contents
 from typer.testing import CliRunner
 
@@ -57,7 +57,8 @@ def receiver_of(scene: Any, name: str, viewers: Any) -> Any:
         def warn(self, message: str) -> None:
             """Do nothing."""
 
-    return VertexReceiver(scene, {**job, "quantity": "radiance", "transport": "combined", "viewers": viewers}, Silent())
+    events: Any = Silent()
+    return VertexReceiver(scene, {**job, "quantity": "radiance", "transport": "combined", "viewers": viewers}, events)
 
 
 def directions_that_a_bake_takes(viewers: list[list[float]]) -> dict[str, Any]:
@@ -188,6 +189,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built("../../tests/bake/light_set_scenes.py", tmp_path_factory.mktemp("scenes"))("room")
 
 
+@pytest.mark.slow
 @pytest.mark.blender
 @pytest.mark.parametrize(
     "flags", [["--receiver", "vertices:Crate", "--transport", "indirect"], ["--receiver", "lightmap:Walls", "--size", "8"]]

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-SCENES = Path(__file__).parents[2] / "data" / "scenes"
+from building import SCENES
 
 pytestmark = pytest.mark.blender
 

@@ -43,6 +43,10 @@ RENAME = """
 import bpy, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 bpy.data.objects["Table"].name = sys.argv[2]
+for name, kind in (("Desk light", "POINT"), ("Window", "AREA")):
+    light = bpy.data.objects.new(name, bpy.data.lights.new(name, kind))
+    light.data.energy, light.location = 50, (0.3, 0.2, 1)
+    bpy.context.scene.collection.objects.link(light)
 bpy.ops.wm.save_as_mainfile(filepath=sys.argv[3])
 """
 FRAMES = {"frames": [{"lights": [{"kind": "directional", "direction": [0, 0.5, 1], "color": [1, 1, 1]}]}, {"lights": []}]}

@@ -81,7 +81,7 @@ def test_grazing_light_does_not_shade_its_plane(context: Any) -> None:
 
 def test_panes_multiply_by_their_transmittance(context: Any) -> None:
     pane = quad([-0.5, -0.5, 0.9], [0.5, -0.5, 0.9], [0.5, 0.5, 0.9], [-0.5, 0.5, 0.9])
-    receivers = room(64, np.concatenate([pane, pane + np.array([0, 0, 0.1], np.float32)]), tint=0.5)
+    receivers = room(64, np.concatenate([pane, pane + np.array([0, 0, 0.1], np.float32)]), passed=0.5)
     covered = receivers.images["coverage"] > 0
     rays = RayTracer(receivers)
     with ShadowMapper(receivers, context=context) as mapper:

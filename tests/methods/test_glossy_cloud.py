@@ -18,6 +18,7 @@ from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.viewer_errors import viewer_errors
 from srbf.fitting.options import fit, method_for
 from srbf.io import files
+from srbf.io.image import write_image
 from srbf.lights import PointLight, SphereLight, SpotLight
 from srbf.methods import linear_response, projected_weights, radiance_to, relight
 from srbf.methods.glossy_cloud import GlossyCloud
@@ -85,6 +86,7 @@ def test_errors_toward_viewers_are_measured(asset: Asset, capture: Capture) -> N
     assert asset.bytes_per_texel()["point"] == 17
 
 
+@pytest.mark.slow
 def test_lambert_looks_alike_from_everywhere(tmp_path: Path) -> None:
     asset = GlossyCloud(clusters=6, components=12).encode(glossy_room(tmp_path / "capture", BOX, 40, gloss=0.0))
     lights = [light((1.2, 0.9, 1.1))]
@@ -131,6 +133,7 @@ def test_seen_from_above_is_seen_along_the_normals(asset: Asset) -> None:
     np.testing.assert_array_equal(GlossyCloud.toward(asset, weights, asset.images["normal"]), linear_response(asset, lights))
 
 
+@pytest.mark.slow
 def test_it_is_chosen_where_the_capture_has_harmonics(capture: Capture) -> None:
     assert method_for(capture) == GlossyCloud()
     assert method_for(capture, None, {"clusters": 8}) == GlossyCloud(clusters=8)
@@ -138,6 +141,7 @@ def test_it_is_chosen_where_the_capture_has_harmonics(capture: Capture) -> None:
     assert fit(capture, clusters=4, components=4).method == "glossy-cloud"
 
 
+@pytest.mark.slow
 def test_a_combined_capture_has_no_walls(capture: Capture, tmp_path: Path) -> None:
     shutil.copytree(capture.folder, tmp_path / "combined")
     manifest = files.read_json(tmp_path / "combined" / "capture.json")
@@ -184,3 +188,12 @@ def test_a_light_that_lacks_harmonics_is_refused(capture: Capture, tmp_path: Pat
         Capture.open(tmp_path / "broken")
     assert capture.harmonics(0).shape == (16, capture.height, capture.width, 3)
     assert len(capture.of_harmonics().lights) == 16 * len(capture.lights)
+
+
+def test_seams_are_closed(capture: Capture, tmp_path: Path) -> None:
+    shutil.copytree(capture.folder, tmp_path / "seams")
+    manifest = files.read_json(tmp_path / "seams" / "capture.json")
+    write_image(tmp_path / "seams" / "seams.exr", np.array([[[0.1, 0.1, 0.4, 0.1, 0.5, 0.6, 0.8, 0.6]]], np.float32), "float")
+    files.write_json(tmp_path / "seams" / "capture.json", {**manifest, "seams": "seams.exr"})
+    asset = fit(Capture.open(tmp_path / "seams"), clusters=4, components=8, interpolation="kernel", method="glossy-cloud")
+    assert 0 < asset.manifest["seams"]["after"] < asset.manifest["seams"]["before"]

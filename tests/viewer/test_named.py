@@ -67,7 +67,7 @@ def test_the_desk_mixes_and_the_address_keeps_it(chromium: Any, asset: Mixed, ur
     opened(chromium, url)
     assert shows(chromium, asset, {})
     assert chromium.state()["lights"] == []
-    field(chromium, "Desk lamp: intensity", "50")  # a quarter: the dial is finer near zero
+    field(chromium, "Desk lamp: intensity", "50")  # a quarter: the dial is finer near zero # words: ok
     field(chromium, "Window: intensity, a number", "2.5")
     field(chromium, "Window: color", "#00ff00")
     field(chromium, "TV: on", False)
@@ -122,7 +122,7 @@ def test_keys_reach_every_control(chromium: Any, desk: Mixed) -> None:
         chromium("press", keys=["Tab"])
         if chromium("run", script="document.activeElement.type") == "range":
             break
-    assert chromium("run", script="document.activeElement.getAttribute('aria-label')") == "Desk lamp: intensity"
+    assert chromium("run", script="document.activeElement.getAttribute('aria-label')") == "Desk lamp: intensity"  # words: ok
     chromium("press", keys=["Home"])
     assert shows(chromium, desk, {"Desk lamp": (0.0, 0.0, 0.0)})
     chromium("press", keys=["End"])
@@ -152,14 +152,14 @@ def test_wrong_frames_and_addresses_are_said_in_one_line(chromium: Any, desk: Mi
     for text, expected in {
         "{": "expected JSON in FRAMES.json",
         '{"frames": []}': "expected a list of frames",
-        '{"frames": [{"lights": [{"kind": "named", "name": "Lamp"}]}]}': 'expected a light of this asset, found "Lamp"',
+        '{"frames": [{"lights": [{"kind": "named", "name": "Lamp"}]}]}': 'expected a light of this asset, found "Lamp"',  # words: ok
         '{"frames": [{"lights": [{"kind": "point", "position": [0, 0, 1]}]}]}': "expected named lights for this asset, found a point one",
         '{"frames": [{"lights": [{"kind": "named", "name": "TV", "color": [1, 2]}]}]}': "expected three numbers of color in frame 0",
     }.items():
         chromium("drop", name="FRAMES.json", bytes=base64.b64encode(text.encode()).decode())
         assert expected in chromium("run", script="document.getElementById('toast').textContent")
     went = "addEventListener('hashchange', () => done(), {once: true})"
-    other = "#{'lights':[{'kind':'named','name':'Lamp','on':true,'color':'@ffffff','intensity':1}]}".replace("@", "%23")
+    other = "#{'lights':[{'kind':'named','name':'Lamp','on':true,'color':'@ffffff','intensity':1}]}".replace("@", "%23")  # words: ok
     chromium("run", script=f"new Promise((done) => {{ {went}; location.hash = {json.dumps(other)}; }})")
-    assert 'found "Lamp"; the page uses its defaults' in chromium("run", script="document.getElementById('toast').textContent")
+    assert 'found "Lamp"; the page uses its defaults' in chromium("run", script="document.getElementById('toast').textContent")  # words: ok
     assert shows(chromium, desk, {})

@@ -23,7 +23,7 @@ ENGINES = {
     "babylon": ("babylon-material", {"rightHanded": True}),
     "playcanvas": ("playcanvas-material", {}),
 }
-# Desk lamp dimmed, the window recolored, the TV off; the others as designed.
+# Desk lamp dimmed, the window recolored, the TV off; the others as designed. # words: ok
 MIX = {"Desk lamp": (0.25, (1.0, 1.0, 1.0)), "Window": (2.0, (1.0, 0.9, 0.3)), "TV": (0.0, (1.0, 1.0, 1.0))}
 COLORS = {name: tuple(intensity * c for c in color) for name, (intensity, color) in MIX.items()}
 
@@ -63,8 +63,8 @@ def test_clusters_are_mixed_between_texels_by_their_light(browser: Any, served: 
 def test_an_unknown_name_and_other_lights_are_refused_in_one_line(browser: Any, served: dict[str, tuple[Mixed, str]]) -> None:
     _, url = served["clusters"]
     job = {"asset": url, "color": ALBEDO, "half": HALF_EXTENT, "material": "MeshLambertMaterial"}
-    error = browser.response("three-material", **job, named=[["Lamp", 1, [1, 1, 1]]])["error"]
-    assert '"Desk lamp"' in error and 'found "Lamp"; was it renamed after the bake?' in error
+    error = browser.response("three-material", **job, named=[["Lamp", 1, [1, 1, 1]]])["error"]  # words: ok
+    assert '"Desk lamp"' in error and 'found "Lamp"; was it renamed after the bake?' in error  # words: ok
     sun = browser.response(
         "three-material", **job, follow=[{"type": "DirectionalLight", "color": (1, 1, 1), "intensity": 1, "position": (1, 1, 1)}]
     )
