@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
@@ -23,6 +23,7 @@ FEATURES = 48  # numbers per texel by which it finds its cluster
 Refine = Callable[[ndarray, ndarray], ndarray]
 
 
+@runtime_checkable
 class RowSpace(Protocol):
     """Rows of T as n vectors of M numbers that can be compared, and the way back: see `weighted_rows.LightSpace`."""
 

@@ -7,13 +7,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from building import ROOT, built
+from building import ROOT, SCENES, built
 from surfaces import check_normals
 
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.settings import BakeSettings, Receiver
 from srbf.capture import Capture
 
+__all__ = ["ROOT", "SCENES", "built"]
 sys.path.insert(0, str(ROOT / "benchmarks"))  # faults, for tests that put them in
 
 
