@@ -194,7 +194,9 @@ def evaluate(
     >>> errors["holdout"]["psnr"] > 20  # dB
     True
     """
-    if direct != "none" and capture.transport == "indirect":  # train lights inside the scene have no direct images
+    if (
+        direct != "none" and capture.transport == "indirect" and capture.kind != "directional"
+    ):  # train lights inside the scene have no direct images
         roles = [role for role in roles if capture.indices(role) and capture.has_direct_of([role])] or roles
     reference, peak_source = _references(asset, capture, direct, roles)
     if (asset.width, asset.height) != (capture.width, capture.height):

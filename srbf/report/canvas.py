@@ -138,6 +138,6 @@ def gain_text(gain: float) -> str:
     return f"exposure ×{gain:.3g} ({np.log2(gain):+.1f} EV)"
 
 
-def place_text(position: Sequence[float]) -> str:
+def place_text(position: Sequence[float] | ndarray) -> str:
     """A position in meters, rounded to centimeters, without a negative zero."""
     return "(" + ", ".join(f"{round(v, 2) + 0.0:.2f}" for v in position) + ")"

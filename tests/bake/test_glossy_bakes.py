@@ -11,6 +11,7 @@ import pytest
 from bpy_process import in_blender
 from building import built
 from faults import contents
+from made_places import places_of
 from typer.testing import CliRunner
 
 from srbf.bake.light_sets import CloudSet, NamedSet
@@ -223,11 +224,7 @@ def test_a_dry_run_counts_harmonics(room: Path, tmp_path: Path) -> None:
 
 
 def test_planned_lights_name_their_harmonics() -> None:
-    class Found:
-        train = np.zeros((2, 3))
-        random = np.zeros((1, 3))
-
-    known = CloudSet("cloud", 2, found=Found())  # type: ignore[arg-type]
+    known = CloudSet("cloud", 2, found=places_of(lights=2, tested=1))
     settings = BakeSettings(Receiver("vertices", "A"), light_set=known, quantity="radiance", gloss=1, validation=0, holdout=1)
     lights = plan_lights(settings)
     assert [light.parts for light in lights] == [("response", "toward")] * 3

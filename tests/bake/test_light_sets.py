@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
+from made_places import BOX, places_of
 
-from srbf.bake.light_sets import CloudSet, FoundPlaces, NamedSet, parse_light_set
+from srbf.bake.light_sets import CloudSet, NamedSet, parse_light_set
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.errors import InputError
-from srbf.visibility.patches import Patches
-from srbf.visibility.surface_cells import Cells, Fragments
 
-BOX = (0.0, 0.0, 0.0, 2.0, 2.0, 2.0)
 LIGHTMAP = Receiver("lightmap", "Floor")
-
-
-def found(lights: int = 5, tested: int = 6) -> FoundPlaces:
-    rng = np.random.default_rng(2)
-    image = rng.uniform(0.1, 1, (2, 12, 4)).astype(np.float32)
-    image[1, :, 3] = np.arange(12) % 4
-    corners = rng.uniform(0, 2, (30, 3, 3)).astype(np.float32)
-    patches = Patches(Cells.of_image(image), Fragments(corners, np.full((30, 3), 0.5, np.float32)), np.arange(30) % 4)
-    return FoundPlaces(rng.uniform(0, 2, (lights, 3)), rng.uniform(0, 2, (tested, 3)), rng.uniform(0, 2, (9, 3)), BOX, patches)
 
 
 def test_flags_mean_a_set() -> None:
@@ -64,7 +52,7 @@ def test_settings_that_exclude_each_other(settings: dict, words: str) -> None:
 
 def test_lights_of_patches_are_tested_by_point_lights() -> None:
     settings = BakeSettings(
-        LIGHTMAP, transport="indirect", light_set=CloudSet("patches", 4, found=found()), validation=2, holdout=3, holdout_samples=9
+        LIGHTMAP, transport="indirect", light_set=CloudSet("patches", 4, found=places_of()), validation=2, holdout=3, holdout_samples=9
     )
     lights = plan_lights(settings)
     assert [light.placed.json() for light in lights[:4]] == [{"kind": "patch", "patch": k} for k in range(4)]
@@ -75,7 +63,7 @@ def test_lights_of_patches_are_tested_by_point_lights() -> None:
 
 
 def test_a_cloud_without_direct_light_renders_one_image_of_each_light() -> None:
-    cloud = CloudSet("cloud", 5, found=found())
+    cloud = CloudSet("cloud", 5, found=places_of())
     apart = plan_lights(BakeSettings(LIGHTMAP, transport="indirect", light_set=cloud, validation=0, holdout=1))
     assert [light.parts for light in apart] == [("indirect",)] * 5 + [("response", "direct")]
     whole = plan_lights(BakeSettings(LIGHTMAP, light_set=cloud, validation=0, holdout=1))
@@ -89,7 +77,7 @@ def test_named_lights_are_all_there_are() -> None:
 
 
 def test_a_set_is_found_again_by_its_key_alone(tmp_path: Path) -> None:
-    known, path = CloudSet("cloud", 5, found=found()), tmp_path / "light_set.npz"
+    known, path = CloudSet("cloud", 5, found=places_of()), tmp_path / "light_set.npz"
     known.write(path, known.key("scene", 6, 1))
     again = CloudSet("cloud", 5).read(path, known.key("scene", 6, 1))
     assert again.is_known and again.record() == known.record()

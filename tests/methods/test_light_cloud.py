@@ -167,7 +167,6 @@ def test_bytes_are_kept(patches: Capture) -> None:
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"interpolation": "nearest"}, "auto, fingerprint, kernel"),
         ({"zones": 4}, "`zones` and `merge` with `interpolation=kernel`"),
         ({"interpolation": "kernel", "merged": 0}, "`merged` auto or 1 or more"),
         ({"nearest": 0}, "1 or more `nearest`"),
