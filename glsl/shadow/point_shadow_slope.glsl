@@ -8,5 +8,5 @@
 vec2 srbfPointShadowSlope(vec3 fromLight, vec3 normal, vec3 across, vec3 up, float steepest) {
     float offset = dot(normal, fromLight);
     offset = abs(offset) < 1e-9 ? (offset < 0.0 ? -1e-9 : 1e-9) : offset;
-    return clamp(vec2(dot(normal, across), dot(normal, up)) / offset, -steepest, steepest);
+    return clamp(vec2(dot(normal, across), dot(normal, up)) / offset, vec2(-steepest), vec2(steepest));
 }

@@ -70,7 +70,7 @@ def test_every_kind_of_light_is_relit_and_saved(chromium: Any, made: Room, url: 
     assert [light["kind"] for light in saved] == ["point", "spot", "sphere", "area"]
     assert shows(chromium, made, [{"radius": 1e-3, **light} for light in saved])
     for light, of_kind in zip(saved, (PointLight, SpotLight, SphereLight, AreaLight), strict=True):
-        of_kind(**{key: value for key, value in light.items() if key != "kind"})
+        of_kind(**{key: tuple(value) if isinstance(value, list) else value for key, value in light.items() if key != "kind"})
 
 
 def test_frames_move_lights_through_the_room(chromium: Any, made: Room, url: str) -> None:
