@@ -1,8 +1,8 @@
 """Noise of a capture taken out of its components: planes through neighbors on the surface, where they agree within the noise.
 
 Images of few samples leave grain in the components of single texels. What the median texel differs by from a plane through its neighbors
-is noise: the slopes of light are no part of it. A texel whose neighbors lie on one plane within that noise gets the plane's value, fitted
-again by those that do; elsewhere, at edges, it stays. A texel that its neighbors contradict is replaced by them. So grain goes and edges
+is noise: the slopes of light are no part of it. Where the neighbors lie on one plane within that noise, a value becomes the plane's, fitted
+again by those that do; elsewhere, at edges, it stays. A value that its neighbors contradict is replaced by theirs. So grain goes and edges
 stay, as in non-local means of a known variance, and where there is no noise next to nothing changes [Buades2005; Takeda2007].
 """
 
@@ -20,7 +20,7 @@ NORMAL_SCALE = 8.0  # texel sizes: how far away a neighbor counts for facing els
 REACH = 4.0  # texel sizes: neighbors farther away are none
 SHARPNESS = 2.0  # how fast a neighbor's weight falls beyond the noise
 AGREED = 0.5  # share of the neighbors that must lie on the plane
-OUTLIER = 8.0  # squared distance from the neighbors' plane, over that of noise, from which a texel is contradicted
+OUTLIER = 8.0  # squared distance from the neighbors' plane, over that of noise, from which a value is contradicted
 STEADY = 1e-3  # added to the normal equations: a row of neighbors gives no slope across
 MEDIAN = 0.4549  # of the square of a normal variable of variance 1
 BATCH = 1 << 15

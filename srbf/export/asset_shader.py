@@ -28,7 +28,7 @@ WEIGHTED = {
 }
 _WEIGHTED_GLSL = {
     "relighting_map": """
-/* All lights of this asset: a texel of weights per map, in one row. */
+/* All lights of this asset: one row of weights, one texel for each map. */
 vec3 srbfAssetDirectional(highp sampler2DArray layers, vec2 uv, float level, highp sampler2D weights) {
     return srbfCombineWeighted(layers, uv, level, 0, weights, srbfScale, srbfBias);
 }
@@ -66,7 +66,7 @@ class AssetShader:
 
 
 def by_weights_alone(asset: Asset) -> bool:
-    """Whether every light enters through the weights of a frame, so that a texel costs the same under any number of lights."""
+    """Whether every light enters through the weights of a frame, so that the cost per texel is the same under any number of lights."""
     return not method_of(asset).local_lights([PointLight((0.0, 0.0, 0.0))])
 
 

@@ -90,7 +90,10 @@ def method_for(
     chosen = method_named(name)
     kind = domain_of_capture(capture, settings.get("domain", "auto")).kind
     if kind not in chosen.domains:
-        raise InputError(f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}")
+        raise InputError(
+            f"expected a capture in the light domain {' or '.join(chosen.domains)} for method {name}, found {kind}; "
+            "bake with another `light_set`, or fit with another method"
+        )
     for receiver in (capture.manifest.get("receiver"), *capture.manifest.get("receivers", [])):
         if receiver is not None and receiver["kind"] not in chosen.receivers:
             raise InputError(f"expected a capture of {' or '.join(chosen.receivers)} for method {name}, found {receiver['kind']}")

@@ -13,19 +13,19 @@ from srbf.arrays import Float32, Float64
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.light_domain.protocol import LightDomain
-from srbf.lights import AreaLight, Falloff, Light, PointLight
+from srbf.lights import AreaLight, Falloff, Light, PointLight, SpotLight
 
 MARGIN = 0.1  # of a box's longest side, m: a light this far outside the places is reported
 
 
 def isotropic(light: Light) -> PointLight:
     """A point or sphere light of inverse-square falloff, InputError for others: all that a cloud of captured point lights can be."""
-    if type(light).__name__ not in ("PointLight", "SphereLight") or light.falloff != "inverse-square":  # type: ignore[union-attr]
+    if not isinstance(light, PointLight) or isinstance(light, SpotLight) or light.falloff != "inverse-square":
         raise InputError(
             "expected point lights of inverse-square falloff for a cloud of captured point lights or without embreex, found another; "
             "capture patches for any light, and install embreex"
         )
-    return light  # type: ignore[return-value]
+    return light
 
 
 @dataclass(frozen=True)

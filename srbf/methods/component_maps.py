@@ -76,12 +76,16 @@ class ComponentMaps(Method):
 
     @classmethod
     def gl_passes(cls) -> type[Passes]:
+        if not cls.has_shader:
+            return super().gl_passes()
         from srbf.gl.coefficient_maps import ComponentPasses
 
         return ComponentPasses
 
     @classmethod
     def shader_parts(cls, asset: Asset, pairs: bool = False) -> ShaderParts:
+        if not cls.has_shader:
+            return super().shader_parts(asset, pairs)
         defines = {
             "SRBF_COMPONENTS": asset.components,
             "SRBF_LAYERS": len(asset.scale),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, get_args
+from typing import Any, ClassVar, get_args
 
 import numpy as np
 from numpy import ndarray
@@ -21,12 +21,9 @@ from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel, all_visible
 from srbf.lights import Light, PointLight
 from srbf.methods.component_maps import check_layers, read_cluster_index
 from srbf.methods.light_table_maps import LightTableMaps, check_table_settings, encode_table, stored_values
-from srbf.methods.protocol import QUIET, FitRun, Method, ShaderParts, setting
+from srbf.methods.protocol import QUIET, FitRun, setting
 from srbf.sphere import fibonacci
 from srbf.visibility.cloud_lights import CloudLights, Interpolation, chosen_interpolation, unseen_lights
-
-if TYPE_CHECKING:
-    from srbf.gl.passes import Passes
 
 MOST_COLUMNS = 768  # harmonics of lights that are compared one by one; of more, so many random mixtures are
 JUDGES = 8  # viewers by which ways of interpolation are compared
@@ -260,14 +257,6 @@ class GlossyCloud(LightTableMaps):
     def summary(cls, asset: Asset) -> str:
         lights = asset.tables["light_values"].shape[1]
         return f"{lights} point lights, {_terms(asset)} harmonics of the viewer, {asset.clusters} clusters of {asset.components} components"
-
-    @classmethod
-    def gl_passes(cls) -> type[Passes]:
-        return Method.gl_passes.__func__(cls)  # type: ignore[attr-defined]
-
-    @classmethod
-    def shader_parts(cls, asset: Asset, pairs: bool = False) -> ShaderParts:
-        return Method.shader_parts.__func__(cls, asset, pairs)  # type: ignore[attr-defined]
 
 
 def _terms(asset: Asset) -> int:

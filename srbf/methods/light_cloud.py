@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -164,13 +164,6 @@ class LightCloud(LightTableMaps):
         asset.manifest |= places.manifest()
         asset.tables |= places.tables()
         return asset
-
-    def __str__(self) -> str:
-        return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
-
-    def on_sample(self, ratio: float) -> LightCloud:
-        """As many texels per cluster as there will be."""
-        return replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))
 
     @classmethod
     def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[LightCloud]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -95,13 +95,6 @@ class LightMix(LightTableMaps):
         12
         """
         return encode_table(self, capture, run, mixes(len(capture.indices("train"))), self.clusters, self.seed)
-
-    def __str__(self) -> str:
-        return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
-
-    def on_sample(self, ratio: float) -> LightMix:
-        """As many texels per cluster as there will be."""
-        return self if self.clusters == 1 else replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))
 
     @classmethod
     def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[LightMix]:

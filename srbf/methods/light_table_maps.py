@@ -1,7 +1,7 @@
 """Component maps whose functions are a table: a value per function and captured light (or patch), weighed once per frame.
 
 What light mixing and the light cloud share. A frame's lights become one weight per function and color on the CPU, by one small matrix
-product; a texel then costs the same under any number of lights, and the shader is that of distant lights.
+product; the cost per texel is then the same under any number of lights, and the shader is that of distant lights.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any, ClassVar, get_args
+from typing import Any, ClassVar, Self, get_args
 
 import numpy as np
 from numpy import ndarray
@@ -48,7 +48,15 @@ class LightTableMaps(ComponentMaps):
     tables: ClassVar[dict[str, str]] = {"light_values": VALUES_FILE, "cluster_index": "cluster_index.png"}
     filterable: ClassVar[bool] = False
 
+    clusters: int
     smooth: bool = True  # take the noise of few samples out of the components
+
+    def __str__(self) -> str:
+        return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
+
+    def on_sample(self, ratio: float) -> Self:
+        """As many texels per cluster as there will be."""
+        return self if self.clusters == 1 else replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))  # type: ignore[type-var]
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:

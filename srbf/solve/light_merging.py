@@ -46,11 +46,6 @@ class MergeTree:
         heights = np.append(np.sort(self.steps[:, 2]), np.inf)
         return self.groups(float(heights[max(0, len(heights) - count)]))
 
-    def threshold(self, count: int) -> float:
-        """The threshold that `into` cuts at."""
-        heights = np.append(np.sort(self.steps[:, 2]), np.inf)
-        return float(min(heights[max(0, len(heights) - count)], self.limit))
-
 
 def merge_tree(
     positions: Float[ndarray, "L 3"],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -24,7 +25,8 @@ def in_blender(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
         command = [sys.executable, __file__, function.__code__.co_filename, function.__name__, json.dumps(arguments), str(out)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # what the test's module finds, it finds here
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
         with np.load(out) as arrays:
             return dict(arrays)

@@ -61,7 +61,7 @@ def received(made: Room, light: dict[str, Any]) -> np.ndarray:
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_weights_are_those_of_rays_against_every_triangle(browser: Any, made: Room, url: str, kind: str) -> None:
     said = browser.response("host", asset=url, raw=LIGHTS[kind])
-    assert said["pointLights"] == [], "a texel costs the same whatever the number of lights"
+    assert said["pointLights"] == [], "the cost per texel is the same for any number of lights"
     each = np.sum([received(made, light) for light in LIGHTS[kind]], axis=0)
     expected = made.weights(each)
     np.testing.assert_allclose(np.reshape(said["weights"], (-1, 3)), expected, atol=CLOSE * np.abs(expected).max())

@@ -1,4 +1,4 @@
-/** Scalar coefficient maps, four per layer, that are summed under projected weights alone: whatever the lights are, a texel costs the same. */
+/** Scalar coefficient maps, four per layer, that are summed under projected weights alone: the cost per texel is the same for any number of lights. */
 import { SrbfError } from "./errors";
 import type { AssetFiles } from "./files";
 import { type ByteImage, checkSize } from "./image";
