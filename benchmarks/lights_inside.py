@@ -99,13 +99,15 @@ def rendered(scene: Path, capture: Capture, lights: list[Light], samples: int) -
 def row(relit: np.ndarray, first: np.ndarray, second: np.ndarray) -> str:
     """One line of the table; arrays (N, n, 3)."""
     products, power = (relit - first) * (relit - second), first * second
+    lit = power.sum(axis=(1, 2)) > 0  # a light that reaches no receiver has no relative error
+    products, power = products[lit], power[lit]
     by_light = np.sqrt(np.maximum(products.sum(axis=(1, 2)) / power.sum(axis=(1, 2)), 0))
     pooled = np.sqrt(max(products.sum() / power.sum(), 0))
     trimmed = []
     for own, whole in zip(products.sum(axis=2), power.sum(axis=2), strict=True):
         kept = np.argsort(np.abs(own))[: int(0.99 * len(own))]
         trimmed.append(np.sqrt(max(own[kept].sum() / whole[kept].sum(), 0)))
-    noise = np.sqrt(((first - second) ** 2).sum() / 2 / power.sum())
+    noise = np.sqrt(((first - second)[lit] ** 2).sum() / 2 / power.sum())
     energy = relit.sum() / ((first.sum() + second.sum()) / 2)
     return f"{pooled:8.3f}{by_light.mean():8.3f}{by_light.max():8.3f}{np.mean(trimmed):14.3f}{energy:9.3f}{noise:8.3f}"
 

@@ -9,10 +9,8 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from blender_bake.ipc import WorkerError
-from blender_bake.receiver_objects import select
+from blender_bake.vertex_albedo import ATTRIBUTE, bake_colors, corner_colors
 
-ATTRIBUTE = "srbf albedo"
 GRAY = 0.8  # of a face without a material
 EVEN = {  # nodes whose color is the same all over a surface, if that of their inputs is
     *("ShaderNodeMixShader", "ShaderNodeAddShader", "ShaderNodeRGB", "ShaderNodeValue", "ShaderNodeMath", "ShaderNodeMix"),
@@ -110,34 +108,11 @@ def varying_albedo(
 
 def bake(scene: bpy.types.Scene, mesh: bpy.types.Mesh, matrix: np.ndarray) -> np.ndarray:
     """(F, 3) diffuse color of the mesh's triangles, the mean of their corners. The mesh is removed."""
-    for other in scene.objects:
-        other.hide_render = True
-    obj = bpy.data.objects.new(ATTRIBUTE, mesh)
-    obj.matrix_world = [list(map(float, row)) for row in matrix]
-    scene.collection.objects.link(obj)
-    mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
-    mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
-    select([obj])
-    scene.cycles.samples, scene.cycles.seed = 1, 0
-    try:
-        result = bpy.ops.object.bake(
-            type="DIFFUSE",
-            pass_filter={"COLOR"},
-            target="VERTEX_COLORS",
-            use_clear=True,
-            margin=0,
-            use_selected_to_active=False,
-            use_cage=False,
-        )
-    except RuntimeError as error:
-        reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
-        raise WorkerError(f"Blender could not bake the albedo of the surfaces: {reason}") from error
-    if result != {"FINISHED"}:
-        raise WorkerError(f"Blender's bake of the albedo of the surfaces ended as {', '.join(result)}, without a reason")
-    colors = _read(mesh.color_attributes[ATTRIBUTE].data, "color", len(mesh.loops), 4)[:, :3]
+    (obj,) = bake_colors(scene, [(mesh, matrix)])
+    colors = corner_colors(mesh)
     bpy.data.objects.remove(obj)
     bpy.data.meshes.remove(mesh)
-    return np.clip(np.nan_to_num(colors), 0, 1).reshape(-1, 3, 3).mean(axis=1)
+    return colors.reshape(-1, 3, 3).mean(axis=1)
 
 
 def _behind_colors(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:

@@ -36,37 +36,44 @@ class AlbedoBakes:
         """(corners, 3) linear albedo by key. It hides every other object of the scene from rendering."""
         if not self._meshes:
             return {}
-        for other in scene.objects:
-            other.hide_render = True
-        objects = []
-        for mesh, matrix in self._meshes.values():
-            obj = bpy.data.objects.new(ATTRIBUTE, mesh)
-            obj.matrix_world = [list(map(float, row)) for row in matrix]
-            scene.collection.objects.link(obj)
-            mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
-            mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
-            objects.append(obj)
-        select(objects)
-        scene.cycles.samples, scene.cycles.seed = 1, 0
-        try:
-            result = bpy.ops.object.bake(
-                type="DIFFUSE",
-                pass_filter={"COLOR"},
-                target="VERTEX_COLORS",
-                use_clear=True,
-                margin=0,
-                use_selected_to_active=False,
-                use_cage=False,
-            )
-        except RuntimeError as error:
-            reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
-            raise WorkerError(f"Blender could not bake the albedo of {len(objects)} objects: {reason}") from error
-        if result != {"FINISHED"}:
-            raise WorkerError(f"Blender's bake of the albedo of {len(objects)} objects ended as {', '.join(result)}, without a reason")
-        return {key: _colors(mesh) for key, (mesh, _) in self._meshes.items()}
+        bake_colors(scene, list(self._meshes.values()))
+        return {key: corner_colors(mesh) for key, (mesh, _) in self._meshes.items()}
 
 
-def _colors(mesh: bpy.types.Mesh) -> np.ndarray:
+def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.ndarray]]) -> list[bpy.types.Object]:
+    """Objects of meshes and transforms, whose attribute is now the diffuse color of every corner; all else is hidden from rendering."""
+    for other in scene.objects:
+        other.hide_render = True
+    objects = []
+    for mesh, matrix in placed:
+        obj = bpy.data.objects.new(ATTRIBUTE, mesh)
+        obj.matrix_world = [list(map(float, row)) for row in matrix]
+        scene.collection.objects.link(obj)
+        mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
+        mesh.color_attributes.active_color = mesh.color_attributes[ATTRIBUTE]
+        objects.append(obj)
+    select(objects)
+    scene.cycles.samples, scene.cycles.seed = 1, 0
+    try:
+        result = bpy.ops.object.bake(
+            type="DIFFUSE",
+            pass_filter={"COLOR"},
+            target="VERTEX_COLORS",
+            use_clear=True,
+            margin=0,
+            use_selected_to_active=False,
+            use_cage=False,
+        )
+    except RuntimeError as error:
+        reason = str(error).replace("Error: ", "").strip().replace("\n", " ")
+        raise WorkerError(f"Blender could not bake the albedo of {len(objects)} objects: {reason}") from error
+    if result != {"FINISHED"}:
+        raise WorkerError(f"Blender's bake of the albedo of {len(objects)} objects ended as {', '.join(result)}, without a reason")
+    return objects
+
+
+def corner_colors(mesh: bpy.types.Mesh) -> np.ndarray:
+    """(corners, 3) linear colors, 0 to 1, of a mesh that was baked."""
     colors = np.empty(len(mesh.loops) * 4, np.float32)
     mesh.color_attributes[ATTRIBUTE].data.foreach_get("color", colors)
     return np.clip(np.nan_to_num(colors.reshape(-1, 4)[:, :3]), 0, 1)

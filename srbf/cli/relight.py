@@ -90,6 +90,16 @@ def relight(
         ),
     ] = None,
     lights: Annotated[Path | None, typer.Option(metavar="FRAMES.json", help="A folder of images, one a frame.", show_default=False)] = None,
+    fade: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            parser=POSITIVE,
+            help="With --lights, light cloud of the kernel: captured lights come and go over so long.",
+            show_default=False,
+        ),
+    ] = None,
+    fps: Annotated[float, typer.Option(metavar="N", parser=POSITIVE, help="With --fade: frames per second.")] = 24.0,
     ambient_only: Annotated[bool, typer.Option("--ambient-only", help="No light: the ambient light that the scene itself emits.")] = False,
     direct: Annotated[
         Literal["none", "ray", "shadow-map"] | None,
@@ -139,6 +149,8 @@ def relight(
         )
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
+    if fade is not None and (lights is None or renderer == "gl" or viewer is not None):
+        raise typer.BadParameter("expected --fade with --lights, and without --viewer or --renderer gl, found another; leave it out")
     picture = lights is None and output.suffix.lower() == ".png"
     if lights is None and output.suffix.lower() not in (".exr", ".png"):
         raise typer.BadParameter(f"expected an output named .exr or .png, found {output.name!r}")
@@ -147,7 +159,7 @@ def relight(
     if lights is not None:
         opened = Asset.open(asset)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
-        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from)
+        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
@@ -177,6 +189,8 @@ def _relight_frames(
     alpha: Alpha,
     force: bool,
     viewer: Viewer,
+    fade: float | None,
+    seconds: float,
 ) -> None:
     """An image of each frame's lights in the folder `output`."""
     opacity = alpha_of(opened)
@@ -188,7 +202,8 @@ def _relight_frames(
         for number, frame in enumerate(frames):
             for line in outside_domain(opened, frame):
                 note(f"frame {number}: {line}")
-        for number, image in enumerate(_render(opened, frames, renderer, added, viewer)):
+        images = _render(opened, frames, renderer, added, viewer) if fade is None else _faded(opened, frames, added, fade, seconds)
+        for number, image in enumerate(images):
             write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
             update(number + 1, len(frames))
         for line in added.notes([light for frame in frames for light in frame]):
@@ -208,3 +223,11 @@ def _render(asset: Asset, frames: list[list[Light]], renderer: str, added: Added
     else:
         with Relighter(asset) as relighter:
             yield from (relighter.relight(lights, direct=added.response(lights)) for lights in frames)
+
+
+def _faded(asset: Asset, frames: list[list[Light]], added: Added, fade: float, seconds: float) -> Iterator[np.ndarray]:
+    respond = methods.faded(asset, fade)
+    for lights in frames:
+        direct = added.response(lights)
+        total = respond(lights, seconds)
+        yield methods.finish(asset, total if direct is None else total + direct)

@@ -12,6 +12,7 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.capture import Capture, OnImage
 from srbf.encode.uv_seams import Stitch
+from srbf.solve.adaptive_clustered_pca import adaptive_cluster
 from srbf.solve.clustered_pca import Clusters, cluster
 from srbf.solve.grouped_product import GroupedProduct
 from srbf.solve.pca import principal_axes
@@ -71,17 +72,19 @@ def clustered_components(
     progress: Callable[[int], None],
     zones: Zones | None = None,
     refine: Refine = lambda projected, index: projected,
+    mean: float | None = None,
 ) -> ClusteredComponents:
     """Clusters grow axis by axis on the sample, then every texel joins the cluster that holds it best.
 
     One pass over the train images assigns the texels, another projects them: `on_image` sees each image in the first, `progress` counts
-    the images of both. `refine(components, index)` may change the components of texels before they get their ranges. `stitch` closes the
+    the images of both. `refine(components, index)` may change the components of texels before they get their ranges. `mean`:
+    how many a texel has on average, in clusters of differing numbers; None: all of them. `stitch` closes the
     seams of the images, since components of two clusters cannot be compared, and what its texels show is read once more: both sides then
     agree as well as their clusters hold them.
     """
     train = capture.indices("train")
     features, _ = principal_axes(space.centered, FEATURES)
-    found, of_zone = _clusters_in_zones(space, np.ascontiguousarray(features.T), clusters, components, seed, zones)
+    found, of_zone = _clusters_in_zones(space, np.ascontiguousarray(features.T), clusters, components, seed, zones, mean)
     seen = StreamedProduct(space.weights(features))
     for first, block in capture.stream(train, on_image):
         seen.add(first, block)
@@ -117,17 +120,24 @@ def clustered_components(
 
 
 def _clusters_in_zones(
-    space: RowSpace, features: Float32[ndarray, "M D"], count: int, axes: int, seed: int, zones: Zones | None
+    space: RowSpace, features: Float32[ndarray, "M D"], count: int, axes: int, seed: int, zones: Zones | None, mean: float | None
 ) -> tuple[Clusters, Int[ndarray, " C"] | None]:
     """(clusters, the zone of each): as many in each zone as its share of the sample asks for, one at least."""
+
+    def made(vectors: ndarray, count: int) -> Clusters:
+        if mean is None:
+            return cluster(vectors, features, count, axes, seed)
+        grown = adaptive_cluster(vectors, features, count, mean, seed, axes)
+        return Clusters(grown.means, np.pad(grown.axes, ((0, 0), (0, 0), (0, axes - grown.axes.shape[2]))))
+
     if zones is None:
-        return cluster(space.centered, features, count, axes, seed), None
+        return made(space.centered, count), None
     found, owners = [], []
     for zone in np.unique(zones.texels):
         rows = np.flatnonzero(zones.sample == zone)
         if not len(rows):  # too small for the sample: its texels join the zone of the first cluster
             continue
-        own = cluster(space.centered[rows], features, max(1, round(count * len(rows) / len(zones.sample))), axes, seed)
+        own = made(space.centered[rows], max(1, round(count * len(rows) / len(zones.sample))))
         found.append(own)
         owners += [int(zone)] * len(own.means)
     means = np.concatenate([one.means for one in found])

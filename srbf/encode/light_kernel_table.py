@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,9 +12,11 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.capture import COVERED, Capture
-from srbf.light_domain.cloud_kernel import CloudKernel, Visible
+from srbf.light_domain.cloud_kernel import CloudKernel, Fade, Visible
 from srbf.lights import PointLight
 from srbf.solve.light_merging import Mean, largest_differences, merge_tree, merged, metric_weights
+
+Weight = Literal["auto"] | float
 
 SAMPLE_TEXELS = 2048  # of a zone, by which lights are compared
 
@@ -53,23 +56,61 @@ class KernelTable:
         """For `source.fit`."""
         return {"merged_lights": self.counts.tolist()}
 
-    def weights(self, light: PointLight, visible: Visible) -> Float64[ndarray, "F 3"]:
-        """Weights of all functions for an isotropic point light."""
-        total = np.zeros((len(self.zones), 3))
-        for zone, count in enumerate(self.counts):
-            kernel = CloudKernel(self.places[zone, :count], visible, self.nearest)
-            found = kernel.weights(np.array([light.position])).dense(int(count))[0]
+    def kernels(self, visible: Visible) -> list[CloudKernel]:
+        """The kernel of every zone."""
+        return [CloudKernel(self.places[zone, :count], visible, self.nearest) for zone, count in enumerate(self.counts)]
+
+    def weights(self, positions: Float64[ndarray, "n 3"], visible: Visible) -> Float64[ndarray, "n F 3"]:
+        """Weights of all functions for each of n white isotropic point lights at `positions`, m."""
+        return self.combined([kernel.weights(positions).dense(len(kernel.places)) for kernel in self.kernels(visible)])
+
+    def combined(self, of_lights: Sequence[Float64[ndarray, "n N"]]) -> Float64[ndarray, "n F 3"]:
+        """Weights of all functions from those of the captured lights, which each zone has for itself."""
+        total = np.zeros((len(of_lights[0]), len(self.zones), 3))
+        for zone, weights in enumerate(of_lights):
             rows = self.zones == zone
-            total[rows] = np.einsum("fnc,n->fc", self.values[rows, :count].astype(np.float64), found)
-        return total * self.scale * light.a0**2 * np.array(light.color)
+            values = self.values[rows, : self.counts[zone]].astype(np.float64)
+            total[:, rows] = np.einsum("fkc,nk->nfc", values, weights, optimize=True)
+        return total * self.scale
+
+
+class FadedLights:
+    """Weights of moving lights from frame to frame: captured lights that one begins or ceases to see fade over `seconds`, see `Fade`.
+
+    A light is known by its place in the list; one that is new starts without a fade.
+    """
+
+    def __init__(self, table: KernelTable, visible: Visible, seconds: float) -> None:
+        self.table, self.kernels, self.seconds = table, table.kernels(visible), seconds
+        self.fades: list[list[Fade]] = []
+
+    def step(self, lights: Sequence[PointLight], dt: float) -> Float64[ndarray, "F 3"]:
+        """Weights of all functions for all lights together, `dt` seconds after the last step."""
+        del self.fades[len(lights) :]
+        total = np.zeros((len(self.table.zones), 3))
+        for number, light in enumerate(lights):
+            if number == len(self.fades):
+                self.fades.append([Fade(kernel, self.seconds) for kernel in self.kernels])
+            place = np.array(light.position)
+            found = self.table.combined([fade.step(place, dt)[None] for fade in self.fades[number]])[0]
+            total += found * (light.a0**2 * np.array(light.color))
+        return total
 
 
 def kernel_table(
-    capture: Capture, asset: Asset, kernel: CloudKernel, merge: Literal["none"] | Mean, count: int | Literal["auto"], visible: Visible
+    capture: Capture,
+    asset: Asset,
+    kernel: CloudKernel,
+    merge: Literal["none"] | Mean,
+    count: int | Literal["auto"],
+    visible: Visible,
+    metric: tuple[Weight, Weight] = ("auto", "auto"),
 ) -> KernelTable:
     """The table of a fitted asset, whose columns are the captured lights; `merge` makes fewer of them in each zone.
 
-    The arithmetic mean is that of the columns; for the harmonic one the receivers' responses are merged and solved for again.
+    `metric`: w1 (1/m) and w2 (one over the capture's unit) of equation 9 [Kristensen2005]; `auto` gives the largest distance and the
+    largest difference one unit each. The arithmetic mean is that of the columns; for the harmonic one the receivers' responses are merged
+    and solved for again.
     """
     values = asset.tables["light_values"].astype(np.float32) * np.float32(asset.manifest["light_values"]["scale"])
     cluster_zone = np.array(asset.manifest["cluster_zone"], np.int64)
@@ -90,7 +131,8 @@ def kernel_table(
         texels = np.flatnonzero(covered & (cluster_zone[index[: len(covered)]] == zone))
         some = texels[:: max(1, len(texels) // SAMPLE_TEXELS)]
         apart = largest_differences(capture.sample(train, some))
-        tree = merge_tree(kernel.places, apart, sees, *(2 * w for w in metric_weights(kernel.places, apart)))
+        w1, w2 = (2 * own if given == "auto" else given for given, own in zip(metric, metric_weights(kernel.places, apart), strict=True))
+        tree = merge_tree(kernel.places, apart, sees, w1, w2)
         groups.append(tree.groups() if count == "auto" else tree.into(count))
     counts = np.array([int(group.max()) + 1 for group in groups])
     result = np.zeros((len(values), int(counts.max()), 3), np.float32)

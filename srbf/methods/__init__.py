@@ -13,13 +13,16 @@ from srbf.capture import Capture
 from srbf.light_domain import domain_of_asset
 from srbf.lights import Light, moved
 from srbf.methods.over_lights import finish
-from srbf.methods.protocol import FitRun, Method
+from srbf.methods.protocol import FitRun, Method, Moving
 from srbf.registry import method_named
 
 __all__ = [
     "FitRun",
     "Method",
+    "Moving",
     "captured_responses",
+    "faded",
+    "finish",
     "in_asset_frame",
     "linear_response",
     "method_of",
@@ -152,6 +155,37 @@ def linear_response(asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "
     True
     """
     return method_of(asset).linear_response(asset, in_asset_frame(asset, lights))
+
+
+def faded(asset: Asset, seconds: float) -> Moving:
+    """`relight` for moving lights of a light cloud: captured lights that one begins or ceases to see come and go over time.
+
+    Parameters
+    ----------
+    asset
+        Of the method light-cloud with `interpolation=kernel`.
+    seconds
+        That a captured light takes to come or go, 0 or more.
+
+    Returns
+    -------
+    Callable
+        Called with the lights of a frame and the seconds since the last one: `linear_response`. A light is known by its place in the list.
+
+    Raises
+    ------
+    InputError
+        On an asset of another kind, whose light is continuous without.
+
+    Examples
+    --------
+    >>> from srbf.methods import faded
+    >>> faded(asset, 0.25)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected an asset of captured point lights for `fade`, found relighting-map, ...
+    """
+    respond = method_of(asset).faded(asset, seconds)
+    return lambda lights, dt: respond(in_asset_frame(asset, lights), dt)
 
 
 def radiance_to(asset: Asset, lights: Sequence[Light], viewer: tuple[float, float, float]) -> Float32[ndarray, "H W 3"]:

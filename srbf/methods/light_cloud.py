@@ -13,7 +13,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
-from srbf.encode.light_kernel_table import KernelTable, kernel_table
+from srbf.encode.light_kernel_table import FadedLights, KernelTable, Weight, kernel_table
 from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.errors import InputError
 from srbf.io.image import Encoding
@@ -21,7 +21,7 @@ from srbf.light_domain.cloud import isotropic
 from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
 from srbf.lights import Light, NamedLight, PointLight
 from srbf.methods.light_table_maps import LightTableMaps, check_table_settings, encode_table, stored_values
-from srbf.methods.protocol import QUIET, FitRun, setting
+from srbf.methods.protocol import QUIET, FitRun, Moving, setting
 from srbf.solve.light_merging import Mean
 from srbf.visibility.cloud_lights import CloudLights, Interpolation, chosen_interpolation, unseen_lights
 from srbf.visibility.embree import has_embree
@@ -54,10 +54,14 @@ class LightCloud(LightTableMaps):
         kernel: how many captured lights carry a light.
     zones
         kernel: parts of the scene, with merged lights and clusters of their own.
+    mean_components
+        How many a texel has on average: clusters get more where these cut the error most, at most `components`. `auto`: all have all.
     merge
         kernel: similar lights of a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
     merged
         kernel: how many lights are left in each zone; `auto`: all pairs of a merged light are nearer than 1 in the article's metric.
+    distance_weight, response_weight
+        merge: w1 (1/m) and w2 (one over the unit of light) of the article's metric; `auto`: the largest distance and difference count 1.
     smooth
         Average components over neighbors on the surface that differ by no more than the capture's noise.
     encoding
@@ -83,11 +87,16 @@ class LightCloud(LightTableMaps):
 
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
+    mean_components: Literal["auto"] | float = setting(
+        "auto", "How many numbers per texel on average, more where they cut the error most.", words=("auto",)
+    )
     interpolation: Interpolation = setting("auto", "Between captured point lights; auto: what predicts left-out lights better.")
     nearest: int = setting(NEAREST, "kernel: captured lights that carry a light.")
     zones: int = setting(1, "kernel: parts of the scene with merged lights of their own.")
     merge: Literal["none"] | Mean = setting("none", "kernel: how similar lights of a zone become one.")
     merged: Literal["auto"] | int = setting("auto", "kernel: lights left in each zone.", words=("auto",))
+    distance_weight: Weight = setting("auto", "merge: weight of distance between lights, 1/m.", words=("auto",))
+    response_weight: Weight = setting("auto", "merge: weight of difference between lights, one over the unit of light.", words=("auto",))
     smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     seed: int = 0
@@ -102,6 +111,12 @@ class LightCloud(LightTableMaps):
             raise InputError(f"expected 1 or more `nearest` lights and `zones`, found {self.nearest} and {self.zones}")
         if self.merged != "auto" and not self.merged >= 1:
             raise InputError(f"expected `merged` auto or 1 or more lights, found {self.merged}")
+        if self.mean_components != "auto" and not 0 <= self.mean_components <= self.components:
+            raise InputError(f"expected `mean_components` auto or 0 to {self.components} `components`, found {self.mean_components}")
+        for name in ("distance_weight", "response_weight"):
+            weight = getattr(self, name)
+            if weight != "auto" and not (0 <= weight < np.inf and self.merge != "none"):
+                raise InputError(f"expected `{name}` auto, or 0 or more with `merge`, found {weight}")
         if self.interpolation != "kernel" and (self.zones > 1 or self.merge != "none"):
             raise InputError("expected `zones` and `merge` with `interpolation=kernel`, found another; add it")
 
@@ -151,7 +166,8 @@ class LightCloud(LightTableMaps):
                 asset.tables["light_values"], entry = stored_values(unseen.prints.on_patches(found))
                 asset.manifest |= entry
             else:
-                table = kernel_table(capture, asset, kernel, self.merge, self.merged, inside.visible)
+                metric = (self.distance_weight, self.response_weight)
+                table = kernel_table(capture, asset, kernel, self.merge, self.merged, inside.visible, metric)
                 asset.tables["light_values"], entry = stored_values(table.values)
                 asset.tables["cloud"] = table.image()
                 asset.manifest |= {**entry, "cloud": {"file": self.tables["cloud"]}}
@@ -205,9 +221,16 @@ class LightCloud(LightTableMaps):
             return np.sum([_from_table(asset, light) for light in lights], axis=0)
         if asset.manifest["interpolation"]["kind"] != "kernel":
             return super().projected_weights(asset, lights)
-        table = KernelTable.of(asset)
-        visible = CloudLights.of_asset(asset).visible
-        return np.sum([table.weights(isotropic(light), visible) for light in lights], axis=0)
+        points = [isotropic(light) for light in lights]
+        found = KernelTable.of(asset).weights(np.array([point.position for point in points]), CloudLights.of_asset(asset).visible)
+        return np.einsum("nfc,nc->fc", found, np.array([np.array(point.color) * point.a0**2 for point in points]))
+
+    @classmethod
+    def faded(cls, asset: Asset, seconds: float) -> Moving:
+        if asset.manifest["interpolation"]["kind"] != "kernel":
+            return super().faded(asset, seconds)
+        fades = FadedLights(KernelTable.of(asset), CloudLights.of_asset(asset).visible, seconds)
+        return lambda lights, dt: cls.weighted(asset, fades.step([isotropic(light) for light in lights], dt)[None])[0]
 
     @classmethod
     def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
@@ -234,6 +257,8 @@ def _captured_columns(asset: Asset, capture: Capture, lights: Sequence[int]) -> 
 
 
 def _at_places(asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
+    if asset.manifest["interpolation"]["kind"] == "kernel" and has_embree():
+        return KernelTable.of(asset).weights(places, CloudLights.of_asset(asset).visible)
     lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
     return np.stack([LightCloud.projected_weights(asset, [light]) for light in lights])
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any, ClassVar, Self, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy import ndarray
@@ -49,12 +49,13 @@ class LightTableMaps(ComponentMaps):
     filterable: ClassVar[bool] = False
 
     clusters: int
+    mean_components: Literal["auto"] | float = "auto"
     smooth: bool = True  # take the noise of few samples out of the components
 
     def __str__(self) -> str:
         return f"{self.clusters} clusters of {self.components} components{' as bytes' if self.encoding == 'uint8' else ''}"
 
-    def on_sample(self, ratio: float) -> Self:
+    def on_sample(self, ratio: float) -> LightTableMaps:
         """As many texels per cluster as there will be."""
         return self if self.clusters == 1 else replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))  # type: ignore[type-var]
 
@@ -137,6 +138,7 @@ def encode_table(
         lambda images: run.progress(images, steps),
         parts,
         refinement(capture) if method.smooth else lambda projected, index: projected,
+        None if method.mean_components == "auto" else float(method.mean_components),
     )
     clusters = clusters if found.cluster_zone is None else len(found.cluster_zone)
     own = stored_components(capture, method.encoding, found.components, found, run.stitch)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from srbf.gl.passes import Passes
 
 
+Moving = Callable[[Sequence[Light], float], np.ndarray]
+
 MOST_POINT_LIGHTS = 8  # that srbfAssetLights takes at once
 
 
@@ -136,6 +138,15 @@ class Method(ABC):
         raise InputError(
             f"expected an asset of glossy surfaces for `viewer`, found a {cls.name} one, which looks the same from everywhere; "
             "bake with `light_set=cloud` and `gloss=3`, and fit that"
+        )
+
+    @classmethod
+    def faded(cls, asset: Asset, seconds: float) -> Moving:
+        """`linear_response` from frame to frame, each `dt` seconds after the last; where lights carry others, these fade over `seconds`."""
+        kind = asset.manifest.get("interpolation", {}).get("kind", cls.name)
+        raise InputError(
+            f"expected an asset of captured point lights for `fade`, found {kind}, "
+            "whose light is continuous without; leave `fade` out, or fit light-cloud with `interpolation=kernel`"
         )
 
     @classmethod

@@ -16,7 +16,7 @@ from srbf.errors import InputError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight
-from srbf.methods import linear_response, projected_weights
+from srbf.methods import faded, linear_response, projected_weights
 from srbf.methods.light_cloud import LightCloud
 
 pytest.importorskip("embreex")
@@ -159,6 +159,49 @@ def test_merged_lights_of_zones_are_fewer_and_nearly_as_good(points: Capture, me
 
 
 @pytest.mark.slow
+def test_captured_lights_come_and_go_over_time(points: Capture) -> None:
+    """A light that jumps into the other room: captured lights of this one take half a second to come, and no frame goes back."""
+    cloud = LightCloud(clusters=8, interpolation="kernel", zones=2).encode(points)
+    first, last = light((0.6, 2.5, 1.1)), light((3.4, 2.5, 1.1))
+    before, after = linear_response(cloud, [first]), linear_response(cloud, [last])
+    respond = faded(cloud, 0.5)
+    np.testing.assert_allclose(respond([first], 0.1), before, rtol=1e-4, atol=1e-5)
+    left = [np.linalg.norm(respond([last], 0.1) - after) / np.linalg.norm(before - after) for _ in range(6)]
+    assert left[0] > 0.02 and left[-1] < 1e-5 and (np.diff(left) <= 1e-5).all()
+    at_once = faded(cloud, 0.0)
+    np.testing.assert_allclose(at_once([first], 0.1), before, rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(at_once([last], 0.1), after, rtol=1e-4, atol=1e-5)
+    assert not respond([], 0.1).any()
+
+
+def test_lights_of_patches_have_nothing_to_fade(asset: Asset) -> None:
+    with pytest.raises(InputError, match="captured point lights for `fade`, found patches"):
+        faded(asset, 0.2)
+
+
+@pytest.mark.slow
+def test_components_go_where_they_cut_the_error_most(points: Capture) -> None:
+    """Six a texel on average: better than six for all, and no better than twelve for all."""
+    base = LightCloud(clusters=12, interpolation="kernel", smooth=False)
+    settings = {"six": replace(base, components=6), "mixed": replace(base, mean_components=6), "twelve": base}
+    error = {name: evaluate(method.encode(points), points)["train"]["relative_rmse"] for name, method in settings.items()}
+    assert error["twelve"] < error["mixed"] < error["six"]
+
+
+@pytest.mark.slow
+def test_the_metric_is_of_place_or_of_light(points: Capture) -> None:
+    """By place alone the nearest lights merge first: the mean distance within groups is least."""
+    spread = []
+    base = LightCloud(clusters=8, interpolation="kernel", merge="arithmetic", merged=40)
+    for place, response in ((1.0, 0.0), (0.0, 1.0)):
+        cloud = replace(base, distance_weight=place, response_weight=response).encode(points)
+        merged = cloud.tables["cloud"][0, :40, :3].astype(np.float64)
+        places = points.positions(points.indices("train"))
+        spread.append(np.linalg.norm(places[:, None] - merged, axis=2).min(axis=1).mean())
+    assert spread[0] < spread[1]
+
+
+@pytest.mark.slow
 def test_bytes_are_kept(patches: Capture) -> None:
     chosen = fit(patches, budget=13)
     assert chosen.method == "light-cloud" and chosen.bytes_per_texel()["directional"] <= 13
@@ -169,6 +212,8 @@ def test_bytes_are_kept(patches: Capture) -> None:
     [
         ({"zones": 4}, "`zones` and `merge` with `interpolation=kernel`"),
         ({"interpolation": "kernel", "merged": 0}, "`merged` auto or 1 or more"),
+        ({"components": 4, "mean_components": 5}, "`mean_components` auto or 0 to 4"),
+        ({"distance_weight": 2.0}, "`distance_weight` auto, or 0 or more with `merge`"),
         ({"nearest": 0}, "1 or more `nearest`"),
         ({"clusters": 300}, "1 to 256 clusters"),
     ],
