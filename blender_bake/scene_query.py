@@ -29,8 +29,9 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     points: {spacing, box, random, seed} -> `points`: free places for point lights, see `point_grid.free_points`
     named: {groups}               -> `named`: [{name, objects}], see `NamedLights.entries`
     places                        -> `places`: see `free_places.places`
-    surfaces: {cells}             -> `files` in `scratch`: `corners` (T, 3, 3) and `albedo` (T, 3) of all surfaces in fragments no longer
-        than a cell, if they were `cells` cells; `occluders` (U, 3, 3), the triangles that block light
+    surfaces: {cells, spacing}    -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), `object` (T,) and `transparent` (T,) of all
+        surfaces in fragments no longer than a cell, if they were `cells` cells, or than `spacing` m if that is more; `occluders` (U, 3, 3),
+        the triangles that block light; `surface_objects`: their names by number; `bounces`: diffuse ones that the scene's settings allow
     """
     found: dict[str, Any] = {}
     if question.get("collections"):
@@ -51,13 +52,19 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     if question.get("points"):
         found["points"] = point_grid.free_points(scene, question["points"])
     if question.get("surfaces"):  # the last: it hides all objects
-        found["files"] = _surfaces(scene, question["surfaces"]["cells"], Path(scratch), events)
+        found |= _surfaces(scene, question["surfaces"], Path(scratch), events)
     return found
 
 
-def _surfaces(scene: bpy.types.Scene, cells: int, scratch: Path, events: Events) -> dict[str, str]:
-    found = surfaces.fragments(scene, math.sqrt(surfaces.area(scene) / cells), events)
-    return {name: hand_over(scratch, name, found[name]) for name in ("corners", "albedo", "occluders")}
+def _surfaces(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path, events: Events) -> dict[str, Any]:
+    longest = max(math.sqrt(surfaces.area(scene) / question["cells"]), question.get("spacing") or 0.0)
+    found = surfaces.fragments(scene, longest, events)
+    names = ("corners", "albedo", "object", "transparent", "occluders")
+    return {
+        "files": {name: hand_over(scratch, name, found[name]) for name in names},
+        "surface_objects": found["names"],
+        "bounces": min(scene.cycles.diffuse_bounces, scene.cycles.max_bounces),
+    }
 
 
 class Silent:

@@ -5,6 +5,7 @@ A room is an axis-aligned box, or two joined by a doorway; its cells are the rec
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,11 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import label_cells
-from srbf.visibility.surface_cells import Cells, lit
+from srbf.visibility.patches import label_cells, surfel_groups
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.surface_cells import Cells, Fragments, lit
+from srbf.visibility.surfels import surfels_of
+from srbf.visibility.transfer_operator import OPERATOR_FILE, SURFELS_FILE, TransferOperator
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +102,14 @@ class Room:
 
     def direct(self, place: np.ndarray) -> np.ndarray:
         """(N,) irradiance of a point light of unit irradiance at 1 m."""
-        toward = place - self.places
-        squared = (toward**2).sum(axis=1)
-        cosine = np.maximum((toward * self.normals).sum(axis=1), 0) / np.sqrt(squared)
-        amount = cosine / (squared + self.areas / np.pi)
+        amount = np.zeros(len(self.places))
+        axes = np.array([np.eye(3)[np.abs(normal) < 0.5] for normal in self.normals])  # (N, 2, 3): walls are along the axes
+        steps = (np.arange(4) + 0.5) / 4 - 0.5
+        for s, t in itertools.product(steps, steps):
+            toward = place - self.places - np.sqrt(self.areas)[:, None] * (s * axes[:, 0] + t * axes[:, 1])
+            squared = (toward**2).sum(axis=1)
+            cosine = np.maximum((toward * self.normals).sum(axis=1), 0) / np.sqrt(squared)
+            amount += cosine / np.maximum(squared, self.areas / (32 * np.pi)) / 16
         front = np.flatnonzero(amount > 0)
         amount[front] *= self.sees(self.places[front] + 1e-4 * self.normals[front], np.broadcast_to(place, (len(front), 3)))
         return amount
@@ -193,3 +201,40 @@ def room_of_points(folder: Path, room: Room, count: int, tested: int = 12) -> Ca
             lights.append({"kind": "point", "position": place.tolist(), "role": role})
             images.append(np.einsum("ijc,j->ic", transport, room.direct(place)))
     return write_room(folder, room, lights, images, labels)
+
+
+def room_of_surfels(folder: Path, room: Room, count: int, groups: int = 64, tested: int = 12) -> Capture:
+    """A transfer operator traced in a room, about `count` surfels of it in `groups`, and point lights held out."""
+    transport = room.transport()
+    lights: list[dict[str, Any]] = []
+    images = []
+    for role, places in (("validation", room.free[:4]), ("holdout", room.free[-tested:])):
+        for place in places:
+            lights.append({"kind": "point", "position": place.tolist(), "role": role})
+            images.append(np.einsum("ijc,j->ic", transport, room.direct(place)))
+    corners = divided(room.corners, 0.7 * float(np.sqrt(room.areas.sum() / count)))
+    red = corners[:, :, 0].max(axis=1) < 1e-6
+    albedo = np.where(red[:, None], room.albedo[room.places[:, 0] < 1e-6][0], room.albedo[room.places[:, 0] > 1e-6][0])
+    occluders = EmbreeTriangles(room.corners)
+    surfels = surfels_of(Fragments(corners, albedo.astype(np.float32)), red.astype(np.int64), occluders, room.free, None, count)
+    grouped = surfel_groups(surfels.cells, occluders, room.free, groups)
+    told = {"count": surfels.count, "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": ["Walls", "Red wall"]}
+    capture = write_room(folder, room, lights, images, room.patches(groups), surfels=told)
+    write_image(folder / "patches.exr", grouped.cells.image(), "float")
+    TransferOperator.traced(surfels, Receivers.of(capture), is_lightmap=False).write(folder, "made")
+    return Capture.open(folder)
+
+
+def divided(corners: np.ndarray, longest: float) -> np.ndarray:
+    """Triangles (T, 3, 3), the longest edge halved while it is longer than `longest`."""
+    done = []
+    while len(corners):
+        edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        long = edges.max(axis=1) > longest
+        done.append(corners[~long])
+        corners, edges = corners[long], edges[long]
+        turn = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        first, second, third = np.moveaxis(np.take_along_axis(corners, turn[:, :, None], axis=1), 1, 0)
+        middle = (first + second) / 2
+        corners = np.concatenate([np.stack([first, middle, third], axis=1), np.stack([middle, second, third], axis=1)])
+    return np.concatenate(done).astype(np.float32)

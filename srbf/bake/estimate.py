@@ -22,6 +22,12 @@ from srbf.bake.worker import Worker
 from srbf.io.image import write_image
 
 PROBE_SAMPLES = 4  # more than that of the other probe: enough to separate the fixed cost per light from the cost per sample
+SOURCES = {  # of train lights, by light set
+    "named": "lights of the scene",
+    "cloud": "point lights in free space",
+    "patches": "patches of the surfaces",
+    "surfels": "form factors of surfels in place of train lights",
+}
 
 
 def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list[str]:
@@ -65,9 +71,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
     if settings.light_set is not None:
-        train_from = {"named": "lights of the scene", "cloud": "point lights in free space", "patches": "patches of the surfaces"}[
-            settings.light_set.kind
-        ]
+        train_from = SOURCES[settings.light_set.kind]
     elif settings.points is not None:
         train_from = f"point lights {settings.points.spacing:g} m apart"
     else:

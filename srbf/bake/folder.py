@@ -21,6 +21,7 @@ from srbf.channels import CHANNELS, file_name
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
+from srbf.visibility.transfer_operator import OPERATOR_FILE, SURFELS_FILE
 
 STATE = "bake.json"  # exists while a bake is unfinished: its settings
 LOG = "bake.log"
@@ -38,6 +39,8 @@ BEFORE_IMAGES = (
     FORMER,
     LIGHT_SET_FILE,
     PATCHES_FILE,
+    SURFELS_FILE,
+    OPERATOR_FILE,
     "lights",
     "direct",
     "harmonics",
@@ -51,6 +54,8 @@ WRITTEN = (
     SCENE_FILE,
     LIGHT_SET_FILE,
     PATCHES_FILE,
+    SURFELS_FILE,
+    OPERATOR_FILE,
     ACCUMULATION,
     FORMER,
     SCRATCH,

@@ -24,12 +24,17 @@ from srbf.errors import InputError
 from srbf.io import files
 from srbf.visibility.patches import Patches, cell_count
 from srbf.visibility.surface_cells import Cells, Fragments
+from srbf.visibility.surfels import Surfels
+from srbf.visibility.transfer_operator import OPERATOR_FILE, SURFELS_FILE
 
 PLACES = 1024  # random free places: where the components of a fit are made for, and what sees which patch
 LIGHT_SET_FILE = "light_set.npz"  # in the capture's folder: what was found of the scene, so that a resumed bake has the same
 PATCHES_FILE = "patches.exr"
 MOST_NAMES = 4096
 MOST_LIGHTS = 20_000  # of a cloud, or patches
+SURFELS = 5000  # of the transfer operator, about, unless a density is given
+MOST_SURFELS = 8000
+RUN_TIME_SURFELS = 1500  # groups of surfels that a light is measured by
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,9 @@ class FoundPlaces:
     free: Float64[ndarray, "F 3"]
     box: Box
     patches: Patches
+    surfels: Surfels | None = None
+    objects: tuple[str, ...] = ()
+    bounces: int | None = None
     checksum: str = ""
 
     def __post_init__(self) -> None:
@@ -115,6 +123,17 @@ class FoundPlaces:
             "corners": emits.corners,
             "albedo": emits.albedo,
             "patch": self.patches.owners.astype(np.int32),
+            **({} if self.surfels is None else self._surfel_arrays(self.surfels)),
+        }
+
+    def _surfel_arrays(self, surfels: Surfels) -> dict[str, ndarray]:
+        return {
+            "surfel_corners": surfels.corners,
+            "surfel_owners": surfels.owners.astype(np.int32),
+            "surfel_objects": surfels.objects.astype(np.int32),
+            "surfel_albedo": surfels.cells.albedo,
+            "object_names": np.array(json.dumps(list(self.objects))),
+            "bounces": np.array(-1 if self.bounces is None else self.bounces),
         }
 
     @staticmethod
@@ -122,16 +141,25 @@ class FoundPlaces:
         """From `arrays`."""
         x0, y0, z0, x1, y1, z1 = stored["box"].tolist()
         patches = Patches(Cells.of_image(stored["cells"]), Fragments(stored["corners"], stored["albedo"]), stored["patch"].astype(np.int64))
-        return FoundPlaces(stored["train"], stored["random"], stored["free"], (x0, y0, z0, x1, y1, z1), patches)
+        found = FoundPlaces(stored["train"], stored["random"], stored["free"], (x0, y0, z0, x1, y1, z1), patches)
+        if "surfel_owners" not in stored:
+            return found
+        cells = replace(patches.cells, albedo=stored["surfel_albedo"])
+        owners, objects = (stored[f"surfel_{name}"].astype(np.int64) for name in ("owners", "objects"))
+        surfels = Surfels(cells, stored["surfel_corners"], owners, objects)
+        bounces = int(stored["bounces"])
+        names = tuple(json.loads(str(stored["object_names"])))
+        return replace(found, surfels=surfels, objects=names, bounces=None if bounces < 0 else bounces)
 
 
 @dataclass(frozen=True)
 class CloudSet:
     """Lights inside the scene: `cloud` captures `count` point lights in its free space, blue noise or `spacing` meters apart; `patches`
-    captures what `count` patches of its surfaces reflect. Held-out lights are point lights in either.
+    captures what `count` patches of its surfaces reflect; `surfels` traces what `count` surfels, or surfels `spacing` meters apart, send to
+    receivers and to each other. Held-out lights are point lights in all of them.
     """
 
-    kind: Literal["cloud", "patches"]
+    kind: Literal["cloud", "patches", "surfels"]
     count: int
     spacing: float | None = None
     box: Box | None = None
@@ -139,7 +167,7 @@ class CloudSet:
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MOST_LIGHTS:
-            raise InputError(f"expected 1 to {MOST_LIGHTS} {'patches' if self.kind == 'patches' else 'lights'}, found {self.count}")
+            raise InputError(f"expected 1 to {MOST_LIGHTS} {'lights' if self.kind == 'cloud' else self.kind}, found {self.count}")
         if self.spacing is not None and not (np.isfinite(self.spacing) and self.spacing > 0):
             raise InputError(f"expected a spacing of point lights above 0 m, found {self.spacing:g}")
 
@@ -158,6 +186,8 @@ class CloudSet:
         found = self._known
         if self.kind == "cloud":
             return [PlacedLight("point", tuple(place)) for place in found.train.tolist()]
+        if self.kind == "surfels":
+            return []
         cells = found.patches.cells
         area = np.maximum(np.bincount(cells.patches, cells.areas), 1e-30)
         middles = np.stack([np.bincount(cells.patches, cells.areas * cells.places[:, k]) / area for k in range(3)], axis=1)
@@ -178,13 +208,20 @@ class CloudSet:
                 "places": PLACES,
                 "seed": seed,
             },
-            "surfaces": {"cells": cell_count(self.patch_count)},
+            "surfaces": {"cells": self.count, "spacing": self.spacing}
+            if self.kind == "surfels"
+            else {"cells": cell_count(self.patch_count)},
         }
+
+    def _surfaces(self) -> dict[str, Any]:
+        if self.kind == "surfels":
+            return {"cells": self.count, "spacing": self.spacing}
+        return {"cells": cell_count(self.patch_count)}
 
     @property
     def patch_count(self) -> int:
         """How many patches are asked for."""
-        return self.count if self.kind == "patches" else FINGERPRINT_PATCHES
+        return {"patches": self.count, "cloud": FINGERPRINT_PATCHES, "surfels": RUN_TIME_SURFELS}[self.kind]
 
     def record(self) -> dict[str, Any]:
         """JSON for the manifest, with a checksum of what was found of the scene."""
@@ -196,6 +233,7 @@ class CloudSet:
         found = self._known
         return {
             "patches": {"count": found.patches.count, "file": PATCHES_FILE},
+            **({} if found.surfels is None else _surfel_keys(found)),
             "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
         }
 
@@ -216,15 +254,28 @@ class CloudSet:
         return self
 
 
+def _surfel_keys(found: FoundPlaces) -> dict[str, Any]:
+    told = {"count": len(found.patches.cells.places), "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": list(found.objects)}
+    return {"surfels": told if found.bounces is None else {**told, "bounces": found.bounces}}
+
+
 FINGERPRINT_PATCHES = 1024  # which see the lights of a cloud differently
 
 LightSet = NamedSet | CloudSet
 
 
 def parse_light_set(
-    word: str, groups: Sequence[str], lights: int, patches: int | None, spacing: float | None, light_bounds: str | None
+    word: str,
+    groups: Sequence[str],
+    lights: int,
+    patches: int | None,
+    spacing: float | None,
+    light_bounds: str | None,
+    surfels_per_m2: float | None = None,
 ) -> LightSet:
     """From the command line's flags; InputError on words and combinations that mean nothing."""
+    if surfels_per_m2 is not None and word != "surfels":
+        raise InputError(f"expected `surfels_per_m2` with `light_set=surfels`, found it with {word}")
     if word == "named":
         if patches is not None or spacing is not None or light_bounds is not None:
             raise InputError("expected `light_set=named` without `patches`, `grid` and `light_bounds`, found them; leave them out")
@@ -239,4 +290,9 @@ def parse_light_set(
         if spacing is not None:
             raise InputError("expected `grid` with `light_set=cloud`, found it with patches")
         return CloudSet("patches", 512 if patches is None else patches, None, parse_box(light_bounds))
-    raise InputError(f"expected `light_set` named, cloud, patches or point:SPACING, found {word!r}")
+    if word == "surfels":
+        if patches is not None or spacing is not None:
+            raise InputError("expected `light_set=surfels` without `patches` and `grid`, found them; leave them out")
+        apart = None if surfels_per_m2 is None else surfels_per_m2**-0.5
+        return CloudSet("surfels", SURFELS if apart is None else MOST_SURFELS, apart, parse_box(light_bounds))
+    raise InputError(f"expected `light_set` named, cloud, patches, surfels or point:SPACING, found {word!r}")

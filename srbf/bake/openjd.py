@@ -112,6 +112,9 @@ def _light_set(light_set: LightSet | None) -> dict[str, Any]:
     if isinstance(light_set, NamedSet):
         return {"light-set": light_set.kind}
     box = None if light_set.box is None else ",".join(map(repr, light_set.box))
+    if light_set.kind == "surfels":
+        density = None if light_set.spacing is None else round(light_set.spacing**-2, 6)
+        return {"light-set": light_set.kind, "surfels-per-m2": density, "light-bounds": box}
     count = {"lights" if light_set.kind == "cloud" else "patches": light_set.count}
     return {"light-set": light_set.kind, **count, "grid": light_set.spacing, "light-bounds": box}
 

@@ -33,6 +33,8 @@ from srbf.errors import BakeError, InputError
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.receiver_images import MANIFEST
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.transfer_operator import TransferOperator, is_traced
 
 if TYPE_CHECKING:
     from srbf.bake.dask_workers import DaskWorkerPool
@@ -250,6 +252,7 @@ class _Passes:
                 self._record(self._images.prepared["facts"]["blender"])
             self._check_lights()
             self._write_light_set()
+            self._trace_operator()
             try:
                 self._passes(pool)
             except KeyboardInterrupt:
@@ -301,7 +304,7 @@ class _Passes:
             return
         if self._shard is not None:
             return
-        if not self._first.lit and all(float(self._images.published(light).max()) <= 0 for light in self._lights):
+        if self._lights and not self._first.lit and all(float(self._images.published(light).max()) <= 0 for light in self._lights):
             raise self._first.black(len(self._lights))  # rendered by shards of too few lights each to check
         if self._keep:
             (self._folder / STATE).unlink()
@@ -410,7 +413,8 @@ class _Passes:
         if self._shard is not None:
             return
         lights = [(light, self._accumulation.samples(light)) for light in self._lights if self._accumulation.passes(light)]
-        reached = [samples for light, samples in lights if light.role == "train"]
+        traced = isinstance(self._settings.light_set, CloudSet) and self._settings.light_set.kind == "surfels"
+        reached = [self._goal] if traced else [samples for light, samples in lights if light.role == "train"]
         if reached and self._images.prepared is not None:
             curve = stopping.record(self._curve)
             manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)
@@ -427,6 +431,27 @@ class _Passes:
         if not (patches.is_file() and replace(light_set, found=None).read(path, key).is_known):
             write_image(patches, light_set.found.patches.cells.image(), "float")
             light_set.write(path, key)
+
+    def _trace_operator(self) -> None:
+        """Of surfels: form factors by rays, once; by the machine that prepares the folder or bakes alone."""
+        light_set = self._settings.light_set
+        if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:
+            return
+        if self._shard is not None and not self._shard.is_preparation:
+            return
+        key = f"{light_set.found.checksum} {self._settings.width}x{self._settings.height} {self._settings.seed}"
+        if is_traced(self._folder, key):
+            return
+        assert self._images.prepared is not None
+        manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])
+        operator = TransferOperator.traced(
+            light_set.found.surfels,
+            Receivers.of(Capture(self._folder, manifest, ())),
+            self._settings.receiver.kind == "lightmap",
+            self._settings.seed,
+            lambda done, total: self._reporter.progress(done, total, "form factors"),
+        )
+        operator.write(self._folder, key)
 
     def _record(self, blender: str) -> None:
         """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""

@@ -21,8 +21,9 @@ from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import patches_of
+from srbf.visibility.patches import patches_of, surfel_groups
 from srbf.visibility.surface_cells import Fragments
+from srbf.visibility.surfels import surfels_of
 
 SHOWN = 8  # names in a line
 OPEN = 0.2  # share of rays that leave the scene, from which it is called open
@@ -182,13 +183,22 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
     x0, y0, z0, x1, y1, z1 = places["box"]
     free = np.array(places["places"], np.float64).reshape(-1, 3)
     occluders = EmbreeTriangles(arrays["occluders"])
-    patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)
+    surfels, names = None, tuple(found.get("surface_objects", ()))
+    if light_set.kind == "surfels":
+        opaque = arrays["transparent"] < 0.5
+        surfaces = Fragments(arrays["corners"][opaque], arrays["albedo"][opaque])
+        surfels = surfels_of(surfaces, arrays["object"][opaque].astype(np.int64), occluders, free, light_set.spacing, light_set.count)
+        patches = surfel_groups(surfels.cells, occluders, free, light_set.patch_count, seed)
+    else:
+        patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)
     if patches.count == 0:
         raise InputError(
             "expected surfaces that reflect light around the free places, found none; choose another `light_bounds`, or make them diffuse"
         )
     train, random = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("train", "random"))
-    lights = f"{patches.count} patches" if light_set.kind == "patches" else f"{len(train)} point lights"
+    lights = {"patches": f"{patches.count} patches", "cloud": f"{len(train)} point lights"}.get(
+        light_set.kind, f"{len(patches.cells.places)} surfels"
+    )
     say(
         f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
         f"{places['skipped']} places are in or near geometry"
@@ -199,7 +209,11 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
             "alone, and distant light is not: `light_bounds` gives another box"
         )
     box = (x0, y0, z0, x1, y1, z1)
-    return replace(light_set, found=FoundPlaces(train, random, free, box, patches))
+    if surfels is not None:
+        surfels = replace(surfels, cells=replace(patches.cells, albedo=surfels.cells.albedo))
+    return replace(
+        light_set, found=FoundPlaces(train, random, free, box, patches, surfels, names if surfels is not None else (), found.get("bounces"))
+    )
 
 
 def _sized(bake: Bake, width: int, height: int) -> Bake:

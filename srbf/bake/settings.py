@@ -284,8 +284,8 @@ class BakeSettings:
             raise InputError(f"expected {what} without `denoise`, which belongs to directional lights")
         if light_set.kind == "named" and self.keep_scene_lights:
             raise InputError(f"expected {what} without `keep_scene_lights`: the scene's lights are what is captured")
-        if light_set.kind == "patches" and self.transport != "indirect":
-            raise InputError(f"expected `transport=indirect` with {what}, found combined: what patches reflect is indirect light")
+        if light_set.kind in ("patches", "surfels") and self.transport != "indirect":
+            raise InputError(f"expected `transport=indirect` with {what}, found combined: what surfaces reflect is indirect light")
 
     def _check_gloss(self, order: int) -> None:
         if not 1 <= order <= MAX_ORDER:

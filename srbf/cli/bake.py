@@ -46,6 +46,7 @@ def bake(
     light_set: flag.LightSet = None,
     light_group: flag.LightGroups = None,
     patches: flag.PatchCount = None,
+    surfels_per_m2: flag.SurfelDensity = None,
     grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
@@ -81,12 +82,18 @@ def bake(
         points = PointGrid.parse(str(light_set), light_bounds) if by_grid else None
         inside = None
         if light_set is not None and not by_grid:
-            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds)
+            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2)
     if not (named or collection):
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
-    for name, value in (("--light-bounds", light_bounds), ("--light-group", light_group), ("--patches", patches), ("--grid", grid)):
+    for name, value in (
+        ("--light-bounds", light_bounds),
+        ("--light-group", light_group),
+        ("--patches", patches),
+        ("--grid", grid),
+        ("--surfels-per-m2", surfels_per_m2),
+    ):
         if value and (light_set is None or (by_grid and name != "--light-bounds")):
-            raise typer.BadParameter(f"expected --light-set named, cloud or patches with {name}, found {light_set or 'none'}")
+            raise typer.BadParameter(f"expected --light-set named, cloud, patches or surfels with {name}, found {light_set or 'none'}")
     pool = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:

@@ -84,7 +84,8 @@ LightSet = Annotated[
     typer.Option(
         metavar="SET",
         help="Other lights than directions. named: the scene's own, each by itself. cloud: --lights point lights in its free space. "
-        "patches: parts of its surfaces, for any light inside. point:SPACING: point lights that fill a box, so many meters apart.",
+        "patches: parts of its surfaces, for any light inside. "
+        "surfels: light between its surfaces, by rays, for any light. point:SPACING: point lights that fill a box, so many meters apart.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -102,6 +103,17 @@ LightGroups = Annotated[
 PatchCount = Annotated[
     int | None,
     typer.Option("--patches", metavar="COUNT", parser=COUNT, help="patches: how many (512).", show_default=False, rich_help_panel=LIGHTS),
+]
+SurfelDensity = Annotated[
+    float | None,
+    typer.Option(
+        "--surfels-per-m2",
+        metavar="DENSITY",
+        parser=POSITIVE,
+        help="surfels: how many per square meter of surface, 8000 in all at most (about 5000 in all).",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
 ]
 GridSpacing = Annotated[
     float | None,

@@ -87,7 +87,7 @@ def evaluate(
     images = Capture.open(reference)
     with progress_bar("evaluate") as update:
         result = evaluate_capture(opened, images, update, direct or "none")
-    if domain_of_capture(images).kind == "cloud":
+    if domain_of_capture(images).is_inside:
         _add_means(result)
     if domain_of_capture(images).kind == "named" and direct in (None, "none"):
         result["mixes"] = mix_errors(opened, images).as_dict()

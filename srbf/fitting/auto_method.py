@@ -58,6 +58,12 @@ def within_budget(
     budget below LEAST_BUDGET, or on both budget and psnr.
     """
     check_budget(budget, psnr)
+    if capture.kind == "surfel":  # any light is known, and bytes alone decide
+        if psnr is not None:
+            raise InputError("expected a `budget` for a capture of surfels, found `psnr`: it has no train lights to measure by")
+        (chosen,) = _candidates(capture, budget or DEFAULT_BUDGET, int((capture.coverage() >= COVERED).sum()), 0)
+        say(f"chose {chosen}")
+        return _with(chosen, settings)
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
     trial = capture.load(texels)

@@ -35,6 +35,7 @@ class Cloud(LightDomain):
     kind: ClassVar[str] = "cloud"
     captured_kinds: ClassVar[tuple[str, ...]] = ("point", "patch")
     falloff: ClassVar[Falloff] = "inverse-square"
+    is_inside: ClassVar[bool] = True
     places: tuple[tuple[float, float, float], ...]
 
     @classmethod

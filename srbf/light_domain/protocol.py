@@ -27,6 +27,7 @@ class LightDomain(ABC):
     kind: ClassVar[str]  # of `light_domain` in asset.json
     captured_kinds: ClassVar[tuple[str, ...]]  # of the train lights of a capture in this domain
     falloff: ClassVar[Falloff]  # of a point light that does not say
+    is_inside: ClassVar[bool] = False  # whether lights have places in the scene
 
     @classmethod
     @abstractmethod

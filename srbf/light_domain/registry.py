@@ -11,9 +11,10 @@ from srbf.light_domain.cloud import Cloud
 from srbf.light_domain.directions import Directions
 from srbf.light_domain.named import Named
 from srbf.light_domain.protocol import LightDomain
+from srbf.light_domain.surfels import SurfelLights
 from srbf.lights import DirectionalLight, Light, NamedLight, PointLight
 
-DOMAINS: tuple[type[LightDomain], ...] = (Directions, Named, Cloud)
+DOMAINS: tuple[type[LightDomain], ...] = (Directions, Named, Cloud, SurfelLights)
 
 
 def domain_of_capture(capture: Capture, region: str = "auto") -> LightDomain:

@@ -14,13 +14,13 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.light_kernel_table import FadedLights, KernelTable, Weight, kernel_table
-from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.light_domain.cloud import isotropic
 from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
-from srbf.lights import Light, NamedLight, PointLight
-from srbf.methods.light_table_maps import LightTableMaps, check_table_settings, encode_table, stored_values
+from srbf.lights import Light
+from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
+from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, Moving, setting
 from srbf.solve.light_merging import Mean
 from srbf.visibility.cloud_lights import CloudLights, Interpolation, chosen_interpolation, unseen_lights
@@ -33,7 +33,7 @@ LEAST_TEXELS = 64  # per cluster of a candidate
 
 
 @dataclass(frozen=True)
-class LightCloud(LightTableMaps):
+class LightCloud(LightsInsideMaps):
     """Indirect light of lights inside the scene, at the cost of one distant light per texel [Kristensen2005].
 
     T(p, x) ~ sum_k f_k(x) G_k(p),  G_k(p) ~ w_{m,0}(k) + sum_j a_j(p) w_{m,j}(k), m the cluster of p
@@ -83,7 +83,7 @@ class LightCloud(LightTableMaps):
     name: ClassVar[str] = "light-cloud"
     order: ClassVar[int] = 5
     domains: ClassVar[tuple[str, ...]] = ("cloud",)
-    tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", "cloud": "cloud.exr", **FILES}
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "cloud": "cloud.exr"}
 
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
@@ -174,11 +174,7 @@ class LightCloud(LightTableMaps):
                 report |= table.report()
         asset.manifest["interpolation"] = {"kind": kind, **({"nearest": self.nearest} if kind == "kernel" else {})}
         asset.manifest["source"]["fit"] |= report
-        asset.tables["cells"] = inside.cells.image()
-        asset.manifest["cells"] = {"file": self.tables["cells"]}
-        places = position_table(lambda at: _at_places(asset, at), inside.visible, inside.free)
-        asset.manifest |= places.manifest()
-        asset.tables |= places.tables()
+        self.add_places(asset, inside)
         return asset
 
     @classmethod
@@ -191,19 +187,10 @@ class LightCloud(LightTableMaps):
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
-        manifest = reader.manifest
-        tables = {**super().read_tables(reader), "cells": reader.rows("cells", 2, 4)}
-        if "cloud" in manifest:
-            tables["cloud"] = reader.rows("cloud", max(manifest["cluster_zone"]) + 1, 4)
-        told = manifest["position_table"]
-        nx, ny, nz = told["nodes"]
-        functions = len(tables["light_values"])
-        fine = told["fine"]
-        tables["position_nodes"] = reader.table("position_nodes", (nx * ny * nz, told["rank"]), 1)[:, :, 0]
-        tables["position_basis"] = reader.table("position_basis", (told["rank"], functions), 3).astype(np.float16)
-        shape = (fine * (nz - 1) * fine * (ny - 1), 8 * fine * (nx - 1))
-        seen = np.round(reader.table("position_visibility", shape, 1)[:, :, 0] * 255)
-        return {**tables, "position_visibility": seen.astype(np.uint8)}
+        tables = super().read_tables(reader)
+        if "cloud" in reader.manifest:
+            tables["cloud"] = reader.rows("cloud", max(reader.manifest["cluster_zone"]) + 1, 4)
+        return tables
 
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
@@ -212,14 +199,7 @@ class LightCloud(LightTableMaps):
 
     @classmethod
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
-        """By rays where Embree is installed, else by the table of places, which point lights alone are in."""
-        if not lights:
-            return np.zeros((len(asset.tables["light_values"]), 3))
-        if any(isinstance(light, NamedLight) for light in lights):
-            raise InputError("expected lights inside the scene for a light cloud, found a named one; bake `light_set=named` to mix lights")
-        if not has_embree():
-            return np.sum([_from_table(asset, light) for light in lights], axis=0)
-        if asset.manifest["interpolation"]["kind"] != "kernel":
+        if asset.manifest["interpolation"]["kind"] != "kernel" or not lights or not has_embree():
             return super().projected_weights(asset, lights)
         points = [isotropic(light) for light in lights]
         found = KernelTable.of(asset).weights(np.array([point.position for point in points]), CloudLights.of_asset(asset).visible)
@@ -240,8 +220,10 @@ class LightCloud(LightTableMaps):
         return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
 
     @classmethod
-    def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
-        return cls.weighted(asset, _at_places(asset, coordinates))
+    def at_places(cls, asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
+        if asset.manifest["interpolation"]["kind"] == "kernel" and has_embree():
+            return KernelTable.of(asset).weights(places, CloudLights.of_asset(asset).visible)
+        return super().at_places(asset, places)
 
     @classmethod
     def summary(cls, asset: Asset) -> str:
@@ -254,18 +236,6 @@ def _captured_columns(asset: Asset, capture: Capture, lights: Sequence[int]) -> 
     """Responses to captured point lights while these are still the columns of the table."""
     train = capture.indices("train")
     return LightCloud.columns(asset, [train.index(i) for i in lights])
-
-
-def _at_places(asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
-    if asset.manifest["interpolation"]["kind"] == "kernel" and has_embree():
-        return KernelTable.of(asset).weights(places, CloudLights.of_asset(asset).visible)
-    lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
-    return np.stack([LightCloud.projected_weights(asset, [light]) for light in lights])
-
-
-def _from_table(asset: Asset, light: Light) -> Float64[ndarray, "F 3"]:
-    point = isotropic(light)
-    return PositionTable.of(asset.manifest, asset.tables).evaluate(np.array(point.position)) * (np.array(point.color) * point.a0**2)
 
 
 METHOD = LightCloud

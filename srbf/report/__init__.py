@@ -22,7 +22,7 @@ from srbf.report.places_report import PlacesReport
 from srbf.report.section import Figure
 from srbf.report.subject import Picture, gather
 
-REPORTS: dict[str, type[DomainReport]] = {report.kind: report for report in (DirectionsReport, NamesReport, PlacesReport)}
+REPORTS: dict[str, type[DomainReport]] = {kind: report for report in (DirectionsReport, NamesReport, PlacesReport) for kind in report.kinds}
 REPORT_FILES = (
     "contact_sheet.png",
     "animation.webp",
@@ -108,7 +108,7 @@ def write_report(
         (folder / name).unlink(missing_ok=True)
     subject = gather(asset, capture, evaluation, demo_lights)
     kind = REPORTS[subject.domain.kind]
-    compared = [method for method in (compared_methods() if methods is None else methods) if kind.kind in method.domains]
+    compared = [method for method in (compared_methods() if methods is None else methods) if subject.domain.kind in method.domains]
     steps = kind.steps + kind.drawings
     report = kind.measured(subject, compared, lambda done, total: progress(done, steps))
     pictures = []

@@ -56,7 +56,7 @@ FIGURES: tuple[tuple[str, str, Draw, tuple[str, ...]], ...] = (  # file, title, 
 class DirectionsReport(DomainReport):
     """Of lights at infinity."""
 
-    kind: ClassVar[str] = "directions"
+    kinds: ClassVar[tuple[str, ...]] = ("directions",)
     steps: ClassVar[int] = STEPS
     drawings: ClassVar[int] = len(FIGURES)
     subject: Subject

@@ -16,7 +16,7 @@ from srbf.report.subject import Picture, Subject
 class DomainReport(ABC):
     """The part of a report that depends on what lights are: made of a subject by `measured`, then asked."""
 
-    kind: ClassVar[str]  # of the light domain
+    kinds: ClassVar[tuple[str, ...]]  # of the light domains
     steps: ClassVar[int]  # of `measured`, for progress
     drawings: ClassVar[int]  # that `figures` has
 

@@ -32,7 +32,7 @@ MOST_ROWS = 48  # of lights in the table
 class NamesReport(DomainReport):
     """Of lights by their names. `brightness`: the mean response to each of the subject's lights, by file."""
 
-    kind: ClassVar[str] = "named"
+    kinds: ClassVar[tuple[str, ...]] = ("named",)
     steps: ClassVar[int] = 3
     drawings: ClassVar[int] = 0
     subject: Subject

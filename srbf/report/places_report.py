@@ -39,13 +39,13 @@ UNTESTED = "Not shown: the capture holds point lights of no role; bake some with
 class PlacesReport(DomainReport):
     """Of lights by their places. `tested`: the point lights of the subject's role; `missing`: why there is no motion."""
 
-    kind: ClassVar[str] = "cloud"
+    kinds: ClassVar[tuple[str, ...]] = ("cloud", "surfels")
     steps: ClassVar[int] = 3
     drawings: ClassVar[int] = 1
     subject: Subject
     held_out: HeldOut
     texels: int
-    spectrum: Spectrum
+    spectrum: Spectrum | None
     motion: MotionInside | None
     borders: ClusterBorders | None
     missing: str
@@ -56,7 +56,8 @@ class PlacesReport(DomainReport):
         progress(1, cls.steps)
         picked = sampled_texels(subject.covered, TEXELS)
         sample, asset = subject.capture.load(picked), subject.asset.at(picked)
-        spectrum = spectrum_of(sample, asset, subject.evaluation[subject.role]["peak"])
+        has_train = bool(sample.indices("train"))
+        spectrum = spectrum_of(sample, asset, subject.evaluation[subject.role]["peak"]) if has_train else None
         progress(2, cls.steps)
         motion, missing = None, ""
         try:
@@ -111,7 +112,7 @@ class PlacesReport(DomainReport):
             Section("By place", by_place(subject, self.tested, self.motion) if self.tested else paragraphs(UNTESTED)),
             Section("In motion", self._motion(list(pictures), folder)),
             Section("By texel", by_texel(subject, self.held_out)),
-            Section("Spectrum", spectrum_plots(subject, self.texels, self.spectrum)),
+            *([Section("Spectrum", spectrum_plots(subject, self.texels, self.spectrum))] if self.spectrum is not None else []),
         ]
         return sections + samples_section(subject.capture)
 

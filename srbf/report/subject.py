@@ -23,7 +23,7 @@ from srbf.sphere import farthest_points
 
 SHOWN_LIGHTS = 6  # compared
 EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # the exposure maps this quantile of the references to this linear level
-NOUNS = {"directions": "directions", "cloud": "point lights", "named": "lights"}  # by light domain
+NOUNS = {"directions": "directions", "cloud": "point lights", "surfels": "point lights", "named": "lights"}  # by light domain
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Subject:
     @property
     def by_relative(self) -> bool:
         """Whether lights are compared by relative error: inside a scene, their brightness depends on where they are."""
-        return self.domain.kind == "cloud"
+        return self.domain.is_inside
 
     def worst_first(self, indices: Sequence[int]) -> list[int]:
         """Lights in order of their errors, the largest first."""

@@ -54,6 +54,15 @@ def patches_of(surfaces: Fragments, occluders: EmbreeTriangles, free: Float64[nd
     return Patches(cells.with_patches(labels), sides, labels[owner])
 
 
+def surfel_groups(cells: Cells, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"], count: int, seed: int = 0) -> Patches:
+    """Cells in at most `count` groups by which a light is measured, as patches are made; nothing emits."""
+    nothing = Fragments(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
+    if not len(cells.places):
+        return Patches(cells, nothing, np.zeros(0, np.int64))
+    seen = lit(cells.places.astype(np.float64), cells.normals.astype(np.float64), occluders, free)
+    return Patches(cells.with_patches(label_cells(cells, seen, count, seed)), nothing, np.zeros(0, np.int64))
+
+
 def cell_count(patches: int) -> int:
     """About how many cells that many patches are made of."""
     return int(np.clip(CELLS_PER_PATCH * patches, FEWEST_CELLS, MOST_CELLS))
@@ -72,7 +81,7 @@ def label_cells(cells: Cells, seen: Bool[ndarray, "N F"], count: int, seed: int 
     )
     asked = count
     for _ in range(SPLITS):
-        labels = _parted(group(features, cells.areas, asked, seed), seen)
+        labels = parted(group(features, cells.areas, asked, seed), seen)
         found = int(labels.max()) + 1
         if found <= count:
             break
@@ -90,7 +99,7 @@ def group(features: ndarray, weights: ndarray, count: int, seed: int = 0) -> Int
     return np.unique(found.labels_, return_inverse=True)[1].ravel().astype(np.int64)
 
 
-def _parted(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarray, " N"]:
+def parted(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarray, " N"]:
     """Groups without parts that share no place from which they are seen."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 from numpy import ndarray
@@ -12,10 +13,12 @@ from srbf.io.scene_glb import read_triangles
 from srbf.light_geometry import environment_samples, spot_cone
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.surface_cells import OFFSET, Cells
+from srbf.visibility.surface_cells import OFFSET, Cells, frames
 
 SIDE = 4  # points per side of an area light
 DIRECTIONS = 512  # of an environment map
+NEAR, PARTS = 8.0, 4  # sides of a cell, closer than which it is measured by so many points a side
+Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 @functools.lru_cache(maxsize=4)
@@ -34,7 +37,7 @@ class ReceivedLight:
         places = cells.places.astype(np.float64)
         lift = OFFSET * float(np.ptp(places, axis=0).max()) if len(places) else 0.0
         self._places, self._starts = places, (places + lift * self._normals).astype(np.float32)
-        self._spread = cells.areas.astype(np.float64) / np.pi  # a cell is not a point: close by, r^2 is at least this
+        self._areas = cells.areas.astype(np.float64)
 
     def irradiance(self, light: Light) -> Float64[ndarray, "N 3"]:
         """On every cell, in the light's units; 0 for lights without a place or a direction."""
@@ -53,35 +56,53 @@ class ReceivedLight:
         return patch_means(self._cells, self.irradiance(light))
 
     def _of_point(self, light: PointLight) -> Float64[ndarray, " N"]:
-        """cos a0^2 / (r^2 + A / pi) of what sees the light, or a0 over the root for a linear falloff; times a spot's cone."""
-        place = np.array(light.position)
-        vector = place - self._places
-        squared = np.einsum("nk,nk->n", vector, vector)
-        distance = np.sqrt(np.maximum(squared, 1e-30))
-        cosine = np.einsum("nk,nk->n", vector, self._normals) / distance
-        near = np.maximum(squared, light.radius**2) + self._spread
-        strength = light.a0**2 / near if light.falloff == "inverse-square" else light.a0 / np.sqrt(near)
-        if isinstance(light, SpotLight):
-            along = -(vector @ np.array(light.direction)) / distance
-            strength = strength * spot_cone(along, np.cos(light.inner), np.cos(light.outer))
-        return self._shadowed(cosine * strength, place)
+        """cos a0^2 / r^2 of what sees the light, or a0 / r for a linear falloff; times a spot's cone."""
+
+        def strength(squared: ndarray, unit: ndarray, least: ndarray) -> ndarray:
+            near = np.maximum(np.maximum(squared, light.radius**2), least)
+            found = light.a0**2 / near if light.falloff == "inverse-square" else light.a0 / np.sqrt(near)
+            if isinstance(light, SpotLight):
+                found = found * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
+            return found
+
+        return self._from_place(np.array(light.position), strength)
 
     def _of_area(self, light: AreaLight) -> Float64[ndarray, " N"]:
-        """The mean of a grid of points, each a Lambertian emitter: cos_l cos a0^2 / (r^2 + A / pi)."""
+        """The mean of a grid of points, each a Lambertian emitter: cos_l cos a0^2 / r^2."""
         u, v, center = np.array(light.u), np.array(light.v), np.array(light.position)
         facing = np.cross(u, v)
         facing /= np.linalg.norm(facing)
+
+        def strength(squared: ndarray, unit: ndarray, least: ndarray) -> ndarray:
+            return np.maximum(-(unit @ facing), 0) * light.a0**2 / np.maximum(squared, least)
+
         steps = (np.arange(SIDE) + 0.5) / SIDE - 0.5
-        total = np.zeros(len(self._places))
-        for s in steps:
-            for t in steps:
-                place = center + s * u + t * v
-                vector = place - self._places
-                squared = np.einsum("nk,nk->n", vector, vector)
-                unit = vector / np.sqrt(np.maximum(squared, 1e-30))[:, None]
-                strength = np.maximum(-(unit @ facing), 0) * light.a0**2 / (squared + self._spread)
-                total += self._shadowed(np.einsum("nk,nk->n", unit, self._normals) * strength, place)
-        return total / SIDE**2
+        places = [center + s * u + t * v for s in steps for t in steps]
+        return np.sum([self._from_place(place, strength) for place in places], axis=0) / SIDE**2
+
+    def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength) -> Float64[ndarray, " N"]:
+        """The mean of cos times `strength` over every cell that sees a place.
+
+        Cells are taken as squares: at their middles far away, by PARTS x PARTS points closer than NEAR sides. r^2 is at least A / 2 pi, so
+        that no part takes more than half of a light.
+        """
+        least = self._areas / (2 * np.pi)
+        vector = place - self._places
+        squared = np.einsum("nk,nk->n", vector, vector)
+        amount = _falling(vector, squared, self._normals, least, strength)
+        near = np.flatnonzero(squared < NEAR**2 * self._areas)
+        if len(near):
+            tangent, bitangent = frames(self._normals[near])
+            steps = (np.arange(PARTS) + 0.5) / PARTS - 0.5
+            side = np.sqrt(self._areas[near])[:, None]
+            found = np.zeros(len(near))
+            for s in steps:
+                for t in steps:
+                    part = vector[near] - side * (s * tangent + t * bitangent)
+                    far = np.einsum("nk,nk->n", part, part)
+                    found += _falling(part, far, self._normals[near], least[near] / PARTS**2, strength)
+            amount[near] = found / PARTS**2
+        return self._shadowed(amount, place)
 
     def _of_environment(self, light: EnvironmentLight) -> Float64[ndarray, "N 3"]:
         """A sum over about DIRECTIONS blocks of the map, each as a distant light from its middle."""
@@ -116,6 +137,13 @@ class ReceivedLight:
         result = np.zeros(len(amount))
         result[front[~blocked]] = amount[front[~blocked]]
         return result
+
+
+def _falling(vector: ndarray, squared: ndarray, normals: ndarray, least: ndarray, strength: Strength) -> Float64[ndarray, " n"]:
+    """cos times `strength` of (r^2, unit vectors to the light, the least r^2); 0 from behind."""
+    unit = vector / np.sqrt(np.maximum(squared, 1e-30))[:, None]
+    cosine = np.einsum("nk,nk->n", unit, normals)
+    return np.where(cosine > 0, cosine * strength(squared, unit, least), 0.0)
 
 
 def patch_means(cells: Cells, values: Float64[ndarray, "N 3"]) -> Float64[ndarray, "K 3"]:

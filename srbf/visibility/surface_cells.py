@@ -125,11 +125,8 @@ def lit(
 
 
 def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T"]]:
-    """(cells of about `size` meters, the cell of every fragment): fragments of one voxel that face about the same way are one cell.
-
-    A cell's place is that of the fragment nearest to the mean, so that it lies on the surface. All are in patch 0.
-    """
-    centers, normals, areas = fragments.centers, fragments.normals, fragments.areas
+    """(cells of about `size` meters, the cell of every fragment): fragments of one voxel that face about the same way are one cell."""
+    centers, normals = fragments.centers, fragments.normals
     major = np.abs(normals).argmax(axis=1)
     facing = 2 * major + (np.take_along_axis(normals, major[:, None], 1)[:, 0] < 0)
     across = np.floor((np.delete(normals, 0, 1) + 1) / 2 * NORMAL_BINS).astype(np.int64).clip(0, NORMAL_BINS - 1)
@@ -140,6 +137,12 @@ def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T
     keys = np.column_stack([voxel, facing, np.where(rough[:, None], across, 0), color])
     _, owner = np.unique(keys, axis=0, return_inverse=True)
     owner = owner.ravel()
+    return grouped_cells(fragments, owner), owner
+
+
+def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
+    """The cells that fragments make together, in patch 0. A cell's place is that of the fragment nearest to the mean: on the surface."""
+    centers, normals, areas = fragments.centers, fragments.normals, fragments.areas
     count = int(owner.max()) + 1 if len(owner) else 0
     area = np.bincount(owner, areas, count)
     safe = np.maximum(area, 1e-30)[:, None]
@@ -152,11 +155,19 @@ def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T
     order = np.lexsort((off, owner))
     nearest = order[np.searchsorted(owner[order], np.arange(count))]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    cells = Cells(
+    return Cells(
         centers[nearest].astype(np.float32),
         normal.astype(np.float32),
         area.astype(np.float32),
         albedo.astype(np.float32),
         np.zeros(count, np.int64),
     )
-    return cells, owner
+
+
+def frames(normals: Float64[ndarray, "n 3"]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
+    """Two unit vectors across each normal and each other, along the axes for a normal that is one [Duff2017]."""
+    sign = np.where(normals[:, 2] >= 0, 1.0, -1.0)
+    a = -1 / (sign + normals[:, 2])
+    b = normals[:, 0] * normals[:, 1] * a
+    tangent = np.stack([1 + sign * normals[:, 0] ** 2 * a, sign * b, -sign * normals[:, 0]], axis=1)
+    return tangent, np.stack([b, sign + normals[:, 1] ** 2 * a, -normals[:, 1]], axis=1)

@@ -21,7 +21,7 @@ def srbf(*words: object) -> Result:
 
 def done(*words: object) -> Result:
     result = srbf(*words)
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 0, (result.output, result.exception)
     return result
 
 

@@ -30,7 +30,7 @@ from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size
         (["--shard", "3/2"], "I from 1 to N, found '3/2'"),
         (["--light-set", "point:x"], "point:SPACING"),
         (["--light-set", "point:1", "--light-bounds", "0,1"], "--light-bounds x0,y0,z0,x1,y1,z1"),
-        (["--light-bounds", "0,0,0,1,1,1"], "expected --light-set named, cloud or patches with --light-bounds"),
+        (["--light-bounds", "0,0,0,1,1,1"], "expected --light-set named, cloud, patches or surfels with --light-bounds"),
         (["--light-set", "point:1", "--sun-angle", "auto"], "--sun-angle auto"),
         (["--receiver", "mirror"], "expected a receiver"),
         (["--receiver", "view"], "found view"),

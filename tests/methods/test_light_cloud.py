@@ -122,7 +122,7 @@ def test_a_sun_through_no_window_lights_nothing(asset: Asset) -> None:
 def test_the_table_of_places_stands_in_for_rays(asset: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
     lights = [light(place) for place in BOX.free[-6:]]
     exact = np.stack([projected_weights(asset, [one]) for one in lights])
-    monkeypatch.setattr("srbf.methods.light_cloud.has_embree", lambda: False)
+    monkeypatch.setattr("srbf.methods.lights_inside_maps.has_embree", lambda: False)
     looked_up = np.stack([projected_weights(asset, [one]) for one in lights])
     relit = LightCloud.weighted(asset, np.concatenate([exact, looked_up]))
     assert np.sqrt(((relit[:6] - relit[6:]) ** 2).sum() / (relit[:6] ** 2).sum()) < 0.05

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -58,16 +58,24 @@ class Room:
         return np.einsum("fkc,kc->fc", self.values, received)
 
     def irradiance(self, place: np.ndarray, strength: Any) -> np.ndarray:
-        """(K,) patch means of cos times `strength(squared, unit vectors, spread)` where nothing stands between."""
+        """(K,) patch means of cos times `strength(squared, unit vectors, least square of the distance)` where nothing stands between."""
         points, areas = self.cells[0, :, :3].astype(float), self.cells[0, :, 3].astype(float)
         normals, owners = self.cells[1, :, :3].astype(float), self.cells[1, :, 3].astype(int)
-        vector = np.asarray(place) - points
-        squared = (vector**2).sum(axis=1)
-        unit = vector / np.sqrt(squared)[:, None]
         lift = OFFSET * np.ptp(points, axis=0).max()
-        amount = np.maximum((unit * normals).sum(axis=1), 0) * strength(squared, unit, areas / np.pi)
+        amount = np.array([self._of_cell(np.asarray(place, float), *cell, strength) for cell in zip(points, normals, areas, strict=True)])
         amount[self.blocked(points + lift * normals, np.asarray(place))] = 0
         return np.bincount(owners, areas * amount, PATCHES) / np.bincount(owners, areas, PATCHES)
+
+    @staticmethod
+    def _of_cell(place: np.ndarray, point: np.ndarray, normal: np.ndarray, area: float, strength: Any) -> float:
+        """The mean over a square, of its middle alone where that is more than eight sides away."""
+        count = 4 if ((place - point) ** 2).sum() < 64 * area else 1
+        across = np.linalg.svd(normal[None])[2][1:] if np.abs(normal).max() < 1 else np.eye(3)[normal == 0]
+        steps = ((np.arange(count) + 0.5) / count - 0.5) * np.sqrt(area)
+        vector = place - np.array([point + s * across[0] + t * across[1] for s in steps for t in steps])
+        squared = (vector**2).sum(axis=1)
+        unit = vector / np.sqrt(squared)[:, None]
+        return float((np.maximum(unit @ normal, 0) * strength(squared, unit, area / count**2 / (2 * np.pi))).mean())
 
     def blocked(self, starts: np.ndarray, place: np.ndarray) -> np.ndarray:
         a, b, c = self.corners.astype(float).transpose(1, 0, 2)
@@ -131,6 +139,23 @@ def room(components: int = 6, clusters: int = 5, height: int = 9, width: int = 1
         **{f"plane_{i:02d}.{'png' if encoding == 'uint8' else 'exr'}": (layer, encoding) for i, layer in enumerate(stored)},
     }
     return Room(manifest, files, scene, np.concatenate([walls, partition]), cells, values)
+
+
+def with_transfer(made: Room, rank: int = 4) -> Room:
+    """The room as an asset of the method transfer: its table over `rank` shapes, and their weights from the light on the patches."""
+    rng = np.random.default_rng(12)
+    matrix = rng.normal(size=(rank, PATCHES, 3)).astype(np.float16).astype(np.float32)
+    values = rng.normal(size=(len(made.values), rank, 3)).astype(np.float16).astype(np.float32)
+    files = {**made.files, "light_values.exr": (values, "half"), "transfer.exr": (matrix, "half")}
+    manifest = {
+        **made.manifest,
+        "method": "transfer",
+        "light_domain": "surfels",
+        "interpolation": {"kind": "surfels"},
+        "light_values": {"file": "light_values.exr", "lights": rank, "scale": 1.0},
+        "surfel_transfer": {"file": "transfer.exr", "rank": rank, "surfels": PATCHES, "scale": 2.0},
+    }
+    return replace(made, manifest=manifest, files=files, values=2 * np.einsum("frc,rkc->fkc", values, matrix))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cloud_assets import GRID, LOW, Room, room, with_table
+from cloud_assets import GRID, LOW, Room, room, with_table, with_transfer
 
 CLOSE = 1e-6  # relative: single precision of cells on disk, the same in both
 POINT: dict[str, Any] = {
@@ -42,12 +42,12 @@ def received(made: Room, light: dict[str, Any]) -> np.ndarray:
         facing = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
         steps = (np.arange(GRID) + 0.5) / GRID - 0.5
         points = [place + s * u + t * v for s in steps for t in steps]
-        strength = lambda squared, unit, spread: np.maximum(-(unit @ facing), 0) * a0**2 / (squared + spread)  # noqa: E731
+        strength = lambda squared, unit, least: np.maximum(-(unit @ facing), 0) * a0**2 / np.maximum(squared, least)  # noqa: E731
         mean = np.mean([made.irradiance(point, strength) for point in points], axis=0)
         return mean[:, None] * light["color"]
 
-    def of_point(squared: np.ndarray, unit: np.ndarray, spread: np.ndarray) -> np.ndarray:
-        near = np.maximum(squared, light["radius"] ** 2) + spread
+    def of_point(squared: np.ndarray, unit: np.ndarray, least: np.ndarray) -> np.ndarray:
+        near = np.maximum(np.maximum(squared, light["radius"] ** 2), least)
         fade = a0**2 / near if light["falloff"] == "inverse-square" else a0 / np.sqrt(near)
         if light["kind"] != "spot":
             return fade
@@ -64,6 +64,14 @@ def test_weights_are_those_of_rays_against_every_triangle(browser: Any, made: Ro
     assert said["pointLights"] == [], "the cost per texel is the same for any number of lights"
     each = np.sum([received(made, light) for light in LIGHTS[kind]], axis=0)
     expected = made.weights(each)
+    np.testing.assert_allclose(np.reshape(said["weights"], (-1, 3)), expected, atol=CLOSE * np.abs(expected).max())
+
+
+def test_weights_of_transfer_go_by_way_of_shapes(browser: Any, made: Room) -> None:
+    transferred = with_transfer(made)
+    said = browser.response("host", asset=browser.place(transferred.write), raw=LIGHTS["all"])
+    assert "weights" in said, said
+    expected = transferred.weights(np.sum([received(made, light) for light in LIGHTS["all"]], axis=0))
     np.testing.assert_allclose(np.reshape(said["weights"], (-1, 3)), expected, atol=CLOSE * np.abs(expected).max())
 
 

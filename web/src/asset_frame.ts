@@ -23,6 +23,7 @@ const TAKEN = {
   directions: ["directional", "environment", "point", "spot", "sphere"],
   named: ["named"],
   cloud: ["point", "spot", "sphere", "area", "directional"],
+  surfels: ["point", "spot", "sphere", "area", "directional"],
 } as const;
 
 /** `lights` are in the asset's world. @throws SrbfError on kinds that the asset cannot be relit by. */

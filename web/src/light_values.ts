@@ -24,15 +24,26 @@ export function checkLightValues({ light_values }: LightValuesManifest, fail: Fa
 
 /** `count` columns of lights, by default as many as the manifest says. @throws SrbfError on a file of another size, or a damaged one. */
 export async function readLightValues(files: AssetFiles, manifest: LightValuesManifest, functions: number, count?: number): Promise<LightValues> {
-  const { file, lights, scale = 1 } = manifest.light_values as { file: string; lights?: number; scale?: number };
+  const entry = manifest.light_values as TableEntry & { lights?: number };
+  return readRgbTable(files, entry, functions, count ?? entry.lights);
+}
+
+/** A file of a table, and what its numbers are multiplied by. */
+export interface TableEntry {
+  file: string;
+  scale?: number;
+}
+
+/** A table of `rows` and `columns` of RGB, by default as many columns as the file has. @throws SrbfError as `readLightValues`. */
+export async function readRgbTable(files: AssetFiles, { file, scale = 1 }: TableEntry, rows: number, columns?: number): Promise<LightValues> {
   const image = decodeFloat(await files.bytes(file), file);
-  const columns = count ?? lights ?? image.width;
-  if (image.width !== columns || image.height !== functions || image.channels < 3) {
-    throw new SrbfError(`expected ${columns} x ${functions} RGB numbers in ${file}, found ${image.width} x ${image.height} x ${image.channels}`);
+  const count = columns ?? image.width;
+  if (image.width !== count || image.height !== rows || image.channels < 3) {
+    throw new SrbfError(`expected ${count} x ${rows} RGB numbers in ${file}, found ${image.width} x ${image.height} x ${image.channels}`);
   }
-  const data = new Float32Array(3 * columns * functions);
-  for (let i = 0; i < columns * functions; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + c];
-  return { functions, count: columns, data };
+  const data = new Float32Array(3 * count * rows);
+  for (let i = 0; i < count * rows; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + c];
+  return { functions: rows, count, data };
 }
 
 /** Sum over lights of color times values, (F, 3); `colors` (count, 3), or (n,) of gray ones, n <= count. */

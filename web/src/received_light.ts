@@ -7,6 +7,7 @@ import type { Occluders } from "./occluders";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
 const SIDE = 4; // points per side of an area light
+const [NEAR, PARTS] = [8, 4]; // sides of a cell, closer than which it is measured by so many points a side
 const SOFTNESS_MIN = 1e-6; // in cosine, of a spot's edge
 
 /** N cells of K patches: `cells.exr`. */
@@ -51,8 +52,8 @@ export class Cells {
   underPoint(light: PunctualLight, occluders: Occluders): Float64Array {
     const out = new Float64Array(this.patches);
     const cone = light.kind === "spot" ? { inner: Math.cos(light.inner), outer: Math.cos(light.outer), axis: light.direction } : undefined;
-    this.add(out, light.position, occluders, (squared, ux, uy, uz, spread) => {
-      const near = Math.max(squared, light.radius ** 2) + spread;
+    this.add(out, light.position, occluders, (squared, ux, uy, uz, least) => {
+      const near = Math.max(squared, light.radius ** 2, least);
       const strength = light.falloff === "inverse-square" ? light.a0 ** 2 / near : light.a0 / Math.sqrt(near);
       return cone ? strength * smooth(-(ux * cone.axis[0] + uy * cone.axis[1] + uz * cone.axis[2]), cone.inner, cone.outer) : strength;
     });
@@ -66,7 +67,7 @@ export class Cells {
     for (let i = 0; i < SIDE ** 2; ++i) {
       const [s, t] = [(Math.floor(i / SIDE) + 0.5) / SIDE - 0.5, ((i % SIDE) + 0.5) / SIDE - 0.5];
       const place = [0, 1, 2].map((k) => position[k] + s * u[k] + t * v[k]) as unknown as Triple;
-      this.add(out, place, occluders, (squared, ux, uy, uz, spread) => (Math.max(0, -(ux * fx + uy * fy + uz * fz)) * a0 ** 2) / (squared + spread) / SIDE ** 2);
+      this.add(out, place, occluders, (squared, ux, uy, uz, least) => (Math.max(0, -(ux * fx + uy * fy + uz * fz)) * a0 ** 2) / Math.max(squared, least) / SIDE ** 2);
     }
     return this.means(out);
   }
@@ -84,22 +85,40 @@ export class Cells {
     return this.means(out);
   }
 
-  /** Area times cosine times `strength` of every cell that sees `place`, added to its patch. The unit vector to the place is (ux, uy, uz). */
+  /**
+   * Area times the mean of cosine times `strength` of every cell that sees `place`, added to its patch: by PARTS x PARTS points of cells
+   * closer than NEAR sides. The unit vector to the place is (ux, uy, uz).
+   */
   private add(
     out: Float64Array,
     place: Triple,
     occluders: Occluders,
-    strength: (squared: number, ux: number, uy: number, uz: number, spread: number) => number,
+    strength: (squared: number, ux: number, uy: number, uz: number, least: number) => number,
   ): void {
     const { places, starts, normals, areas, owners } = this;
     for (let i = 0; i < this.count; ++i) {
       const at = 3 * i;
       const [x, y, z] = [place[0] - places[at], place[1] - places[at + 1], place[2] - places[at + 2]];
-      const toward = x * normals[at] + y * normals[at + 1] + z * normals[at + 2];
-      if (toward <= 0) continue;
-      const squared = x * x + y * y + z * z;
-      const distance = Math.sqrt(Math.max(squared, 1e-30));
-      const amount = (toward / distance) * strength(squared, x / distance, y / distance, z / distance, areas[i] / Math.PI);
+      const [nx, ny, nz] = [normals[at], normals[at + 1], normals[at + 2]];
+      const falling = (dx: number, dy: number, dz: number, least: number): number => {
+        const toward = dx * nx + dy * ny + dz * nz;
+        if (toward <= 0) return 0;
+        const squared = dx * dx + dy * dy + dz * dz;
+        const distance = Math.sqrt(Math.max(squared, 1e-30));
+        return (toward / distance) * strength(squared, dx / distance, dy / distance, dz / distance, least);
+      };
+      const least = areas[i] / (2 * Math.PI);
+      let amount = 0;
+      if (x * x + y * y + z * z < NEAR ** 2 * areas[i]) {
+        const [[tx, ty, tz], [bx, by, bz]] = frame(nx, ny, nz);
+        const side = Math.sqrt(areas[i]);
+        for (let part = 0; part < PARTS ** 2; ++part) {
+          const s = side * ((Math.floor(part / PARTS) + 0.5) / PARTS - 0.5);
+          const t = side * (((part % PARTS) + 0.5) / PARTS - 0.5);
+          amount += falling(x - s * tx - t * bx, y - s * ty - t * by, z - s * tz - t * bz, least / PARTS ** 2);
+        }
+        amount /= PARTS ** 2;
+      } else amount = falling(x, y, z, least);
       if (amount <= 0) continue;
       const [sx, sy, sz] = [starts[at], starts[at + 1], starts[at + 2]];
       if (!occluders.between(sx, sy, sz, place[0] - sx, place[1] - sy, place[2] - sz)) out[owners[i]] += areas[i] * amount;
@@ -109,6 +128,17 @@ export class Cells {
   private means(sums: Float64Array): Float64Array {
     return sums.map((sum, k) => sum / Math.max(this.patchAreas[k], 1e-30));
   }
+}
+
+/** Two unit vectors across a normal and each other, as the Python library has them [Duff2017]. */
+function frame(x: number, y: number, z: number): [Triple, Triple] {
+  const sign = z >= 0 ? 1 : -1;
+  const a = -1 / (sign + z);
+  const b = x * y * a;
+  return [
+    [1 + sign * x * x * a, sign * b, -sign * x],
+    [b, sign + y * y * a, -y],
+  ];
 }
 
 function smooth(cosine: number, inner: number, outer: number): number {

@@ -6,8 +6,9 @@ import { lightMix } from "./light_mix";
 import type { Method } from "./method";
 import { namedMaps } from "./named_maps";
 import { relightingMap } from "./relighting_map";
+import { transfer } from "./transfer";
 
-export const METHODS: readonly Method[] = [relightingMap, eigenMap, clusteredEigenMap, lightMix, namedMaps, lightCloud];
+export const METHODS: readonly Method[] = [relightingMap, eigenMap, clusteredEigenMap, lightMix, namedMaps, lightCloud, transfer];
 
 export function methodNamed(name: unknown): Method | undefined {
   return METHODS.find((method) => method.name === name);

@@ -2,7 +2,7 @@
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { type LightValues, readLightValues, summed } from "../light_values";
+import { type LightValues, readLightValues, readRgbTable, summed, type TableEntry } from "../light_values";
 import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
@@ -17,6 +17,8 @@ interface LightCloudManifest extends ComponentsManifest, PositionManifest {
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
+  /** Of the method `transfer`: weights of the columns of `light_values` from the irradiance on the patches. */
+  surfel_transfer?: TableEntry & { rank: number; surfels: number };
 }
 
 const FAR = 1e4; // meters: how far a distant light's shadow rays go
@@ -78,24 +80,28 @@ class Rays {
     private readonly cells: Cells,
     private readonly occluders: Occluders,
     private readonly values: LightValues,
+    private readonly transfer?: LightValues,
   ) {}
 
   static async read(files: AssetFiles, manifest: LightCloudManifest, functions: number): Promise<Rays> {
     const { file } = manifest.cells as { file: string };
     const scene = manifest.scene as string;
-    const [cells, corners, values] = await Promise.all([
+    const told = manifest.surfel_transfer;
+    const [cells, corners, values, transfer] = await Promise.all([
       files.bytes(file).then((buffer) => new Cells(decodeFloat(buffer, file), file)),
       files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
       readLightValues(files, manifest, functions),
+      told && readRgbTable(files, told, told.rank, told.surfels),
     ]);
-    if (cells.patches > values.count) throw new SrbfError(`expected cells of ${values.count} patches in ${file}, found ${cells.patches}`);
-    return new Rays(cells, new Occluders(corners), values);
+    const patches = (transfer ?? values).count;
+    if (cells.patches > patches) throw new SrbfError(`expected cells of ${patches} patches in ${file}, found ${cells.patches}`);
+    return new Rays(cells, new Occluders(corners), values, transfer);
   }
 
   /** Of a white light, (F, 3). */
   weights(light: Placed): Float64Array {
-    const { cells, occluders, values } = this;
+    const { cells, occluders, values, transfer } = this;
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    return summed(values, received);
+    return summed(values, transfer ? summed(transfer, received) : received);
   }
 }

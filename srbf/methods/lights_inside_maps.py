@@ -1,0 +1,79 @@
+"""Table maps of lights inside a scene: weights by shadow rays to cells of its surfaces, or by a table of places where there are no rays.
+
+What the light cloud and the transfer of direct light share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
+from srbf.encode.position_table import FILES, PositionTable, position_table
+from srbf.errors import InputError
+from srbf.light_domain.cloud import isotropic
+from srbf.lights import Light, NamedLight, PointLight
+from srbf.methods.light_table_maps import LightTableMaps
+from srbf.visibility.cloud_lights import CloudLights
+from srbf.visibility.embree import has_embree
+
+
+class LightsInsideMaps(LightTableMaps):
+    """A method whose lights are inside the scene."""
+
+    tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", **FILES}
+
+    @classmethod
+    def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
+        tables = {**super().read_tables(reader), "cells": reader.rows("cells", 2, 4)}
+        told = reader.manifest["position_table"]
+        nx, ny, nz = told["nodes"]
+        functions = len(tables["light_values"])
+        fine = told["fine"]
+        tables["position_nodes"] = reader.table("position_nodes", (nx * ny * nz, told["rank"]), 1)[:, :, 0]
+        tables["position_basis"] = reader.table("position_basis", (told["rank"], functions), 3).astype(np.float16)
+        shape = (fine * (nz - 1) * fine * (ny - 1), 8 * fine * (nx - 1))
+        seen = np.round(reader.table("position_visibility", shape, 1)[:, :, 0] * 255)
+        return {**tables, "position_visibility": seen.astype(np.uint8)}
+
+    @classmethod
+    def add_places(cls, asset: Asset, inside: CloudLights) -> None:
+        """The cells, and the table of places, which needs all else of the asset."""
+        asset.tables["cells"] = inside.cells.image()
+        asset.manifest["cells"] = {"file": cls.tables["cells"]}
+        places = position_table(lambda at: cls.at_places(asset, at), inside.visible, inside.free)
+        asset.manifest |= places.manifest()
+        asset.tables |= places.tables()
+
+    @classmethod
+    def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
+        """By rays where Embree is installed, else by the table of places, which point lights alone are in."""
+        if not lights:
+            return np.zeros((len(asset.tables["light_values"]), 3))
+        if any(isinstance(light, NamedLight) for light in lights):
+            raise InputError(
+                f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
+            )
+        if not has_embree():
+            return np.sum([_from_table(asset, light) for light in lights], axis=0)
+        return super().projected_weights(asset, lights)
+
+    @classmethod
+    def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        return cls.weighted(asset, cls.at_places(asset, coordinates))
+
+    @classmethod
+    def at_places(cls, asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
+        """Weights of white point lights of unit irradiance at 1 m."""
+        lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in places)
+        return np.stack([cls.projected_weights(asset, [light]) for light in lights])
+
+
+def _from_table(asset: Asset, light: Light) -> Float64[ndarray, "F 3"]:
+    point = isotropic(light)
+    return PositionTable.of(asset.manifest, asset.tables).evaluate(np.array(point.position)) * (np.array(point.color) * point.a0**2)

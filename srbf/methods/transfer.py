@@ -1,0 +1,197 @@
+"""Direct-to-indirect transfer: bounces of any light, by the direct light that it lays on surfels of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
+from srbf.capture import Capture, InMemoryCapture
+from srbf.captured_light import NOWHERE, CapturedLight
+from srbf.errors import InputError
+from srbf.io.image import Encoding
+from srbf.lights import Light
+from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
+from srbf.methods.lights_inside_maps import LightsInsideMaps
+from srbf.methods.protocol import QUIET, FitRun, setting
+from srbf.visibility.cloud_lights import CloudLights
+from srbf.visibility.patches import surfel_groups
+from srbf.visibility.received import ReceivedLight
+from srbf.visibility.transfer_basis import MOST_RANK, TransferBasis, grouped, training_light, transfer_basis
+from srbf.visibility.transfer_operator import TransferOperator
+
+TRANSFER_FILE = "transfer.exr"
+MOST_SURFELS = 8000
+MOST_TRIED = 64  # components of a candidate
+FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 128
+TEXELS_PER_CLUSTER = 64  # at least, of a candidate
+MOST_BYTES = 3 << 30  # of the shapes in memory
+
+
+@dataclass(frozen=True)
+class Transfer(LightsInsideMaps):
+    """Indirect light of any lights inside the scene, at the cost of one distant light per texel [Lehtinen2008].
+
+    T(p) ~ w_{m,0} + sum_j a_j(p) w_{m,j},  w = Q R e, m the cluster of p
+
+    e is the direct irradiance that the lights lay on S surfels; R (r, S) takes it, all bounces included, to weights of the r shapes that
+    light makes on the receivers; Q are the functions of components and clusters for each shape. The capture's form factors give R, so that
+    no light is rendered.
+
+    Parameters
+    ----------
+    surfels
+        How many parts of the surfaces a light is measured by; `auto`: as the capture groups them, about 1500.
+    rank
+        How many shapes; `auto`: as many as leave out a twentieth of many lights' pictures, by norm, at most 768.
+    clusters
+        1 to 256: a texel's index is a byte.
+    components
+        How many numbers per texel.
+    smooth
+        Average components over neighbors on the surface that differ by no more than the noise of the rays.
+    encoding
+        Of the layers on disk: `half`, `float` or `uint8`.
+    seed
+        Of random numbers.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> Transfer(clusters=64).rank
+    'auto'
+    """
+
+    name: ClassVar[str] = "transfer"
+    order: ClassVar[int] = 8
+    domains: ClassVar[tuple[str, ...]] = ("surfels",)
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE}
+
+    surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
+    rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
+    clusters: int = setting(64, "How many clusters, at most 256.")
+    components: int = setting(12, "How many numbers per texel.")
+    smooth: bool = setting(True, "Take the noise of few rays out of the components.")
+    encoding: Encoding = setting("uint8", "Of the layers on disk.")
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_table_settings(self.components, self.clusters, self.encoding)
+        if self.surfels != "auto" and not 1 <= self.surfels <= MOST_SURFELS:
+            raise InputError(f"expected `surfels` auto or 1 to {MOST_SURFELS}, found {self.surfels}")
+        if self.rank != "auto" and not self.rank >= 1:
+            raise InputError(f"expected `rank` auto or 1 or more, found {self.rank}")
+
+    def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
+        """Shapes from the capture's form factors, then components of the shapes in clusters.
+
+        Parameters
+        ----------
+        capture
+            Of surfels.
+        run
+            `stitch` closes the seams of the images.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where the capture lacks its scene, or no light reaches a receiver.
+        ImageError
+            Where its form factors cannot be read.
+
+        Examples
+        --------
+        >>> Transfer().encode(inside).manifest["surfel_transfer"]["rank"]  # doctest: +SKIP
+        137
+        """
+        inside = CloudLights.of(capture)
+        operator = TransferOperator.read(capture.folder)
+        if not operator.receivers.nnz:
+            raise InputError(
+                f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
+            )
+        if self.surfels != "auto":
+            groups = surfel_groups(operator.cells, inside.occluders, inside.free, int(self.surfels), self.seed)
+            inside = replace(inside, cells=groups.cells)
+        received = ReceivedLight(operator.cells, inside.occluders)
+        lit = training_light(operator, received, inside.free, self.seed)
+        most = max(1, min(MOST_RANK, MOST_BYTES // (12 * capture.width * capture.height)))
+        asked = None if self.rank == "auto" else int(self.rank)
+        basis = transfer_basis(operator, lit, asked, self.seed, capture.manifest["surfels"].get("bounces"), most)
+        rank = basis.shapes.shape[1]
+        asset = encode_table(
+            self, _of_shapes(capture, basis), replace(run, on_image=QUIET.on_image), np.eye(rank), self.clusters, self.seed
+        )
+        count = inside.cells.patch_count
+        own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
+        asset.tables["surfel_transfer"], entry = stored_values(own)
+        asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        asset.manifest["interpolation"] = {"kind": "surfels"}
+        asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
+        self.add_places(asset, inside)
+        return asset
+
+    @classmethod
+    def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[Transfer]:
+        """Bytes, four to a layer, and one for the cluster; as many clusters as the texels fill."""
+        components = min((size - 1) // 4 * 4, MOST_TRIED)
+        if components >= 1:
+            yield cls(clusters=int(np.clip(texels // TEXELS_PER_CLUSTER, FEWEST_CLUSTERS, MOST_CLUSTERS)), components=components)
+
+    @classmethod
+    def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
+        told = reader.manifest["surfel_transfer"]
+        table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
+        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16)}
+
+    @classmethod
+    def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
+        inside = CloudLights.of_asset(asset)
+        received = np.sum([inside.on_patches(light) for light in lights], axis=0)
+        table = asset.tables["surfel_transfer"].astype(np.float32)
+        columns = np.stack([table[:, :, c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
+        return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"]
+
+    @classmethod
+    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+        """Shapes are columns of the table; point lights are relit as such."""
+        if any(capture.lights[i].kind != "patch" for i in lights):
+            return super().captured_responses(asset, capture, lights)
+        return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
+
+    @classmethod
+    def summary(cls, asset: Asset) -> str:
+        told = asset.manifest["surfel_transfer"]
+        return f"{told['surfels']} surfels, rank {told['rank']}, {asset.clusters} clusters of {asset.components} components"
+
+
+def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:
+    """The capture with its shapes as images, in its quantity."""
+    shapes = basis.shapes[:, :, None]
+    if capture.quantity == "radiance":
+        albedo = capture.geometry("albedo")
+        if albedo is None:
+            raise InputError(f"expected the albedo of the receivers in {capture.folder}, found none; bake again")
+        responses = shapes * (albedo.reshape(-1, 1, 3) / np.float32(np.pi))
+    else:
+        responses = np.repeat(shapes, 3, axis=2)
+    lights = tuple(CapturedLight(NOWHERE, "train", "", kind="patch", patch=i) for i in range(shapes.shape[1]))
+    return InMemoryCapture(capture.folder, capture.manifest, lights, responses, capture.coverage())
+
+
+METHOD = Transfer

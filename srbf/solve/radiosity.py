@@ -1,0 +1,76 @@
+"""Radiosity: light that diffuse surfels exchange, solved for all bounces at once [Goral1984]."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+
+MOST_REFLECTED = 0.99  # share of light that a bounce keeps at most: a closed white room has no solution
+ROUNDS = 16  # of balancing rows and columns
+SERIES = 24  # reflections from which on all are solved for: the rest is below what rays know
+
+
+class Bounces:
+    """B = sum_k (rho F)^k rho E: the radiosity that irradiance E on the surfels leaves, of one channel.
+
+    `form_factors`: row i are the shares of i's hemisphere that the others fill; `albedo`: rho. `most`: reflections at most, as renderers
+    bound them; None: all, (1 - rho F)^-1 rho E, by one factorization of an S by S matrix in float32.
+    """
+
+    def __init__(self, form_factors: Float32[ndarray, "S S"], albedo: Float64[ndarray, " S"], most: int | None = None) -> None:
+        self._albedo = np.clip(albedo, 0, MOST_REFLECTED).astype(np.float32)
+        self._form_factors, self._most = form_factors, most if most is None or most < SERIES else None
+        if self._most is not None:
+            return
+        from scipy.linalg import lu_factor
+
+        system = -self._albedo[:, None] * form_factors
+        system[np.diag_indices_from(system)] += 1
+        self._factors: Any = lu_factor(system, overwrite_a=True, check_finite=False)
+
+    def radiosity(self, irradiance: Float32[ndarray, "S n"]) -> Float32[ndarray, "S n"]:
+        """Of n lights."""
+        first = self._albedo[:, None] * irradiance
+        if self._most is None:
+            return self._solved(first, 0)
+        total = last = first if self._most else np.zeros_like(first)
+        for _ in range(1, self._most):
+            last = self._albedo[:, None] * (self._form_factors @ last)
+            total = total + last
+        return total
+
+    def gathered(self, weights: Float32[ndarray, "r S"]) -> Float32[ndarray, "r S"]:
+        """`weights` of radiosity as weights of irradiance: their products with `radiosity`'s matrix."""
+        if self._most is None:
+            return self._solved(np.ascontiguousarray(weights.T, np.float32), 1).T * self._albedo
+        total = last = weights * (self._albedo if self._most else np.float32(0))
+        for _ in range(1, self._most):
+            last = (last @ self._form_factors) * self._albedo
+            total = total + last
+        return total
+
+    def _solved(self, right: Float32[ndarray, "S n"], transposed: int) -> Float32[ndarray, "S n"]:
+        from scipy.linalg import lu_solve
+
+        return np.asarray(lu_solve(self._factors, right, trans=transposed, check_finite=False), np.float32)
+
+
+def reciprocal(form_factors: Float32[ndarray, "S S"], areas: Float32[ndarray, " S"]) -> Float32[ndarray, "S S"]:
+    """Form factors of rays made to agree with reciprocity, A_i F_ij = A_j F_ji: the mean of both estimates, which halves the variance.
+
+    Rows keep their sums, what of each hemisphere the surfels fill, so that no light is lost: flux is scaled by D F D, a few rounds.
+    """
+    area = np.maximum(areas.astype(np.float64), 1e-30)
+    flux = area[:, None] * form_factors
+    wanted = flux.sum(axis=1)
+    flux = (flux + flux.T) / 2
+    scale = np.ones(len(area))
+    for _ in range(ROUNDS):
+        own = scale * (flux @ scale)
+        scale *= np.sqrt(np.divide(wanted, own, out=np.ones_like(own), where=own > 0))
+    result = flux * scale * (scale / area)[:, None]
+    return result.astype(np.float32)

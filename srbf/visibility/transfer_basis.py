@@ -1,0 +1,123 @@
+"""What lights inside a scene can show on its receivers, as a few shapes, and how direct light on surfels becomes their weights.
+
+Indirect light is linear in the direct light on the surfaces, whatever gives it: E(p) = sum_f F_pf B_f, B = (1 - rho F)^-1 rho e. The
+pictures of many lights span few dimensions; their leading axes on the receivers are the shapes, and a light's weights on them are one
+matrix product with its direct irradiance e on the surfels.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64, Int
+from srbf.lights import PointLight, SpotLight
+from srbf.solve.radiosity import Bounces, reciprocal
+from srbf.visibility.received import ReceivedLight
+from srbf.visibility.transfer_operator import TransferOperator
+
+PLACED, NEAR, SPOTS = 700, 250, 250  # lights that the shapes are made for
+NEAR_RANGE = (0.03, 0.12)  # m from a surface
+CONE = (0.25, 0.7)  # rad, half-angles
+OVERSAMPLED = 16
+POWER_STEPS = 1
+RANK_ERROR = 0.05  # of the training lights' pictures, rms, that `auto` leaves out
+MOST_RANK = 768
+NORM_TEXELS = 2048
+JUDGES = 32  # random mixtures of lights by which the rank is chosen
+
+
+@dataclass(frozen=True, eq=False)
+class TransferBasis:
+    """Shapes (P, r) of irradiance on receivers, whose rms is their share of the training lights' light, and maps to their weights.
+
+    weights = `transfer` (r, S, 3) times irradiance on the surfels, all bounces included. Of changed albedo and emission: `gather` (r, S)
+    takes radiosity of the surfels, `sent` (S, r) is what the shapes lay on them, `feedback` (r, r, 3) is gather rho sent.
+    """
+
+    shapes: Float32[ndarray, "P r"]
+    transfer: Float32[ndarray, "r S 3"]
+    gather: Float32[ndarray, "r S"]
+    sent: Float32[ndarray, "S r"]
+    feedback: Float64[ndarray, "r r 3"]
+
+
+def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
+    """(S, V) float32: irradiance on the surfels under point lights and spots in free space, and point lights close to surfaces."""
+    rng = np.random.default_rng(seed)
+    cells = operator.cells
+    placed = free[rng.permutation(len(free))[:PLACED]]
+    chosen = rng.choice(len(cells.places), NEAR, p=cells.areas / cells.areas.sum())
+    near = cells.places[chosen] + rng.uniform(*NEAR_RANGE, size=(NEAR, 1)) * cells.normals[chosen]
+    lights: list[PointLight] = []
+    for x, y, z in np.concatenate([placed, near]).tolist():
+        lights.append(PointLight((x, y, z), falloff="inverse-square"))
+    for x, y, z in free[rng.integers(len(free), size=SPOTS)].tolist():
+        direction = rng.normal(size=3)
+        dx, dy, dz = (direction / np.linalg.norm(direction)).tolist()
+        outer = float(rng.uniform(*CONE))
+        lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
+    return np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+
+
+def transfer_basis(
+    operator: TransferOperator,
+    irradiance: Float32[ndarray, "S V"],
+    rank: int | None = None,
+    seed: int = 0,
+    most_bounces: int | None = None,
+    most_rank: int = MOST_RANK,
+) -> TransferBasis:
+    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out RANK_ERROR, or `most_rank`.
+
+    `most_bounces`: reflections that light has at most; None: all of them. The pictures are never formed: their axes come from random
+    mixtures of them [Halko2011].
+    """
+    rng = np.random.default_rng(seed)
+    form_factors = operator.receivers
+    cells = operator.cells
+    exchange = reciprocal(operator.exchange.toarray(), cells.areas)
+    bounces = [Bounces(exchange, cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
+    lit = np.flatnonzero(np.diff(form_factors.indptr))
+    some = form_factors[lit[:: max(1, len(lit) // NORM_TEXELS)]]
+    radiosity = []
+    for one in bounces:
+        own = one.radiosity(irradiance)
+        norm = np.sqrt(((some @ own) ** 2).sum(axis=0))
+        radiosity.append(own / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)))
+    lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
+    most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, len(lit)))
+    mixed = lights @ rng.normal(size=(lights.shape[1], most + OVERSAMPLED)).astype(np.float32)
+    found = np.linalg.qr(form_factors @ mixed)[0]
+    for _ in range(POWER_STEPS):
+        found = np.linalg.qr(form_factors @ (lights @ (lights.T @ (form_factors.T @ found))))[0]
+    left, values, _ = np.linalg.svd((form_factors.T @ found).T @ lights, full_matrices=False)
+    axes = found @ left
+    count = most if rank is not None else _enough(axes[:, :most], form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES))))
+    values = np.maximum(values[:count], 1e-7 * max(float(values[0]), 1e-30))
+    axes = axes[:, :count]
+    share = np.float32(max(1, len(lit)) / max(1, lights.shape[1]))
+    scale = values * np.sqrt(share)
+    gather = (form_factors.T @ axes).T / scale[:, None]  # (r, S)
+    transfer = np.stack([one.gathered(gather) for one in bounces], axis=2)
+    mixture = share * (lights @ (lights.T @ gather.T))  # radiosity that makes each shape: shapes = F_p mixture
+    sent = exchange @ mixture
+    feedback = np.stack([gather.astype(np.float64) @ (cells.albedo[:, c, None] * sent) for c in range(3)], axis=2)
+    return TransferBasis(axes * scale, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
+
+
+def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray) -> int:
+    """How many of the axes leave RANK_ERROR of the pictures, by norm."""
+    energy = float((pictures.astype(np.float64) ** 2).sum())
+    kept = np.cumsum(((axes.T @ pictures).astype(np.float64) ** 2).sum(axis=1))
+    return min(len(kept), int(np.searchsorted(kept, (1 - RANK_ERROR**2) * energy)) + 1)
+
+
+def grouped(values: Float32[ndarray, "r S"], groups: Int[ndarray, " S"], count: int) -> Float32[ndarray, "r G"]:
+    """Sums over the surfels of each group: light that is even over a group."""
+    found = np.zeros((len(values), count), np.float32)
+    for row, own in zip(found, values, strict=True):
+        row += np.bincount(groups, own, count).astype(np.float32)
+    return found

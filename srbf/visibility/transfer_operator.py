@@ -1,0 +1,156 @@
+"""The transfer operator of a scene: how much light surfels send to receivers and to each other, traced once, for any light."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float64, Int
+from srbf.errors import ImageError
+from srbf.io import files
+from srbf.io.image import read_image, write_image
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.form_factors import form_factors
+from srbf.visibility.lightmap_points import LightmapPoints
+from srbf.visibility.receivers import Receivers, spread_points
+from srbf.visibility.surface_cells import Cells
+from srbf.visibility.surfels import Surfels
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+SURFELS_FILE = "surfels.exr"
+OPERATOR_FILE = "operator.npz"
+POINTS, RAYS_PER_POINT = 8, 96  # of a receiver
+SURFEL_RAYS = 1024
+RECEIVERS = 1 << 14  # traced between two reports of progress
+Progress = Callable[[int, int], None]  # (points done, of how many)
+
+
+@dataclass(frozen=True, eq=False)
+class TransferOperator:
+    """Form factors from P receivers (P, S) and from surfels (S, S) to S surfels, sparse, float32.
+
+    Irradiance at receivers is `receivers` times the radiosity of the surfels. `objects` (S,): the number of each surfel's object.
+    """
+
+    cells: Cells
+    objects: Int[ndarray, " S"]
+    receivers: csr_array
+    exchange: csr_array
+
+    @staticmethod
+    def traced(
+        surfels: Surfels, receivers: Receivers, is_lightmap: bool, seed: int = 0, progress: Progress = lambda done, total: None
+    ) -> TransferOperator:
+        """By rays from every surfel and every covered receiver, from points all over its footprint where it is a texel of a lightmap."""
+        from scipy.sparse import csr_array, vstack
+
+        coverage = receivers.images.get("coverage")
+        texels = receivers.width * receivers.height
+        chosen = np.arange(texels) if coverage is None else np.flatnonzero(coverage.ravel() > 0)
+        points = _LightmapRays(receivers) if is_lightmap else _CenterRays(receivers)
+        total = len(chosen) + surfels.count
+        parts = [csr_array((0, surfels.count), dtype=np.float32)]
+        for start in range(0, len(chosen), RECEIVERS):
+            rows = chosen[start : start + RECEIVERS]
+            parts.append(points.form_factors(surfels, rows, _hash(seed, start)))
+            progress(start + len(rows), total)
+        own = form_factors(surfels, surfels.cells.places, surfels.cells.normals, SURFEL_RAYS, _hash(seed, -1))
+        progress(total, total)
+        traced = vstack(parts, format="csr")
+        counts = np.zeros(texels + 1, np.int64)
+        counts[chosen + 1] = np.diff(traced.indptr)
+        every = csr_array((traced.data, traced.indices, np.cumsum(counts)), shape=(texels, surfels.count))
+        return TransferOperator(surfels.cells, surfels.objects, every, own)
+
+    def write(self, folder: Path, key: str) -> None:
+        """surfels.exr, three rows (x, y, z, area), (normal, patch), (albedo, object), and operator.npz; `key` tells what they are of."""
+        image = np.concatenate([self.cells.image(), np.column_stack([self.cells.albedo, self.objects])[None]]).astype(np.float32)
+        write_image(folder / SURFELS_FILE, image, "float")
+        arrays = {}
+        for name in ("receivers", "exchange"):
+            matrix = getattr(self, name)
+            arrays[f"{name}_starts"] = matrix.indptr.astype(np.int64)
+            arrays[f"{name}_surfels"] = matrix.indices.astype(np.uint16)
+            arrays[f"{name}_shares"] = matrix.data.astype(np.float16)
+        with files.atomic_path(folder / OPERATOR_FILE) as temporary, open(temporary, "wb") as file:
+            np.savez_compressed(file, key=np.array(key), **arrays)
+
+    @staticmethod
+    def read(folder: Path) -> TransferOperator:
+        """ImageError where the files are missing, damaged, or not of one bake."""
+        from scipy.sparse import csr_array
+
+        path = folder / OPERATOR_FILE
+        image = read_image(folder / SURFELS_FILE, 4)
+        if len(image) != 3:
+            raise ImageError(f"expected 3 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again")
+        count = image.shape[1]
+        found = {}
+        try:
+            with np.load(path) as stored:
+                for name in ("receivers", "exchange"):
+                    starts, surfels, shares = (stored[f"{name}_{part}"] for part in ("starts", "surfels", "shares"))
+                    if surfels.max(initial=0) >= count:
+                        raise ImageError(f"expected surfels below {count} in {path}, found {surfels.max()}; bake again")
+                    found[name] = csr_array((shares.astype(np.float32), surfels.astype(np.int32), starts), shape=(len(starts) - 1, count))
+        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again") from error
+        cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
+        return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), found["receivers"], found["exchange"])
+
+
+def is_traced(folder: Path, key: str) -> bool:
+    """Whether a folder has the operator of this `key`."""
+    try:
+        with np.load(folder / OPERATOR_FILE) as stored:
+            return (folder / SURFELS_FILE).is_file() and str(stored["key"]) == key
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        return False
+
+
+class _CenterRays:
+    """Rays from the place that the receiver's images say."""
+
+    def __init__(self, receivers: Receivers) -> None:
+        self._positions, self._normals = (receivers.images[name].reshape(-1, 3).astype(np.float64) for name in ("position", "normal"))
+
+    def form_factors(self, surfels: Surfels, rows: Int[ndarray, " n"], seed: int) -> csr_array:
+        return form_factors(surfels, self._positions[rows], _unit(self._normals[rows]), POINTS * RAYS_PER_POINT, seed)
+
+
+class _LightmapRays:
+    """Rays from points all over each texel's footprint, as a bake samples it."""
+
+    def __init__(self, receivers: Receivers) -> None:
+        self._points = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit)
+        self._square = spread_points(POINTS)[:, :2]
+
+    def form_factors(self, surfels: Surfels, rows: Int[ndarray, " n"], seed: int) -> csr_array:
+        from scipy.sparse import diags_array
+
+        turn = np.random.default_rng(seed).uniform(size=(len(rows), 2))
+        total, weights = None, np.zeros(len(rows))
+        for number, square in enumerate(self._square):
+            at = self._points.at(rows, (square + turn) % 1)
+            found = form_factors(surfels, at.point, _unit(at.normal.astype(np.float64)), RAYS_PER_POINT, _hash(seed, number))
+            found = diags_array(at.weight) @ found
+            total = found if total is None else total + found
+            weights += at.weight
+        return (diags_array((1 / np.maximum(weights, 1e-30)).astype(np.float32)) @ total).tocsr()
+
+
+def _unit(vectors: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-30)
+
+
+def _hash(seed: int, number: int) -> int:
+    """A seed of its own for each part."""
+    return (seed * 0x9E3779B1 + number * 0x85EBCA77) & 0x7FFFFFFF

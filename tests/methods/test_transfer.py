@@ -1,0 +1,145 @@
+"""Transfer on rooms solved by radiosity: errors at lights that no one rendered, linearity, leaks, other kinds of lights, bad files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_rooms import Room, room_of_surfels
+
+from srbf.asset import Asset
+from srbf.capture import Capture
+from srbf.errors import ImageError, InputError
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.fitting.options import fit
+from srbf.lights import AreaLight, DirectionalLight, NamedLight, PointLight, SpotLight
+from srbf.methods import linear_response, projected_weights
+from srbf.methods.transfer import Transfer
+from srbf.solve.radiosity import Bounces, reciprocal
+from srbf.visibility.cloud_lights import CloudLights
+from srbf.visibility.received import ReceivedLight
+from srbf.visibility.transfer_basis import grouped, training_light, transfer_basis
+from srbf.visibility.transfer_operator import OPERATOR_FILE, TransferOperator, is_traced
+
+pytest.importorskip("embreex")
+pytest.importorskip("sklearn")
+
+BOX = Room.box((3, 2, 2), 0.25, 0.6)
+APART = Room.box((4, 3, 2.5), 0.25, 0.6, (2.0, 3.0, 3.0))  # a wall without a door
+SETTINGS = Transfer(clusters=8, components=12, rank=96)
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory) -> Capture:
+    return room_of_surfels(tmp_path_factory.mktemp("surfels") / "capture", BOX, 800, 400)
+
+
+@pytest.fixture(scope="module")
+def asset(capture: Capture) -> Asset:
+    return SETTINGS.encode(capture)
+
+
+def light(place, **changes) -> PointLight:
+    return PointLight(tuple(place), falloff="inverse-square", **changes)
+
+
+def test_lights_that_no_one_rendered_are_relit(asset: Asset, capture: Capture) -> None:
+    """The truth is of square cells of 25 cm, and of their centers: 9 % of the error is its own."""
+    errors = evaluate(asset, capture)
+    assert set(errors) == {"validation", "holdout", "lights"}
+    assert errors["holdout"]["relative_rmse"] < 0.15
+    assert asset.bytes_per_texel()["directional"] == 13
+
+
+def test_energy_is_that_of_the_room(asset: Asset) -> None:
+    transport = BOX.transport()
+    for place in BOX.free[-6:]:
+        found = linear_response(asset, [light(place)]).reshape(-1, 3)[: len(BOX.places)]
+        truth = np.einsum("ijc,j->ic", transport, BOX.direct(place))
+        np.testing.assert_allclose((BOX.areas @ found) / (BOX.areas @ truth), 1, atol=0.05)
+
+
+def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
+    asset.save(tmp_path / "asset")
+    lights = [light((1.0, 1.0, 1.0)), SpotLight((2.0, 1.0, 1.5), falloff="inverse-square", direction=(0, 0, -1), inner=0.3, outer=0.5)]
+    np.testing.assert_array_equal(linear_response(Asset.open(tmp_path / "asset"), lights), linear_response(asset, lights))
+
+
+def test_lights_of_all_kinds_add_up_and_scale(asset: Asset) -> None:
+    one, other = light((0.5, 0.6, 0.7), color=(2.0, 1.0, 0.5)), AreaLight((2.0, 1.0, 1.9), u=(0.4, 0, 0), v=(0, -0.4, 0))
+    both = linear_response(asset, [one, other])
+    np.testing.assert_allclose(both, linear_response(asset, [one]) + linear_response(asset, [other]), atol=1e-4 * both.max())
+    np.testing.assert_allclose(linear_response(asset, [replace(one, a0=2.0)]), 4 * linear_response(asset, [one]), rtol=1e-3, atol=1e-4)
+    assert not linear_response(asset, []).any()
+    assert not linear_response(asset, [DirectionalLight((0.2, 0.3, 1.0))]).any(), "a sun through no window"
+    with pytest.raises(InputError, match="found a named one"):
+        projected_weights(asset, [NamedLight("Desk")])
+
+
+@pytest.mark.slow
+def test_two_rooms_without_a_door_exchange_no_light(tmp_path: Path) -> None:
+    apart = Transfer(clusters=16, rank=96).encode(room_of_surfels(tmp_path / "capture", APART, 1200, 400))
+    far = (APART.places[:, 0] > 2) | ((np.abs(APART.places[:, 0] - 2) < 1e-6) & (APART.normals[:, 0] > 0))
+    lit = linear_response(apart, [light((1.0, 1.5, 1.2))]).reshape(-1, 3)[: len(APART.places)]
+    assert np.abs(lit[far]).mean() < 0.005 * lit[~far].mean()
+
+
+def test_full_rank_is_the_operator(capture: Capture) -> None:
+    """As many shapes as the lights span: transfer times shapes is F_p (1 - rho F)^-1 rho, of lights that made them."""
+    operator, inside = TransferOperator.read(capture.folder), CloudLights.of(capture)
+    received = ReceivedLight(operator.cells, inside.occluders)
+    lights = training_light(operator, received, inside.free)[:, :40]
+    basis = transfer_basis(operator, lights, 120)
+    exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas)
+    for c in range(3):
+        exact = operator.receivers @ Bounces(exchange, operator.cells.albedo[:, c].astype(np.float64)).radiosity(lights)
+        found = basis.shapes @ (basis.transfer[:, :, c] @ lights)
+        np.testing.assert_allclose(found, exact, atol=2e-3 * exact.max())
+
+
+def test_shapes_on_surfels_are_those_on_receivers(capture: Capture) -> None:
+    """With feedback and gather, as changed albedo needs them: one bounce more each round."""
+    operator, inside = TransferOperator.read(capture.folder), CloudLights.of(capture)
+    lights = training_light(operator, ReceivedLight(operator.cells, inside.occluders), inside.free)
+    basis = transfer_basis(operator, lights, 160)
+    for c in range(3):
+        direct = operator.cells.albedo[:, c : c + 1] * lights[:, :8]
+        weights = np.linalg.solve(np.eye(len(basis.gather)) - basis.feedback[:, :, c], basis.gather @ direct)
+        exact = basis.transfer[:, :, c] @ lights[:, :8]
+        pictures = [basis.shapes @ found for found in (weights, exact)]
+        assert np.linalg.norm(pictures[0] - pictures[1]) < 0.05 * np.linalg.norm(pictures[1])
+
+
+def test_groups_sum_their_surfels() -> None:
+    values = np.arange(8, dtype=np.float32).reshape(2, 4)
+    np.testing.assert_array_equal(grouped(values, np.array([0, 2, 0, 2]), 3), [[2, 0, 4], [10, 0, 12]])
+
+
+@pytest.mark.slow
+def test_a_number_of_surfels_and_bytes_are_kept(capture: Capture) -> None:
+    few = fit(capture, surfels=50, rank=32, clusters=4, method="transfer")
+    assert few.manifest["surfel_transfer"]["surfels"] <= 50 and few.manifest["surfel_transfer"]["rank"] == 32
+    chosen = fit(capture, budget=13)
+    assert chosen.method == "transfer" and chosen.bytes_per_texel()["directional"] <= 13
+    with pytest.raises(InputError, match="expected a `budget` for a capture of surfels"):
+        fit(capture, psnr=40)
+
+
+def test_damaged_form_factors_are_refused(capture: Capture, tmp_path: Path) -> None:
+    assert is_traced(capture.folder, "made") and not is_traced(capture.folder, "other") and not is_traced(tmp_path, "made")
+    for name in ("surfels.exr", OPERATOR_FILE):
+        (tmp_path / name).write_bytes((capture.folder / name).read_bytes())
+    (tmp_path / OPERATOR_FILE).write_bytes((capture.folder / OPERATOR_FILE).read_bytes()[:1000])
+    with pytest.raises(ImageError, match="expected form factors of surfels"):
+        TransferOperator.read(tmp_path)
+    assert not is_traced(tmp_path, "made")
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"), [({"surfels": 0}, "`surfels` auto or 1 to"), ({"rank": 0}, "`rank` auto or 1"), ({"clusters": 300}, "1 to 256")]
+)
+def test_settings_out_of_range_are_refused(settings: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Transfer(**settings)

@@ -1,0 +1,81 @@
+"""Form factors by rays: closed rooms lose nothing, two plates against the analytic factor, both sides of a wall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.form_factors import cosine_directions, form_factors
+from srbf.visibility.surface_cells import Fragments
+from srbf.visibility.surfels import Surfels, surfels_of
+
+pytest.importorskip("embreex")
+
+PLATES = 0.19982  # of two parallel unit squares one side apart [Siegel1992, configuration C-11]
+
+
+def square(z: float, up: bool, parts: int = 8) -> np.ndarray:
+    """(2 parts^2, 3, 3): a unit square in small triangles, its normal up or down."""
+    triangles = []
+    for i in range(parts):
+        for j in range(parts):
+            a, b, c, d = ((np.array([i + x, j + y, 0]) / parts + [0, 0, z]) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+            triangles += [[a, b, c], [a, c, d]] if up else [[a, c, b], [a, d, c]]
+    return np.array(triangles, np.float32)
+
+
+def surfels(corners: np.ndarray, free: np.ndarray, count: int, albedo: float = 0.5) -> Surfels:
+    surfaces = Fragments(corners, np.full((len(corners), 3), albedo, np.float32))
+    return surfels_of(surfaces, np.zeros(len(corners), np.int64), EmbreeTriangles(corners), free, None, count)
+
+
+def between_plates() -> Surfels:
+    free = np.random.default_rng(0).uniform(0.1, 0.9, (64, 3))
+    return surfels(np.concatenate([square(0, True), square(1, False)]), free, 64)
+
+
+def test_two_plates() -> None:
+    found = between_plates()
+    lower = found.cells.normals[:, 2] > 0
+    factors = form_factors(found, found.cells.places, found.cells.normals, 4096).toarray()
+    share = factors[np.ix_(lower, ~lower)].sum(axis=1) @ found.cells.areas[lower] / found.cells.areas[lower].sum()
+    assert share == pytest.approx(PLATES, rel=0.02)
+    assert not factors[np.ix_(lower, lower)].any()
+    flux = found.cells.areas[:, None] * factors
+    np.testing.assert_allclose(flux[np.ix_(lower, ~lower)].sum(), flux[np.ix_(~lower, lower)].sum(), rtol=0.02)
+
+
+def test_sides_that_no_free_place_sees_have_no_surfel() -> None:
+    found = between_plates()
+    assert set(np.sign(found.cells.normals[:, 2])) == {-1, 1}
+    assert (found.cells.normals[:, 2] > 0)[found.cells.places[:, 2] < 0.5].all(), "the lower plate's back is out of reach"
+    outside = found.seen_along(np.array([[0.5, 0.5, -1.0], [0.5, 0.5, 0.5]]), np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]))
+    assert outside[0] == -1 and outside[1] >= 0
+
+
+def test_black_surfaces_have_no_surfel() -> None:
+    assert surfels(square(0, True), np.array([[0.5, 0.5, 0.5]]), 16, albedo=0.0).count == 0
+
+
+def test_no_more_surfels_than_asked() -> None:
+    corners = np.concatenate([square(0, True, 16), square(1, False, 16)])
+    free = np.random.default_rng(0).uniform(0.1, 0.9, (64, 3))
+    assert surfels(corners, free, 100).count <= 100
+
+
+def test_directions_have_the_density_of_the_cosine() -> None:
+    normals = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.6, 0, 0.8], [-1, 0, 0]])
+    directions = cosine_directions(normals, 4096, np.random.default_rng(1))
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1, atol=1e-12)
+    cosine = np.einsum("ncd,nd->nc", directions, normals)
+    assert (cosine >= 0).all()
+    np.testing.assert_allclose(cosine.mean(axis=1), 2 / 3, atol=2e-3)  # of density cos / pi
+    np.testing.assert_allclose(directions.mean(axis=1), 2 / 3 * normals, atol=5e-3)
+
+
+def test_the_same_seed_gives_the_same_rays() -> None:
+    found = between_plates()
+    one, again = (form_factors(found, found.cells.places, found.cells.normals, 64, 3).toarray() for _ in range(2))
+    np.testing.assert_array_equal(one, again)
+    assert (one != form_factors(found, found.cells.places, found.cells.normals, 64, 4).toarray()).any()
