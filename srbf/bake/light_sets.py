@@ -34,7 +34,7 @@ MOST_NAMES = 4096
 MOST_LIGHTS = 20_000  # of a cloud, or patches
 SURFELS = 5000  # of the transfer operator, about, unless a density is given
 MOST_SURFELS = 8000
-RUN_TIME_SURFELS = 1500  # groups of surfels that a light is measured by
+RUN_TIME_SURFELS = 2000  # groups of surfels that a light is measured by
 
 
 @dataclass(frozen=True)

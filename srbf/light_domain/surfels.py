@@ -1,4 +1,4 @@
-"""The light domain of transfer: lights inside the scene, by the direct light that they lay on its surfels [Kontkanen2006]."""
+"""The light domain of transfer: lights inside the scene, by the direct light that they lay on its surfels [Lehtinen2008]."""
 
 from __future__ import annotations
 

@@ -43,7 +43,10 @@ HALF_TOP = 4096.0  # the largest stored value: a millionth of it is still a norm
 
 
 class LightTableMaps(ComponentMaps):
-    """A method whose light functions are columns of `light_values`, (F, N, 3): of named lights, of patches, or of captured point lights."""
+    """A method whose light functions are columns of `light_values`, (F, N, 3): of named lights, of patches, or of captured point lights.
+
+    (F, N, 1) where the columns have no color.
+    """
 
     tables: ClassVar[dict[str, str]] = {"light_values": VALUES_FILE, "cluster_index": "cluster_index.png"}
     filterable: ClassVar[bool] = False
@@ -62,7 +65,8 @@ class LightTableMaps(ComponentMaps):
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         shape = (check_layers(reader), int(reader.manifest["light_values"]["lights"]))
-        tables = {"light_values": reader.table("light_values", shape, 3).astype(np.float16)}
+        channels = int(reader.manifest["light_values"].get("channels", 3))
+        tables = {"light_values": reader.table("light_values", shape, channels).astype(np.float16)}
         return {**tables, "cluster_index": read_cluster_index(reader)} if "cluster_index" in reader.manifest else tables
 
     @classmethod
@@ -76,7 +80,7 @@ class LightTableMaps(ComponentMaps):
         if not lights:
             return np.zeros((len(values), 3))
         columns = cls.column_weights(asset, lights) * asset.manifest["light_values"]["scale"]
-        return np.stack([values[..., c].astype(np.float64) @ columns[:, c] for c in range(3)], axis=1)
+        return np.stack([values[..., c % values.shape[2]].astype(np.float64) @ columns[:, c] for c in range(3)], axis=1)
 
     @classmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
@@ -94,7 +98,7 @@ class LightTableMaps(ComponentMaps):
     def columns(cls, asset: Asset, chosen: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
         """Responses to single columns of the table."""
         values = asset.tables["light_values"][:, list(chosen)].astype(np.float64) * asset.manifest["light_values"]["scale"]
-        return cls.weighted(asset, values.transpose(1, 0, 2))
+        return cls.weighted(asset, np.broadcast_to(values.transpose(1, 0, 2), (len(chosen), len(values), 3)))
 
     @classmethod
     def describe(cls, asset: Asset) -> Mapping[str, Any]:
@@ -199,7 +203,7 @@ def check_table_settings(components: int, clusters: int, encoding: str) -> None:
         raise InputError(f"expected an encoding of half, float, uint8, found {encoding!r}")
 
 
-def stored_values(values: Float32[ndarray, "F N 3"]) -> tuple[Float16[ndarray, "F N 3"], dict[str, Any]]:
+def stored_values(values: Float32[ndarray, "F N c"]) -> tuple[Float16[ndarray, "F N c"], dict[str, Any]]:
     """(the table as halves, the manifest's key `light_values`): value = stored times `scale`, a power of two that keeps halves precise."""
     largest = float(np.abs(values).max()) if values.size else 0.0
     scale = 2.0 ** np.ceil(np.log2(largest / HALF_TOP)) if largest > 0 else 1.0

@@ -29,8 +29,8 @@ from srbf.visibility.transfer_operator import TransferOperator
 TRANSFER_FILE = "transfer.exr"
 MOST_SURFELS = 8000
 MOST_TRIED = 64  # components of a candidate
-FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 128
-TEXELS_PER_CLUSTER = 64  # at least, of a candidate
+FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 192
+TEXELS_PER_CLUSTER = 32  # at least, of a candidate
 MOST_BYTES = 3 << 30  # of the shapes in memory
 
 
@@ -47,9 +47,9 @@ class Transfer(LightsInsideMaps):
     Parameters
     ----------
     surfels
-        How many parts of the surfaces a light is measured by; `auto`: as the capture groups them, about 1500.
+        How many parts of the surfaces a light is measured by; `auto`: as the capture groups them, about 2000.
     rank
-        How many shapes; `auto`: as many as leave out a twentieth of many lights' pictures, by norm, at most 768.
+        How many shapes; `auto`: as many as leave out 3 % of many lights' pictures, by norm, at most 768.
     clusters
         1 to 256: a texel's index is a byte.
     components
@@ -137,6 +137,9 @@ class Transfer(LightsInsideMaps):
         asset = encode_table(
             self, _of_shapes(capture, basis), replace(run, on_image=QUIET.on_image), np.eye(rank), self.clusters, self.seed
         )
+        if capture.quantity == "irradiance":  # shapes have no color
+            asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
+            asset.manifest["light_values"]["channels"] = 1
         count = inside.cells.patch_count
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(own)

@@ -146,7 +146,7 @@ def with_transfer(made: Room, rank: int = 4) -> Room:
     rng = np.random.default_rng(12)
     matrix = rng.normal(size=(rank, PATCHES, 3)).astype(np.float16).astype(np.float32)
     values = rng.normal(size=(len(made.values), rank, 3)).astype(np.float16).astype(np.float32)
-    files = {**made.files, "light_values.exr": (values, "half"), "transfer.exr": (matrix, "half")}
+    files = {**made.files, "light_values.exr": (values[..., :1], "half"), "transfer.exr": (matrix, "half")}
     manifest = {
         **made.manifest,
         "method": "transfer",
@@ -155,7 +155,7 @@ def with_transfer(made: Room, rank: int = 4) -> Room:
         "light_values": {"file": "light_values.exr", "lights": rank, "scale": 1.0},
         "surfel_transfer": {"file": "transfer.exr", "rank": rank, "surfels": PATCHES, "scale": 2.0},
     }
-    return replace(made, manifest=manifest, files=files, values=2 * np.einsum("frc,rkc->fkc", values, matrix))
+    return replace(made, manifest=manifest, files=files, values=2 * np.einsum("fr,rkc->fkc", values[..., 0], matrix))
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,11 +38,11 @@ export interface TableEntry {
 export async function readRgbTable(files: AssetFiles, { file, scale = 1 }: TableEntry, rows: number, columns?: number): Promise<LightValues> {
   const image = decodeFloat(await files.bytes(file), file);
   const count = columns ?? image.width;
-  if (image.width !== count || image.height !== rows || image.channels < 3) {
+  if (image.width !== count || image.height !== rows || (image.channels < 3 && image.channels !== 1)) {
     throw new SrbfError(`expected ${count} x ${rows} RGB numbers in ${file}, found ${image.width} x ${image.height} x ${image.channels}`);
   }
   const data = new Float32Array(3 * count * rows);
-  for (let i = 0; i < count * rows; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + c];
+  for (let i = 0; i < count * rows; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + (image.channels > 1 ? c : 0)];
   return { functions: rows, count, data };
 }
 
