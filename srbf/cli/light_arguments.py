@@ -62,6 +62,18 @@ def parse_area(text: str, a0: float) -> AreaLight:
     return AreaLight(_xyz(n, 0), u=_xyz(n, 3), v=_xyz(n, 6), a0=a0, **_color(n, 9))
 
 
+def parse_object(text: str, flag: str) -> tuple[str, Triple]:
+    """`OBJECT=R,G,B`: the name is all before the last `=`, the color linear and at least 0."""
+    name, equals, rest = text.rpartition("=")
+    usage = f"`{flag}` OBJECT=R,G,B of at least 0"
+    if not (name and equals):
+        raise InputError(f"expected {usage}, found {text!r}")
+    color = _xyz(_numbers(rest, (3, 3), usage, text), 0)
+    if min(color) < 0:
+        raise InputError(f"expected {usage}, found {text!r}")
+    return name, color
+
+
 def parse_named(text: str) -> NamedLight:
     """`NAME=INTENSITY[,R,G,B]`: the name is all before the last `=`; intensity 1 is as the scene has the light set."""
     name, equals, rest = text.rpartition("=")

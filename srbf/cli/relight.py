@@ -16,6 +16,7 @@ from srbf.cli.light_arguments import (
     parse_area,
     parse_directional,
     parse_named,
+    parse_object,
     parse_point,
     parse_sphere,
     parse_spot,
@@ -30,8 +31,9 @@ from srbf.cli.values import POSITIVE, Number
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
 from srbf.light_domain import domain_of_asset
-from srbf.lights import Light
+from srbf.lights import Light, NamedLight
 from srbf.methods import outside_domain
+from srbf.methods.surface_changes import with_albedo
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
@@ -74,6 +76,22 @@ def relight(
         list[str] | None,
         typer.Option(
             metavar="NAME=INTENSITY[,R,G,B]", help="One of the scene's own lights: 1 is as it is set, 0 off. Repeats.", show_default=False
+        ),
+    ] = None,
+    emissive: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="OBJECT=R,G,B",
+            help="An object that emits this radiance, of an editable transfer asset. Repeats.",
+            show_default=False,
+        ),
+    ] = None,
+    albedo: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="OBJECT=R,G,B",
+            help="An object's diffuse color in all bounces, of an editable transfer asset. Repeats.",
+            show_default=False,
         ),
     ] = None,
     environment: Annotated[
@@ -136,7 +154,9 @@ def relight(
             *(parse_sphere(text, reference_distance, falloff or "inverse-square") for text in sphere or []),
             *(parse_area(text, reference_distance) for text in area or []),
             *map(parse_named, light or []),
+            *(NamedLight(*parse_object(text, "emissive")) for text in emissive or []),
         ]
+        painted = dict(parse_object(text, "albedo") for text in albedo or [])
         seen_from = None if viewer is None else parse_viewer(viewer)
     has_light = bool(placed or environment)
     if lights is not None and has_light:
@@ -145,7 +165,8 @@ def relight(
         raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
     if not (has_light or ambient_only or lights is not None):
         raise typer.BadParameter(
-            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --environment or --ambient-only"
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment "
+            "or --ambient-only"
         )
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
@@ -157,13 +178,13 @@ def relight(
     if picture and alpha == "premultiplied":
         raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     if lights is not None:
-        opened = Asset.open(asset)
+        opened = _opened(asset, painted)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
-    opened = Asset.open(asset)
+    opened = _opened(asset, painted)
     if falloff is None:
         placed = with_falloff(placed, domain_of_asset(opened.manifest).falloff)
     opacity = alpha_of(opened)
@@ -209,6 +230,11 @@ def _relight_frames(
         for line in added.notes([light for frame in frames for light in frame]):
             note(line)
     note(f"wrote {len(frames)} images into {output}")
+
+
+def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]]) -> Asset:
+    opened = Asset.open(folder)
+    return with_albedo(opened, albedo) if albedo else opened
 
 
 def check_image_output(path: Path, force: bool) -> None:

@@ -55,7 +55,7 @@ class LightsInsideMaps(LightTableMaps):
         """By rays where Embree is installed, else by the table of places, which point lights alone are in."""
         if not lights:
             return np.zeros((len(asset.tables["light_values"]), 3))
-        if any(isinstance(light, NamedLight) for light in lights):
+        if not cls.takes_objects and any(isinstance(light, NamedLight) for light in lights):
             raise InputError(
                 f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
             )

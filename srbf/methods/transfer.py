@@ -16,10 +16,11 @@ from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import NOWHERE, CapturedLight
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.lights import Light
+from srbf.lights import Light, NamedLight
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, setting
+from srbf.methods.surface_changes import FILES, Surfaces
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
 from srbf.visibility.received import ReceivedLight
@@ -54,6 +55,8 @@ class Transfer(LightsInsideMaps):
         1 to 256: a texel's index is a byte.
     components
         How many numbers per texel.
+    editable
+        Keep what changed albedo and emission of objects need.
     smooth
         Average components over neighbors on the surface that differ by no more than the noise of the rays.
     encoding
@@ -75,12 +78,14 @@ class Transfer(LightsInsideMaps):
     name: ClassVar[str] = "transfer"
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE}
+    takes_objects: ClassVar[bool] = True
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES}
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
+    editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
     smooth: bool = setting(True, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     seed: int = 0
@@ -144,6 +149,10 @@ class Transfer(LightsInsideMaps):
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(own)
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        if self.editable:
+            told = capture.manifest["surfels"]
+            names = tuple(told.get("objects", ()))
+            Surfaces.of_basis(basis, operator.cells, inside.cells.patches, operator.objects, names, told.get("bounces")).add_to(asset)
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)
@@ -160,15 +169,22 @@ class Transfer(LightsInsideMaps):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["surfel_transfer"]
         table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
-        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16)}
+        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16), **Surfaces.read(reader)}
 
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
+        """A named light is an object whose surfaces emit radiance of its color."""
         inside = CloudLights.of_asset(asset)
-        received = np.sum([inside.on_patches(light) for light in lights], axis=0)
+        received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
+        emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
+        for light in lights:
+            if isinstance(light, NamedLight):
+                emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
+            else:
+                received += inside.on_patches(light)
         table = asset.tables["surfel_transfer"].astype(np.float32)
         columns = np.stack([table[:, :, c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
-        return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"]
+        return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
 
     @classmethod
     def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:

@@ -16,6 +16,7 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, NamedLight, moved
+from srbf.methods import method_of
 from srbf.visibility.embree import has_embree
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
@@ -58,6 +59,7 @@ class Added:
         self._stack = ExitStack()
         self._kind = kind
         self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
+        self._emits = isinstance(source, Asset) and method_of(source).takes_objects
         self._light: DirectLight | None = None
         if kind == "ray":
             self._light = RayTracer(Receivers.of(source))
@@ -82,6 +84,8 @@ class Added:
         """What is to be said of `lights`: what was added, and what was not."""
         if self._light is None:
             return []
+        if self._emits:
+            lights = [light for light in lights if not isinstance(light, NamedLight)]  # what it lays on receivers is in the asset
         without = (EnvironmentLight, NamedLight)
         lines = [] if lights and all(isinstance(light, without) for light in lights) else [f"added {NAMES[self._kind]}"]
         if any(isinstance(light, EnvironmentLight) for light in lights):

@@ -15,7 +15,8 @@ from srbf.errors import ImageError, InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.lights import AreaLight, DirectionalLight, NamedLight, PointLight, SpotLight
-from srbf.methods import linear_response, projected_weights
+from srbf.methods import linear_response
+from srbf.methods.surface_changes import with_albedo
 from srbf.methods.transfer import Transfer
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.cloud_lights import CloudLights
@@ -74,8 +75,6 @@ def test_lights_of_all_kinds_add_up_and_scale(asset: Asset) -> None:
     np.testing.assert_allclose(linear_response(asset, [replace(one, a0=2.0)]), 4 * linear_response(asset, [one]), rtol=1e-3, atol=1e-4)
     assert not linear_response(asset, []).any()
     assert not linear_response(asset, [DirectionalLight((0.2, 0.3, 1.0))]).any(), "a sun through no window"
-    with pytest.raises(InputError, match="found a named one"):
-        projected_weights(asset, [NamedLight("Desk")])
 
 
 @pytest.mark.slow
@@ -110,6 +109,57 @@ def test_shapes_on_surfels_are_those_on_receivers(capture: Capture) -> None:
         exact = basis.transfer[:, :, c] @ lights[:, :8]
         pictures = [basis.shapes @ found for found in (weights, exact)]
         assert np.linalg.norm(pictures[0] - pictures[1]) < 0.05 * np.linalg.norm(pictures[1])
+
+
+@pytest.fixture(scope="module")
+def editable(capture: Capture) -> Asset:
+    return Transfer(clusters=8, components=24, rank=160, editable=True, encoding="half").encode(capture)
+
+
+def test_a_repainted_wall_is_that_of_another_bake(editable: Asset, capture: Capture, tmp_path: Path) -> None:
+    """Against the operator itself with the other albedo."""
+    operator, inside = TransferOperator.read(capture.folder), CloudLights.of(capture)
+    blue, one = (0.1, 0.2, 0.8), light((1.2, 0.9, 1.1))
+    direct = ReceivedLight(operator.cells, inside.occluders).irradiance(one)[:, :1].astype(np.float32)
+    exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas)
+
+    def exact(albedo: np.ndarray) -> np.ndarray:
+        columns = [operator.receivers @ Bounces(exchange, albedo[:, c].astype(np.float64)).radiosity(direct)[:, 0] for c in range(3)]
+        return np.stack(columns, axis=1).reshape(capture.height, capture.width, 3)
+
+    painted = np.where((operator.objects == 1)[:, None], np.array(blue), operator.cells.albedo)
+    changed = with_albedo(editable, {"Red wall": blue})
+    change = linear_response(changed, [one]) - linear_response(editable, [one])
+    expected = exact(painted) - exact(operator.cells.albedo)
+    assert np.linalg.norm(change - expected) < 0.15 * np.linalg.norm(expected)
+    assert expected[..., 2].mean() > 0 > expected[..., 0].mean()
+    changed.save(tmp_path / "changed")
+    np.testing.assert_array_equal(linear_response(Asset.open(tmp_path / "changed"), [one]), linear_response(changed, [one]))
+    same = with_albedo(editable, {"Red wall": tuple(operator.cells.albedo[operator.objects == 1][0].tolist())})
+    np.testing.assert_allclose(linear_response(same, [one]), linear_response(editable, [one]), rtol=1e-2, atol=1e-3)
+
+
+def test_an_object_that_emits_lights_the_room(editable: Asset, capture: Capture) -> None:
+    operator = TransferOperator.read(capture.folder)
+    exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas).astype(np.float64)
+    radiance = np.array([1.0, 0.5, 0.0])
+    found = linear_response(editable, [NamedLight("Red wall", tuple(radiance))])
+    for c in range(3):
+        emitted = np.pi * radiance[c] * (operator.objects == 1)
+        radiosity = np.linalg.solve(np.eye(len(exchange)) - operator.cells.albedo[:, c, None] * exchange, emitted)
+        expected = (operator.receivers @ radiosity).reshape(capture.height, capture.width)
+        assert np.linalg.norm(found[..., c] - expected) <= 0.15 * np.linalg.norm(expected) + 1e-5
+    both = linear_response(editable, [NamedLight("Red wall", (1.0, 1.0, 1.0)), light((1.2, 0.9, 1.1))])
+    apart = linear_response(editable, [NamedLight("Red wall")]) + linear_response(editable, [light((1.2, 0.9, 1.1))])
+    np.testing.assert_allclose(both, apart, rtol=1e-4, atol=1e-4)
+
+
+def test_what_cannot_change_is_said(editable: Asset, asset: Asset) -> None:
+    for wrong in (lambda: with_albedo(asset, {"Walls": (0.5, 0.5, 0.5)}), lambda: linear_response(asset, [NamedLight("Walls")])):
+        with pytest.raises(InputError, match="fit with `editable`"):
+            wrong()
+    with pytest.raises(InputError, match="expected an object of the asset .Walls, Red wall., found 'Sofa'"):
+        with_albedo(editable, {"Sofa": (0.5, 0.5, 0.5)})
 
 
 def test_groups_sum_their_surfels() -> None:

@@ -1,0 +1,180 @@
+"""Surfaces that change after the bake: other albedo, and emission, of a transfer asset's objects.
+
+With gather M (r, S), from radiosity of surfels to weights of shapes, and sent A (S, r), what the shapes lay on the surfels, light that is
+exchanged k times has the weights (M rho A)^k M b. So other albedo is another product of small matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64, Int
+from srbf.asset import Asset
+from srbf.asset_reader import AssetReader
+from srbf.errors import InputError
+from srbf.solve.radiosity import MOST_REFLECTED, SERIES
+from srbf.visibility.surface_cells import Cells
+from srbf.visibility.transfer_basis import TransferBasis, grouped
+
+KEY = "surfaces"
+FILES = {
+    "surface_gather": "surface_gather.exr",
+    "surface_sent": "surface_sent.exr",
+    "surface_feedback": "surface_feedback.exr",
+    "surface_objects": "surface_objects.exr",
+    "surface_albedo": "surface_albedo.exr",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Surfaces:
+    """What changes need: `gather` (r, S), `sent` (r, S) and `feedback` (r, r, 3), which is gather rho sent.
+
+    `shares` (O, S): what part of a surfel's area each object has; `albedo` (S, 3); `bounces`: how often light is exchanged, None: always.
+    """
+
+    gather: Float32[ndarray, "r S"]
+    sent: Float32[ndarray, "r S"]
+    feedback: Float32[ndarray, "r r 3"]
+    shares: Float32[ndarray, "O S"]
+    albedo: Float32[ndarray, "S 3"]
+    names: tuple[str, ...]
+    bounces: int | None
+
+    @staticmethod
+    def of_basis(
+        basis: TransferBasis,
+        cells: Cells,
+        groups: Int[ndarray, " F"],
+        objects: Int[ndarray, " F"],
+        names: tuple[str, ...],
+        bounces: int | None,
+    ) -> Surfaces:
+        """Of fine surfels `cells`, each in a group and of an object: sums and means over the groups."""
+        count = int(groups.max()) + 1
+        area = np.maximum(np.bincount(groups, cells.areas, count), 1e-30).astype(np.float32)
+        sent = grouped(np.ascontiguousarray(basis.sent.T) * cells.areas, groups, count) / area
+        owned = (objects == np.arange(len(names))[:, None]) * cells.areas
+        albedo = grouped(np.ascontiguousarray(cells.albedo.T) * cells.areas, groups, count) / area
+        shares = grouped(owned.astype(np.float32), groups, count) / area
+        feedback = basis.feedback.astype(np.float32)
+        return Surfaces(grouped(basis.gather, groups, count), sent, feedback, shares, np.ascontiguousarray(albedo.T), names, bounces)
+
+    @staticmethod
+    def of(asset: Asset) -> Surfaces:
+        """InputError where the asset has none."""
+        if KEY not in asset.manifest:
+            raise InputError(f"expected an asset whose surfaces can change, found a {asset.method} one without; fit with `editable`")
+        told = asset.manifest[KEY]
+        tables = [asset.tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in FILES]
+        gather, sent, feedback, shares, albedo = tables
+        return Surfaces(gather[..., 0], sent[..., 0], feedback, shares[..., 0], albedo[0], tuple(told["objects"]), told.get("bounces"))
+
+    def add_to(self, asset: Asset) -> None:
+        """Its tables and keys."""
+        tables = (self.gather[..., None], self.sent[..., None], self.feedback, self.shares[..., None], self.albedo[None])
+        scales = {}
+        for (name, file), table in zip(FILES.items(), tables, strict=True):
+            scales[name] = float(2.0 ** np.ceil(np.log2(max(float(np.abs(table).max(initial=0)), 1e-30))))
+            asset.tables[name] = (table / np.float32(scales[name])).astype(np.float16)
+            asset.manifest[name] = {"file": file}
+        entry: dict[str, Any] = {"objects": list(self.names), "scales": scales}
+        asset.manifest[KEY] = entry if self.bounces is None else {**entry, "bounces": self.bounces}
+
+    @staticmethod
+    def read(reader: AssetReader) -> dict[str, ndarray]:
+        """The tables of an asset on disk; none where it has none."""
+        if KEY not in reader.manifest:
+            return {}
+        told = reader.manifest["surfel_transfer"]
+        rank, count, objects = int(told["rank"]), int(told["surfels"]), len(reader.manifest[KEY]["objects"])
+        shapes = ((rank, count, 1), (rank, count, 1), (rank, rank, 3), (objects, count, 1), (1, count, 3))
+        return {name: reader.table(name, shape[:2], shape[2]).astype(np.float16) for name, shape in zip(FILES, shapes, strict=True)}
+
+    def emitted(self, name: str, radiance: Float64[ndarray, " 3"]) -> Float64[ndarray, "r 3"]:
+        """Weights of the shapes under an object that emits diffusely: of what it lays on receivers itself, and of all bounces."""
+        radiosity = np.pi * self._share_of(name)[:, None] * radiance
+        more = None if self.bounces is None else self.bounces + 1
+        return np.stack(
+            [_series(self.feedback[:, :, c], self.gather @ radiosity[:, c : c + 1].astype(np.float32), more)[:, 0] for c in range(3)],
+            axis=1,
+        ).astype(np.float64)
+
+    def repainted(self, albedo: Mapping[str, tuple[float, float, float]]) -> tuple[Surfaces, Float32[ndarray, "r S 3"]]:
+        """(the same with objects of another albedo, what that adds to the weights of shapes from irradiance on surfels)."""
+        change = np.zeros_like(self.albedo)
+        for name, color in albedo.items():
+            share = self._share_of(name)[:, None]
+            change += share * (np.clip(np.array(color, np.float32), 0, MOST_REFLECTED) - self.albedo)
+        painted = np.clip(self.albedo + change, 0, MOST_REFLECTED)
+        feedback = np.empty_like(self.feedback)
+        added = np.empty((*self.gather.shape, 3), np.float32)
+        for c in range(3):
+            feedback[:, :, c] = self.feedback[:, :, c] + (self.gather * (painted - self.albedo)[:, c]) @ self.sent.T
+            after = _series(feedback[:, :, c], self.gather * painted[:, c], self.bounces)
+            added[:, :, c] = after - _series(self.feedback[:, :, c], self.gather * self.albedo[:, c], self.bounces)
+        return replace(self, albedo=painted, feedback=feedback), added
+
+    def _share_of(self, name: str) -> Float32[ndarray, " S"]:
+        if name not in self.names:
+            known = ", ".join(self.names[:8]) + (", …" if len(self.names) > 8 else "")
+            raise InputError(f"expected an object of the asset ({known}), found {name!r}")
+        return self.shares[self.names.index(name)]
+
+
+def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) -> Asset:
+    """A transfer asset whose objects have another diffuse color: bounces off them change, everywhere.
+
+    Parameters
+    ----------
+    asset
+        Of the method transfer, fitted with `editable`, of irradiance.
+    albedo
+        Linear RGB from 0 to 1, by name of object.
+
+    Returns
+    -------
+    Asset
+        In memory. Its table of places, for engines without rays, is that of before.
+
+    Raises
+    ------
+    InputError
+        On an object that the asset does not know, and on an asset that cannot change.
+
+    Examples
+    --------
+    >>> from srbf.methods.surface_changes import with_albedo
+    >>> with_albedo(asset, {"Wall": (0.8, 0.1, 0.1)})  # doctest: +SKIP
+    """
+    surfaces = Surfaces.of(asset)
+    if asset.quantity != "irradiance":
+        raise InputError(
+            "expected an asset of irradiance to change the albedo of, found radiance, which has the albedo in it; bake irradiance"
+        )
+    painted, added = surfaces.repainted(albedo)
+    scale = float(asset.manifest["surfel_transfer"]["scale"])
+    table = asset.tables["surfel_transfer"].astype(np.float32) * np.float32(scale) + added
+    largest = float(2.0 ** np.ceil(np.log2(max(float(np.abs(table).max()) / 4096.0, 1e-30))))
+    manifest = {**asset.manifest, "surfel_transfer": {**asset.manifest["surfel_transfer"], "scale": largest}}
+    changed = replace(
+        asset, manifest=manifest, tables={**asset.tables, "surfel_transfer": (table / np.float32(largest)).astype(np.float16)}
+    )
+    painted.add_to(changed)
+    return changed
+
+
+def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:
+    """sum over k < `terms` of feedback^k first; None: of all k."""
+    if terms is None or terms >= SERIES:
+        return np.linalg.solve(np.eye(len(feedback), dtype=np.float32) - feedback, first)
+    total = last = first if terms else np.zeros_like(first)
+    for _ in range(1, terms):
+        last = feedback @ last
+        total = total + last
+    return total
