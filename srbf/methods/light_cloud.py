@@ -213,13 +213,6 @@ class LightCloud(LightsInsideMaps):
         return lambda lights, dt: cls.weighted(asset, fades.step([isotropic(light) for light in lights], dt)[None])[0]
 
     @classmethod
-    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
-        """Patches are columns of the table; point lights are relit as such."""
-        if any(capture.lights[i].kind != "patch" for i in lights):
-            return super().captured_responses(asset, capture, lights)
-        return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
-
-    @classmethod
     def at_places(cls, asset: Asset, places: Float64[ndarray, "b 3"]) -> Float64[ndarray, "b F 3"]:
         if asset.manifest["interpolation"]["kind"] == "kernel" and has_embree():
             return KernelTable.of(asset).weights(places, CloudLights.of_asset(asset).visible)

@@ -14,6 +14,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
+from srbf.capture import Capture
 from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.errors import InputError
 from srbf.light_domain.cloud import isotropic
@@ -62,6 +63,13 @@ class LightsInsideMaps(LightTableMaps):
         if not has_embree():
             return np.sum([_from_table(asset, light) for light in lights], axis=0)
         return super().projected_weights(asset, lights)
+
+    @classmethod
+    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
+        """Patches and shapes are columns of the table; point lights are relit as such."""
+        if any(capture.lights[i].kind != "patch" for i in lights):
+            return super().captured_responses(asset, capture, lights)
+        return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
 
     @classmethod
     def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:

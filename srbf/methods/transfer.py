@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
@@ -185,13 +185,6 @@ class Transfer(LightsInsideMaps):
         table = asset.tables["surfel_transfer"].astype(np.float32)
         columns = np.stack([table[:, :, c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
-
-    @classmethod
-    def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:
-        """Shapes are columns of the table; point lights are relit as such."""
-        if any(capture.lights[i].kind != "patch" for i in lights):
-            return super().captured_responses(asset, capture, lights)
-        return cls.columns(asset, [int(capture.lights[i].patch or 0) for i in lights])
 
     @classmethod
     def summary(cls, asset: Asset) -> str:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
+from srbf.errors import InputError
 from srbf.lights import PointLight, SpotLight
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.received import ReceivedLight
@@ -73,7 +74,7 @@ def transfer_basis(
     """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out RANK_ERROR, or `most_rank`.
 
     `most_bounces`: reflections that light has at most; None: all of them. The pictures are never formed: their axes come from random
-    mixtures of them [Halko2011].
+    mixtures of them [Halko2011]. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
     form_factors = operator.receivers
@@ -88,6 +89,11 @@ def transfer_basis(
         norm = np.sqrt(((some @ own) ** 2).sum(axis=0))
         radiosity.append(own / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)))
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
+    if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
+        raise InputError(
+            "expected light that bounces onto the receivers, found none: no light reaches a surface that they see, or the scene has no "
+            "diffuse bounces; choose other receivers or `light_bounds`, or raise the bounces"
+        )
     most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, len(lit)))
     mixed = lights @ rng.normal(size=(lights.shape[1], most + OVERSAMPLED)).astype(np.float32)
     found = np.linalg.qr(form_factors @ mixed)[0]

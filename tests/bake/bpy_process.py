@@ -25,7 +25,8 @@ def in_blender(function: Callable[..., dict[str, Any]], *arguments: Any) -> dict
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "out.npz"
         command = [sys.executable, __file__, function.__code__.co_filename, function.__name__, json.dumps(arguments), str(out)]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}  # what the test's module finds, it finds here
+        ours = [folder for folder in sys.path if Path(folder).is_relative_to(ROOT) and "site-packages" not in folder]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(ours)}  # what the test's module finds, it finds here
         done = subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment)
         assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
         with np.load(out) as arrays:

@@ -24,7 +24,7 @@ def test_flags_mean_a_set() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("lamps", (), 400, None, None, None), "named, cloud, patches or point:SPACING, found 'lamps'"),  # words: ok
+        (("lamps", (), 400, None, None, None), "named, cloud, patches, surfels or point:SPACING, found 'lamps'"),  # words: ok
         (("named", (), 400, 5, None, None), "`light_set=named` without `patches`"),
         (("cloud", ("Hall",), 400, None, None, None), "`light_group` with `light_set=named`"),
         (("patches", (), 400, None, 0.5, None), "`grid` with `light_set=cloud`"),

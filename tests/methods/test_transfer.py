@@ -162,6 +162,12 @@ def test_what_cannot_change_is_said(editable: Asset, asset: Asset) -> None:
         with_albedo(editable, {"Sofa": (0.5, 0.5, 0.5)})
 
 
+def test_a_scene_without_bounces_has_nothing_to_fit(capture: Capture) -> None:
+    still = replace(capture, manifest={**capture.manifest, "surfels": {**capture.manifest["surfels"], "bounces": 0}})
+    with pytest.raises(InputError, match="expected light that bounces onto the receivers"):
+        SETTINGS.encode(still)
+
+
 def test_groups_sum_their_surfels() -> None:
     values = np.arange(8, dtype=np.float32).reshape(2, 4)
     np.testing.assert_array_equal(grouped(values, np.array([0, 2, 0, 2]), 3), [[2, 0, 4], [10, 0, 12]])

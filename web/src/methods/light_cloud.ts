@@ -17,7 +17,7 @@ interface LightCloudManifest extends ComponentsManifest, PositionManifest {
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
-  /** Of the method `transfer`: weights of the columns of `light_values` from the irradiance on the patches. */
+  /** Of direct-to-indirect transfer: weights of the columns of `light_values` from the irradiance on the patches. */
   surfel_transfer?: TableEntry & { rank: number; surfels: number };
 }
 
