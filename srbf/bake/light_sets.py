@@ -208,9 +208,7 @@ class CloudSet:
                 "places": PLACES,
                 "seed": seed,
             },
-            "surfaces": {"cells": self.count, "spacing": self.spacing}
-            if self.kind == "surfels"
-            else {"cells": cell_count(self.patch_count)},
+            "surfaces": self._surfaces(),
         }
 
     def _surfaces(self) -> dict[str, Any]:

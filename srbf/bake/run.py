@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,8 @@ from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
-from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet, NamedSet
+from srbf.bake.light_set_files import trace_operator, write_light_set
+from srbf.bake.light_sets import CloudSet, NamedSet
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
@@ -31,10 +32,7 @@ from srbf.bake.worker_pool import RemoteResult, Renderer, Response, Task, Worker
 from srbf.capture import Capture
 from srbf.errors import BakeError, InputError
 from srbf.io import files
-from srbf.io.image import write_image
 from srbf.receiver_images import MANIFEST
-from srbf.visibility.receivers import Receivers
-from srbf.visibility.transfer_operator import TransferOperator, is_traced
 
 if TYPE_CHECKING:
     from srbf.bake.dask_workers import DaskWorkerPool
@@ -251,8 +249,11 @@ class _Passes:
             else:
                 self._record(self._images.prepared["facts"]["blender"])
             self._check_lights()
-            self._write_light_set()
-            self._trace_operator()
+            write_light_set(self._folder, self._settings, self._identity)
+            if self._shard is None or self._shard.is_preparation:
+                assert self._images.prepared is not None
+                manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])
+                trace_operator(Capture(self._folder, manifest, ()), self._settings, self._reporter.progress)
             try:
                 self._passes(pool)
             except KeyboardInterrupt:
@@ -420,39 +421,6 @@ class _Passes:
             manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)
             files.write_json(self._folder / MANIFEST, manifest)
 
-    def _write_light_set(self) -> None:
-        """What a cloud knows of the scene: for a fit, and for a bake that is resumed. Again where it is gone or damaged."""
-        settings, light_set = self._settings, self._settings.light_set
-        if not isinstance(light_set, CloudSet):
-            return
-        assert light_set.found is not None
-        patches, path = self._folder / PATCHES_FILE, self._folder / LIGHT_SET_FILE
-        key = light_set.key(self._identity["scene_sha256"], settings.validation + settings.holdout, settings.seed, settings.scene)
-        if not (patches.is_file() and replace(light_set, found=None).read(path, key).is_known):
-            write_image(patches, light_set.found.patches.cells.image(), "float")
-            light_set.write(path, key)
-
-    def _trace_operator(self) -> None:
-        """Of surfels: form factors by rays, once; by the machine that prepares the folder or bakes alone."""
-        light_set = self._settings.light_set
-        if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:
-            return
-        if self._shard is not None and not self._shard.is_preparation:
-            return
-        key = f"{light_set.found.checksum} {self._settings.width}x{self._settings.height} {self._settings.seed}"
-        if is_traced(self._folder, key):
-            return
-        assert self._images.prepared is not None
-        manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])
-        operator = TransferOperator.traced(
-            light_set.found.surfels,
-            Receivers.of(Capture(self._folder, manifest, ())),
-            self._settings.receiver.kind == "lightmap",
-            self._settings.seed,
-            lambda done, total: self._reporter.progress(done, total, "form factors"),
-        )
-        operator.write(self._folder, key)
-
     def _record(self, blender: str) -> None:
         """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""
         path = self._folder / STATE
@@ -481,7 +449,9 @@ class _Passes:
             self._record(event["blender"])
             self._images.require_receiver(event)
         elif kind == "scene":
-            self._write_light_set()  # before the bake counts as begun: resumed, it has the same lights
+            write_light_set(
+                self._folder, self._settings, self._identity
+            )  # before the bake counts as begun: resumed, it has the same lights
             self._record(event["blender"])
             self._facts = event
         elif kind == "file":

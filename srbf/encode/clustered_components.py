@@ -78,7 +78,7 @@ def clustered_components(
 
     One pass over the train images assigns the texels, another projects them: `on_image` sees each image in the first, `progress` counts
     the images of both. `refine(components, index)` may change the components of texels before they get their ranges. `mean`:
-    how many a texel has on average, in clusters of differing numbers; None: all of them. `stitch` closes the
+    the mean number of components per texel, in clusters of differing numbers; None: all have all. `stitch` closes the
     seams of the images, since components of two clusters cannot be compared, and what its texels show is read once more: both sides then
     agree as well as their clusters hold them.
     """

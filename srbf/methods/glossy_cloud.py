@@ -42,7 +42,7 @@ class GlossyCloud(LightTableMaps):
     Parameters
     ----------
     clusters
-        1 to 256: a texel's index is a byte.
+        1 to 256: the index per texel is one byte.
     components
         How many numbers per texel.
     interpolation

@@ -45,7 +45,7 @@ class LightCloud(LightsInsideMaps):
     Parameters
     ----------
     clusters
-        1 to 256: a texel's index is a byte.
+        1 to 256: the index per texel is one byte.
     components
         How many numbers per texel.
     interpolation
@@ -55,7 +55,7 @@ class LightCloud(LightsInsideMaps):
     zones
         kernel: parts of the scene, with merged lights and clusters of their own.
     mean_components
-        How many a texel has on average: clusters get more where these cut the error most, at most `components`. `auto`: all have all.
+        Their mean number per texel: clusters get more where these cut the error most, at most `components`. `auto`: all have all.
     merge
         kernel: similar lights of a zone become one, by the `harmonic` or `arithmetic` mean; `none` merges none.
     merged

@@ -35,7 +35,7 @@ class LightMix(LightTableMaps):
     Parameters
     ----------
     clusters
-        1 to 256: a texel's index is a byte; 1 needs none.
+        1 to 256: the index per texel is one byte; 1 needs none.
     components
         How many numbers per texel; at most three per light are kept.
     smooth

@@ -36,7 +36,7 @@ from srbf.solve.zones import split_zones
 
 VALUES_FILE = "light_values.exr"
 MOST_COMPONENTS = 1024
-MOST_CLUSTERS = 256  # a texel's index is a byte
+MOST_CLUSTERS = 256  # the index per texel is one byte
 SAMPLE_TEXELS = 1 << 14  # at least; and so many a cluster:
 TEXELS_PER_CLUSTER = 96
 HALF_TOP = 4096.0  # the largest stored value: a millionth of it is still a normal half
@@ -60,7 +60,8 @@ class LightTableMaps(ComponentMaps):
 
     def on_sample(self, ratio: float) -> LightTableMaps:
         """As many texels per cluster as there will be."""
-        return self if self.clusters == 1 else replace(self, clusters=max(2, int(np.ceil(self.clusters / ratio))))  # type: ignore[type-var]
+        settings: Any = self  # of the dataclass that it is
+        return self if self.clusters == 1 else replace(settings, clusters=max(2, int(np.ceil(self.clusters / ratio))))
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
@@ -151,7 +152,8 @@ def encode_table(
         own = replace(own, index=None, unstitched_index=None)
     images = carried_images(capture, nearest_covered(capture.coverage()))
     domain = domain_of_capture(capture)
-    manifest = common_manifest(capture, method.name, domain, images, asdict(method), {})  # type: ignore[call-overload]
+    settings: Any = method  # of the dataclass that it is
+    manifest = common_manifest(capture, method.name, domain, images, asdict(settings), {})
     manifest |= own.entries(clusters)
     manifest["cluster_zone"] = [0] * clusters if found.cluster_zone is None else found.cluster_zone.tolist()
     asset = Asset(manifest, own.stored, own.scale, own.bias, own.tables(), images, carried_scene(capture))

@@ -52,7 +52,7 @@ class Transfer(LightsInsideMaps):
     rank
         How many shapes; `auto`: as many as leave out 3 % of many lights' pictures, by norm, at most 768.
     clusters
-        1 to 256: a texel's index is a byte.
+        1 to 256: the index per texel is one byte.
     components
         How many numbers per texel.
     editable

@@ -49,7 +49,7 @@ class TransferOperator:
     def traced(
         surfels: Surfels, receivers: Receivers, is_lightmap: bool, seed: int = 0, progress: Progress = lambda done, total: None
     ) -> TransferOperator:
-        """By rays from every surfel and every covered receiver, from points all over its footprint where it is a texel of a lightmap."""
+        """By rays from every surfel and every covered receiver; in a lightmap from points all over the footprint of each texel."""
         from scipy.sparse import csr_array, vstack
 
         coverage = receivers.images.get("coverage")

@@ -14,6 +14,7 @@ from test_unity import MAIN, UNITY_CG, ask, needs_mono, needs_spirv, shader_of  
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.errors import ShaderError
 from srbf.export import spirv, unity
 from srbf.export.light_tables import weights_shape
 from srbf.lights import SpotLight
@@ -83,5 +84,6 @@ def test_the_sample_shader_compiles(folders: dict[str, Path], kind: str) -> None
     code = (folders[kind] / "Relit.shader").read_text().split("HLSLPROGRAM")[1].split("ENDHLSL")[0]
     code = code.replace('#include "UnityCG.cginc"', UNITY_CG).replace('#include "SrbfAsset.hlsl"', shader_of(folders[kind]))
     code = "\n".join(line for line in code.splitlines() if "#pragma" not in line)
-    spirv.compile_hlsl(code, "vert", "Vertex")
-    spirv.compile_hlsl(code, "frag", "Fragment")
+    assert spirv.compile_hlsl(code, "vert", "Vertex") and spirv.compile_hlsl(code, "frag", "Fragment")
+    with pytest.raises(ShaderError):
+        spirv.compile_hlsl(code.replace("return", "retrun", 1), "frag", "Fragment")

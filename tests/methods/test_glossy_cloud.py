@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -174,9 +175,10 @@ def test_what_is_wrong_is_said(asset: Asset, capture: Capture, tmp_path: Path) -
     kernel = GlossyCloud(clusters=2, components=4, interpolation="kernel").encode(capture)
     with pytest.raises(InputError, match="expected point lights of inverse-square falloff"):
         linear_response(kernel, [SpotLight((1, 1, 1), falloff="inverse-square", direction=(0, 0, -1), inner=0.3, outer=0.5)])
-    for settings in ({"components": 0}, {"clusters": 300}, {"nearest": 0}):
+    wrong: tuple[dict[str, Any], ...] = ({"components": 0}, {"clusters": 300}, {"nearest": 0})
+    for settings in wrong:
         with pytest.raises(InputError):
-            GlossyCloud(**settings)  # type: ignore[arg-type]
+            GlossyCloud(**settings)
 
 
 def test_a_light_that_lacks_harmonics_is_refused(capture: Capture, tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ def test_lights_of_patches_have_nothing_to_fade(asset: Asset) -> None:
 
 @pytest.mark.slow
 def test_components_go_where_they_cut_the_error_most(points: Capture) -> None:
-    """Six a texel on average: better than six for all, and no better than twelve for all."""
+    """A mean of six per texel: better than six for all, and no better than twelve for all."""
     base = LightCloud(clusters=12, interpolation="kernel", smooth=False)
     settings = {"six": replace(base, components=6), "mixed": replace(base, mean_components=6), "twelve": base}
     error = {name: evaluate(method.encode(points), points)["train"]["relative_rmse"] for name, method in settings.items()}

@@ -42,7 +42,10 @@ def received(made: Room, light: dict[str, Any]) -> np.ndarray:
         facing = np.cross(u, v) / np.linalg.norm(np.cross(u, v))
         steps = (np.arange(GRID) + 0.5) / GRID - 0.5
         points = [place + s * u + t * v for s in steps for t in steps]
-        strength = lambda squared, unit, least: np.maximum(-(unit @ facing), 0) * a0**2 / np.maximum(squared, least)  # noqa: E731
+
+        def strength(squared: np.ndarray, unit: np.ndarray, least: np.ndarray) -> np.ndarray:
+            return np.maximum(-(unit @ facing), 0) * a0**2 / np.maximum(squared, least)
+
         mean = np.mean([made.irradiance(point, strength) for point in points], axis=0)
         return mean[:, None] * light["color"]
 
