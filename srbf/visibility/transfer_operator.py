@@ -91,7 +91,7 @@ class TransferOperator:
         path = folder / OPERATOR_FILE
         image = read_image(folder / SURFELS_FILE, 4)
         if len(image) != 3:
-            raise ImageError(f"expected 3 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again")
+            raise ImageError(f"expected 3 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again with `force=True`")
         count = image.shape[1]
         found = {}
         try:
@@ -99,10 +99,10 @@ class TransferOperator:
                 for name in ("receivers", "exchange"):
                     starts, surfels, shares = (stored[f"{name}_{part}"] for part in ("starts", "surfels", "shares"))
                     if surfels.max(initial=0) >= count:
-                        raise ImageError(f"expected surfels below {count} in {path}, found {surfels.max()}; bake again")
+                        raise ImageError(f"expected surfels below {count} in {path}, found {surfels.max()}; bake again with `force=True`")
                     found[name] = csr_array((shares.astype(np.float32), surfels.astype(np.int32), starts), shape=(len(starts) - 1, count))
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
-            raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again") from error
+            raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
         return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), found["receivers"], found["exchange"])
 
