@@ -100,7 +100,7 @@ def group(features: ndarray, weights: ndarray, count: int, seed: int = 0) -> Int
 
 
 def parted(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarray, " N"]:
-    """Groups without parts that share no place from which they are seen."""
+    """Groups without parts that share no place from which they are seen; of what none sees, one part a group."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -108,7 +108,8 @@ def parted(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarra
     for number in range(int(labels.max()) + 1):
         members = np.flatnonzero(labels == number)
         own = seen[members].astype(np.float32)
-        parts, part = connected_components(csr_array(own @ own.T > 0), directed=False)
+        dark = ~own.any(axis=1, keepdims=True)
+        parts, part = connected_components(csr_array((own @ own.T > 0) | (dark & dark.T)), directed=False)
         result[members] = total + part
         total += parts
     return result

@@ -18,6 +18,7 @@ OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to 
 STAGES = (16, 192)  # places that most surfaces are seen from
 RAYS = 1 << 20  # traced at a time
 NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way
+FLAT = 0.01  # of a fragment's longest edge: how far a point is off it at most
 DARK = 1e-3  # albedo below which nothing is reflected
 
 
@@ -141,7 +142,10 @@ def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T
 
 
 def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
-    """The cells that fragments make together, in patch 0. A cell's place is that of the fragment nearest to the mean: on the surface."""
+    """The cells that fragments make together, in patch 0.
+
+    A cell's place is the middle of its fragments where that is on the surface, else that of the fragment nearest to it.
+    """
     centers, normals, areas = fragments.centers, fragments.normals, fragments.areas
     count = int(owner.max()) + 1 if len(owner) else 0
     area = np.bincount(owner, areas, count)
@@ -155,13 +159,26 @@ def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
     order = np.lexsort((off, owner))
     nearest = order[np.searchsorted(owner[order], np.arange(count))]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    on_surface = np.bincount(owner, _contain(fragments, middle[owner]), count) > 0
     return Cells(
-        centers[nearest].astype(np.float32),
+        np.where(on_surface[:, None], middle, centers[nearest]).astype(np.float32),
         normal.astype(np.float32),
         area.astype(np.float32),
         albedo.astype(np.float32),
         np.zeros(count, np.int64),
     )
+
+
+def _contain(fragments: Fragments, points: Float64[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
+    """Whether each fragment has its point, within FLAT of its size."""
+    corners, normals = fragments.corners.astype(np.float64), fragments.normals
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    to_point = points[:, None] - corners  # (T, 3, 3)
+    edges = np.roll(corners, -1, axis=1) - corners
+    inward = np.cross(normals[:, None], edges)
+    inward /= np.maximum(np.linalg.norm(inward, axis=2, keepdims=True), 1e-30)
+    inside = (np.einsum("tek,tek->te", inward, to_point) >= -FLAT * longest[:, None]).all(axis=1)
+    return inside & (np.abs(np.einsum("tk,tk->t", normals, to_point[:, 0])) <= FLAT * longest)
 
 
 def frames(normals: Float64[ndarray, "n 3"]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:

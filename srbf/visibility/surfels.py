@@ -10,10 +10,14 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
 from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, cells_of, exposed, grouped_cells, lit
 
 WITNESSES = 256  # free places by which it is known what a wall parts
+REACH, REACH_RAYS = 3, 64  # bounces and rays by which sides are found that no free place sees
+LEAST_VIEW = 0.1  # share of such a side's hemisphere that lit surfaces fill
+SIDES = 1 << 14  # whose rays are traced at a time
 CUTS = 4  # halvings of a triangle that a wall parts
 
 
@@ -40,6 +44,24 @@ class Surfels:
         back = np.einsum("nk,nk->n", self._normals[triangle], directions) > 0
         return np.where(triangle >= 0, self.owners[back.astype(np.int64), triangle], -1)
 
+    def spread(self, count: int, seed: int = 0) -> tuple[Float64[ndarray, "S q 3"], Float64[ndarray, "S q 3"]]:
+        """`count` points of each surfel, evenly over its area, and unit normals there."""
+        sides = Fragments(self.corners, np.zeros_like(self.corners[:, 0])).both_sides()
+        owner = self.owners.ravel()
+        order = np.argsort(owner, kind="stable")
+        order = order[np.searchsorted(owner[order], 0) :]
+        ends = np.cumsum(sides.areas[order])
+        last = ends[np.searchsorted(owner[order], np.arange(self.count), side="right") - 1]
+        first = np.concatenate([[0.0], last[:-1]])
+        rng = np.random.default_rng(seed)
+        shares = (np.arange(count) + rng.uniform(size=(self.count, count))) / count
+        found = np.searchsorted(ends, first[:, None] + shares * (last - first)[:, None])
+        side = order[np.minimum(found, len(order) - 1)]
+        u, v = np.sqrt(rng.uniform(size=side.shape)), rng.uniform(size=side.shape)
+        barycentric = np.stack([1 - u, u * (1 - v), u * v], axis=-1)
+        points = np.einsum("nqk,nqkc->nqc", barycentric, sides.corners[side].astype(np.float64))
+        return points, sides.normals[side]
+
     @functools.cached_property
     def _triangles(self) -> EmbreeTriangles:
         return EmbreeTriangles(self.corners)
@@ -65,7 +87,9 @@ def surfels_of(
     surfaces, objects = cut_at_walls(surfaces, objects, occluders)
     both, object_of = surfaces.both_sides(), np.concatenate([objects, objects])
     kept = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
-    kept = kept[exposed(both.at(kept), occluders, free)]
+    seen = np.zeros(len(both.corners), bool)
+    seen[kept[exposed(both.at(kept), occluders, free)]] = True
+    kept = kept[reached(both, seen)[kept]]
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
         return Surfels(Cells.of_image(np.zeros((2, 0, 4), np.float32)), surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64))
@@ -81,6 +105,32 @@ def surfels_of(
     of_cell = np.zeros(int(owner.max()) + 1, np.int64)
     of_cell[owner] = object_of[kept]
     return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_cell)
+
+
+def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
+    """Sides that the `seen` ones light, and those that these light: what is behind a chair, under a table, and that no free place sees.
+
+    `both`: sides of triangles, the backs after the fronts. A side counts from LEAST_VIEW on, the share of its hemisphere that they fill,
+    so that the far ground outside a window does not.
+    """
+    half = len(both.corners) // 2
+    triangles, normals, areas = EmbreeTriangles(both.corners[:half]), both.normals, both.areas
+    lift = OFFSET * float(np.ptp(both.corners.reshape(-1, 3), axis=0).max(initial=0))
+    centers, found, last = both.centers, seen.copy(), np.flatnonzero(seen)
+    received = np.zeros(len(areas))
+    for step in range(REACH):
+        for start in range(0, len(last), SIDES):
+            own = last[start : start + SIDES]
+            directions = cosine_directions(normals[own][:, None], REACH_RAYS, np.random.default_rng([step, start]))[:, 0].reshape(-1, 3)
+            triangle, _, _ = triangles.first_hit(np.repeat(centers[own] + lift * normals[own], REACH_RAYS, axis=0), directions)
+            back = np.einsum("nk,nk->n", normals[triangle], directions) > 0
+            flux = np.repeat(areas[own] / REACH_RAYS, REACH_RAYS)
+            met = triangle >= 0
+            received += np.bincount((triangle + half * back)[met], flux[met], len(areas))
+        now = received >= LEAST_VIEW * areas
+        last = np.flatnonzero(now & ~found)
+        found |= now
+    return found
 
 
 def cut_at_walls(surfaces: Fragments, objects: Int[ndarray, " T"], occluders: EmbreeTriangles) -> tuple[Fragments, Int[ndarray, " U"]]:

@@ -16,7 +16,7 @@ from srbf.errors import ImageError
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.form_factors import form_factors
+from srbf.visibility.form_factors import RayOrigins, form_factors
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.surface_cells import Cells
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
 SURFELS_FILE = "surfels.exr"
 OPERATOR_FILE = "operator.npz"
-POINTS, RAYS_PER_POINT = 8, 96  # of a receiver
-SURFEL_RAYS = 1024
+POINTS = 16  # of a receiver, and of a surfel
+RAYS, FEWEST_RAYS, MOST_RAYS = 1.5e8, 768, 3072  # of all receivers; of each
+SURFEL_RAYS = 2048
 RECEIVERS = 1 << 14  # traced between two reports of progress
 Progress = Callable[[int, int], None]  # (points done, of how many)
 
@@ -55,14 +56,16 @@ class TransferOperator:
         coverage = receivers.images.get("coverage")
         texels = receivers.width * receivers.height
         chosen = np.arange(texels) if coverage is None else np.flatnonzero(coverage.ravel() > 0)
-        points = _LightmapRays(receivers) if is_lightmap else _CenterRays(receivers)
+        rays = int(np.clip(RAYS / max(1, len(chosen)), FEWEST_RAYS, MOST_RAYS))
+        points = _LightmapPoints(receivers, seed) if is_lightmap else _Centers(receivers)
         total = len(chosen) + surfels.count
         parts = [csr_array((0, surfels.count), dtype=np.float32)]
         for start in range(0, len(chosen), RECEIVERS):
             rows = chosen[start : start + RECEIVERS]
-            parts.append(points.form_factors(surfels, rows, _hash(seed, start)))
+            origins = points.origins(rows)
+            parts.append(form_factors(surfels, origins, rays // origins.weights.shape[1], _hash(seed, start)))
             progress(start + len(rows), total)
-        own = form_factors(surfels, surfels.cells.places, surfels.cells.normals, SURFEL_RAYS, _hash(seed, -1))
+        own = form_factors(surfels, RayOrigins.even(*surfels.spread(POINTS, seed)), SURFEL_RAYS // POINTS, _hash(seed, -1))
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)
@@ -116,39 +119,33 @@ def is_traced(folder: Path, key: str) -> bool:
         return False
 
 
-class _CenterRays:
-    """Rays from the place that the receiver's images say."""
+class _Centers:
+    """The places that the receivers' images say."""
 
     def __init__(self, receivers: Receivers) -> None:
         self._positions, self._normals = (receivers.images[name].reshape(-1, 3).astype(np.float64) for name in ("position", "normal"))
 
-    def form_factors(self, surfels: Surfels, rows: Int[ndarray, " n"], seed: int) -> csr_array:
-        return form_factors(surfels, self._positions[rows], _unit(self._normals[rows]), POINTS * RAYS_PER_POINT, seed)
+    def origins(self, rows: Int[ndarray, " n"]) -> RayOrigins:
+        return RayOrigins.even(self._positions[rows, None], _unit(self._normals[rows])[:, None])
 
 
-class _LightmapRays:
-    """Rays from points all over each texel's footprint, as a bake samples it."""
+class _LightmapPoints:
+    """Points all over each texel's footprint, as a bake samples it."""
 
-    def __init__(self, receivers: Receivers) -> None:
+    def __init__(self, receivers: Receivers, seed: int) -> None:
         self._points = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit)
         self._square = spread_points(POINTS)[:, :2]
+        self._seed = seed
 
-    def form_factors(self, surfels: Surfels, rows: Int[ndarray, " n"], seed: int) -> csr_array:
-        from scipy.sparse import diags_array
-
-        turn = np.random.default_rng(seed).uniform(size=(len(rows), 2))
-        total, weights = None, np.zeros(len(rows))
-        for number, square in enumerate(self._square):
-            at = self._points.at(rows, (square + turn) % 1)
-            found = form_factors(surfels, at.point, _unit(at.normal.astype(np.float64)), RAYS_PER_POINT, _hash(seed, number))
-            found = diags_array(at.weight) @ found
-            total = found if total is None else total + found
-            weights += at.weight
-        return (diags_array((1 / np.maximum(weights, 1e-30)).astype(np.float32)) @ total).tocsr()
+    def origins(self, rows: Int[ndarray, " n"]) -> RayOrigins:
+        turn = np.random.default_rng(_hash(self._seed, int(rows[0]))).uniform(size=(len(rows), 2))
+        found = [self._points.at(rows, (square + turn) % 1) for square in self._square]
+        points, normals, weights = (np.stack([getattr(at, key) for at in found], axis=1) for key in ("point", "normal", "weight"))
+        return RayOrigins(points, _unit(normals.astype(np.float64)), weights)
 
 
-def _unit(vectors: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-30)
+def _unit(vectors: Float64[ndarray, "*n 3"]) -> Float64[ndarray, "*n 3"]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
 
 
 def _hash(seed: int, number: int) -> int:

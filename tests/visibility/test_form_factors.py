@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.form_factors import cosine_directions, form_factors
+from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.surfels import Surfels, surfels_of
 
@@ -35,10 +36,14 @@ def between_plates() -> Surfels:
     return surfels(np.concatenate([square(0, True), square(1, False)]), free, 64)
 
 
+def centers(found: Surfels) -> RayOrigins:
+    return RayOrigins.even(found.cells.places[:, None], found.cells.normals[:, None])
+
+
 def test_two_plates() -> None:
     found = between_plates()
     lower = found.cells.normals[:, 2] > 0
-    factors = form_factors(found, found.cells.places, found.cells.normals, 4096).toarray()
+    factors = form_factors(found, centers(found), 4096).toarray()
     share = factors[np.ix_(lower, ~lower)].sum(axis=1) @ found.cells.areas[lower] / found.cells.areas[lower].sum()
     assert share == pytest.approx(PLATES, rel=0.02)
     assert not factors[np.ix_(lower, lower)].any()
@@ -66,7 +71,7 @@ def test_no_more_surfels_than_asked() -> None:
 
 def test_directions_have_the_density_of_the_cosine() -> None:
     normals = np.array([[0, 0, 1.0], [0, 0, -1.0], [0.6, 0, 0.8], [-1, 0, 0]])
-    directions = cosine_directions(normals, 4096, np.random.default_rng(1))
+    directions = cosine_directions(normals[:, None], 4096, np.random.default_rng(1))[:, 0]
     np.testing.assert_allclose(np.linalg.norm(directions, axis=2), 1, atol=1e-12)
     cosine = np.einsum("ncd,nd->nc", directions, normals)
     assert (cosine >= 0).all()
@@ -76,6 +81,36 @@ def test_directions_have_the_density_of_the_cosine() -> None:
 
 def test_the_same_seed_gives_the_same_rays() -> None:
     found = between_plates()
-    one, again = (form_factors(found, found.cells.places, found.cells.normals, 64, 3).toarray() for _ in range(2))
+    one, again = (form_factors(found, centers(found), 64, 3).toarray() for _ in range(2))
     np.testing.assert_array_equal(one, again)
-    assert (one != form_factors(found, found.cells.places, found.cells.normals, 64, 4).toarray()).any()
+    assert (one != form_factors(found, centers(found), 64, 4).toarray()).any()
+
+
+def test_rays_of_a_receivers_points_are_one_even_set() -> None:
+    found = between_plates()
+    points, normals = found.spread(16)
+    apart = [form_factors(found, RayOrigins.even(points[:, q, None], normals[:, q, None]), 16, q).toarray() for q in range(16)]
+    together = form_factors(found, RayOrigins.even(points, normals), 16).toarray()
+    lower = found.cells.normals[:, 2] > 0
+    exact = form_factors(found, RayOrigins.even(points, normals), 1024, 1).toarray()[lower][:, ~lower].sum(axis=1)
+    error_apart, error_together = (np.std(factors[lower][:, ~lower].sum(axis=1) - exact) for factors in (np.mean(apart, axis=0), together))
+    assert error_together < 0.7 * error_apart
+
+
+def test_points_of_a_surfel_are_spread_over_its_area() -> None:
+    found = between_plates()
+    points, normals = found.spread(64)
+    np.testing.assert_allclose(points.mean(axis=1), found.cells.places, atol=0.02)
+    np.testing.assert_allclose(normals, np.broadcast_to(found.cells.normals[:, None], normals.shape), atol=1e-6)
+    side = np.sqrt(found.cells.areas)
+    assert (np.abs(points - found.cells.places[:, None]).max(axis=(1, 2)) < side).all()
+
+
+def test_what_lit_surfaces_see_has_surfels_although_no_free_place_sees_it() -> None:
+    """A shelf close above a floor: places above it see neither its lower side nor the floor below."""
+    floor, shelf = square(0, True, 16), square(0.05, True, 16) * [0.5, 0.5, 1] + [0.25, 0.25, 0]
+    free = np.random.default_rng(0).uniform([0.4, 0.4, 0.3], [0.6, 0.6, 0.5], (64, 3))
+    found = surfels(np.concatenate([floor, shelf]).astype(np.float32), free, 400)
+    under = (np.abs(found.cells.places[:, 2] - 0.05) < 1e-3) & (found.cells.normals[:, 2] < 0)
+    assert under.any(), "the lower side is lit by the floor around it"
+    assert not (found.cells.normals[:, 2][found.cells.places[:, 2] < 0.01] < 0).any(), "nothing lights the floor from below"
