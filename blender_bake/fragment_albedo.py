@@ -11,6 +11,7 @@ import numpy as np
 
 from blender_bake.vertex_albedo import ATTRIBUTE, bake_colors, corner_colors
 
+Kinds = tuple[str, ...]  # of reflection that make up an albedo
 GRAY = 0.8  # of a face without a material
 EVEN = {  # nodes whose color is the same all over a surface, if that of their inputs is
     *("ShaderNodeMixShader", "ShaderNodeAddShader", "ShaderNodeRGB", "ShaderNodeValue", "ShaderNodeMath", "ShaderNodeMix"),
@@ -81,13 +82,13 @@ def varies(material: bpy.types.Material | None) -> bool:
     return any(node.bl_idname not in EVEN and "Bsdf" not in node.bl_idname for node in _behind_colors(material.node_tree))
 
 
-def even_albedo(scene: bpy.types.Scene, materials: list[bpy.types.Material]) -> dict[bpy.types.Material, np.ndarray]:
+def even_albedo(scene: bpy.types.Scene, materials: list[bpy.types.Material], kinds: Kinds) -> dict[bpy.types.Material, np.ndarray]:
     """(3,) albedo of each material that does not vary. Hides all other objects."""
     if not materials:
         return {}
     count = len(materials)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.float32) + np.array([2, 0, 0], np.float32) * np.arange(count)[:, None, None]
-    colors = bake(scene, _mesh(corners, np.arange(count), materials, Attributes()), np.eye(4))
+    colors = bake(scene, _mesh(corners, np.arange(count), materials, Attributes()), np.eye(4), kinds)
     return dict(zip(materials, colors, strict=True))
 
 
@@ -98,21 +99,25 @@ def varying_albedo(
     materials: list[bpy.types.Material | None],
     attributes: Attributes,
     matrix: np.ndarray,
+    kinds: Kinds,
 ) -> np.ndarray:
     """(F, 3) albedo of fragments, `corners` (F, 3, 3) in the frame that `matrix` (4, 4) puts into the world, slots (F,) of `materials`.
 
     attributes: at the fragments' corners, and the mesh's texture space, which generated coordinates depend on. Hides all other objects.
     """
-    return bake(scene, _mesh(corners, slots, materials, attributes), matrix)
+    return bake(scene, _mesh(corners, slots, materials, attributes), matrix, kinds)
 
 
-def bake(scene: bpy.types.Scene, mesh: bpy.types.Mesh, matrix: np.ndarray) -> np.ndarray:
-    """(F, 3) diffuse color of the mesh's triangles, the mean of their corners. The mesh is removed."""
-    (obj,) = bake_colors(scene, [(mesh, matrix)])
-    colors = corner_colors(mesh)
-    bpy.data.objects.remove(obj)
+def bake(scene: bpy.types.Scene, mesh: bpy.types.Mesh, matrix: np.ndarray, kinds: Kinds = ("DIFFUSE",)) -> np.ndarray:
+    """(F, 3) color of the mesh's triangles, the sum over `kinds`, the mean of their corners. The mesh is removed."""
+    colors = np.zeros((len(mesh.loops), 3), np.float32)
+    for kind in kinds:
+        (obj,) = bake_colors(scene, [(mesh, matrix)], kind)
+        colors += corner_colors(mesh)
+        mesh.color_attributes.remove(mesh.color_attributes[ATTRIBUTE])
+        bpy.data.objects.remove(obj)
     bpy.data.meshes.remove(mesh)
-    return colors.reshape(-1, 3, 3).mean(axis=1)
+    return np.minimum(colors, 1).reshape(-1, 3, 3).mean(axis=1)
 
 
 def _behind_colors(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:

@@ -29,9 +29,10 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     points: {spacing, box, random, seed} -> `points`: free places for point lights, see `point_grid.free_points`
     named: {groups}               -> `named`: [{name, objects}], see `NamedLights.entries`
     places                        -> `places`: see `free_places.places`
-    surfaces: {cells, spacing}    -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), `object` (T,) and `transparent` (T,) of all
-        surfaces in fragments no longer than a cell, if they were `cells` cells, or than `spacing` m if that is more; `occluders` (U, 3, 3),
-        the triangles that block light; `surface_objects`: their names by number; `bounces`: diffuse ones that the scene's settings allow
+    surfaces: {cells, spacing, gloss} -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), with gloss as if it were diffuse where
+        `gloss` is true, `object` (T,) and `transparent` (T,) of all surfaces in fragments no longer than a cell, if they were `cells`, or
+        than `spacing` m if that is more; `occluders` (U, 3, 3), the triangles that block light; `surface_objects`: their names by
+        number; `bounces`: diffuse ones that the scene's settings allow
     """
     found: dict[str, Any] = {}
     if question.get("collections"):
@@ -58,7 +59,7 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
 
 def _surfaces(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path, events: Events) -> dict[str, Any]:
     longest = max(math.sqrt(surfaces.area(scene) / question["cells"]), question.get("spacing") or 0.0)
-    found = surfaces.fragments(scene, longest, events)
+    found = surfaces.fragments(scene, longest, events, bool(question.get("gloss")))
     names = ("corners", "albedo", "object", "transparent", "occluders")
     return {
         "files": {name: hand_over(scratch, name, found[name]) for name in names},

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake.fragment_albedo import GRAY, Attributes, even_albedo, varies, varying_albedo
+from blender_bake.fragment_albedo import GRAY, Attributes, Kinds, even_albedo, varies, varying_albedo
 from blender_bake.ipc import Events, WorkerError
 from blender_bake.scene_file import Shown, corners_of, rendered, show_as_rendered
 from blender_bake.translucency import _passes
@@ -51,13 +51,14 @@ def area(scene: bpy.types.Scene) -> float:
     return sum(float(_areas(_moved(shapes[one.key].corners, one.matrix)).sum()) for one in placed)
 
 
-def fragments(scene: bpy.types.Scene, longest: float, events: Events) -> dict[str, Any]:
+def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: bool = False) -> dict[str, Any]:
     """All surfaces that render and that diffuse rays see, as T fragments: triangles with no edge longer than `longest` meters.
 
     corners (T, 3, 3) float32 in the world, wound so that normals point as they render; albedo (T, 3) float32, diffuse color by Cycles: 0 of
-    metal, glass and black; object (T,) int32 of `names`, a list; transparent (T,) bool: of a material that light passes; occluders
-    (O, 3, 3) float32: the undivided triangles that cast shadows and are not transparent; longest: the longest edge in fact, larger where
-    the scene would have had more than 400,000 fragments. Ends the use of the scene: objects are hidden. WorkerError where nothing renders.
+    metal, glass and black, with `gloss` also what gloss reflects, as if it were diffuse; object (T,) int32 of `names`, a list; transparent
+    (T,) bool: of a material that light passes; occluders (O, 3, 3) float32: the undivided triangles that cast shadows and are not
+    transparent; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
+    scene: objects are hidden. WorkerError where nothing renders.
     """
     show_as_rendered(scene)
     shapes, placed, occluders = _read_scene()
@@ -66,7 +67,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events) -> dict[st
     divided = _divide(shapes, placed, longest)
     if divided > 1.001 * longest:
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
-    transparent = _color(scene, shapes)
+    transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}
     corners = []
@@ -127,10 +128,10 @@ def _divide(shapes: dict[tuple[Any, ...], _Shape], placed: list[_Placed], longes
         longest *= 1.05 * max(1.0, (total / max(MOST, least)) ** 0.5)
 
 
-def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> dict[tuple[Any, ...], np.ndarray]:
+def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds: Kinds) -> dict[tuple[Any, ...], np.ndarray]:
     """Set every shape's albedo; which fragments are transparent, by shape."""
     used = dict.fromkeys(shape.materials[slot] for shape in shapes.values() for slot in np.unique(shape.slots))
-    even = even_albedo(scene, [material for material in used if material is not None and not varies(material)])
+    even = even_albedo(scene, [material for material in used if material is not None and not varies(material)], kinds)
     passing = {
         material: material is not None and bool(material.use_nodes and material.node_tree and _passes(material)) for material in used
     }
@@ -145,7 +146,7 @@ def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> dic
             parents, weights = shape.parents[varying], shape.weights[varying]
             corners = np.einsum("fij,fjk->fik", weights, shape.corners[parents])
             attributes = _interpolated(shape.attributes, parents, weights)
-            shape.albedo[varying] = varying_albedo(scene, corners, slots[varying], shape.materials, attributes, shape.matrix)
+            shape.albedo[varying] = varying_albedo(scene, corners, slots[varying], shape.materials, attributes, shape.matrix, kinds)
     return transparent
 
 

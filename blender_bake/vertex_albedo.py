@@ -40,8 +40,11 @@ class AlbedoBakes:
         return {key: corner_colors(mesh) for key, (mesh, _) in self._meshes.items()}
 
 
-def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.ndarray]]) -> list[bpy.types.Object]:
-    """Objects of meshes and transforms, whose attribute is now the diffuse color of every corner; all else is hidden from rendering."""
+def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.ndarray]], kind: str = "DIFFUSE") -> list[bpy.types.Object]:
+    """Objects of meshes and transforms, whose attribute is now the color of every corner; all else is hidden from rendering.
+
+    kind: DIFFUSE, or GLOSSY, what its gloss reflects of light along the normal.
+    """
     for other in scene.objects:
         other.hide_render = True
     objects = []
@@ -56,7 +59,7 @@ def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.nd
     scene.cycles.samples, scene.cycles.seed = 1, 0
     try:
         result = bpy.ops.object.bake(
-            type="DIFFUSE",
+            type=kind,
             pass_filter={"COLOR"},
             target="VERTEX_COLORS",
             use_clear=True,

@@ -213,7 +213,7 @@ class CloudSet:
 
     def _surfaces(self) -> dict[str, Any]:
         if self.kind == "surfels":
-            return {"cells": self.count, "spacing": self.spacing}
+            return {"cells": self.count, "spacing": self.spacing, "gloss": True}
         return {"cells": cell_count(self.patch_count)}
 
     @property

@@ -18,6 +18,7 @@ from srbf.arrays import Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import COVERED, Capture
+from srbf.compute.full_precision import by_channel
 from srbf.encode.clustered_components import Zones, clustered_components
 from srbf.encode.component_filter import without_noise
 from srbf.encode.dilation import nearest_covered
@@ -77,11 +78,13 @@ class LightTableMaps(ComponentMaps):
 
     @classmethod
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
-        values = asset.tables["light_values"]
         if not lights:
-            return np.zeros((len(values), 3))
+            return np.zeros((len(asset.tables["light_values"]), 3))
+        values = by_channel(asset.tables["light_values"])
         columns = cls.column_weights(asset, lights) * asset.manifest["light_values"]["scale"]
-        return np.stack([values[..., c % values.shape[2]].astype(np.float64) @ columns[:, c] for c in range(3)], axis=1)
+        if len(values) == 1:
+            return (values[0] @ columns.astype(np.float32)).astype(np.float64)
+        return np.stack([values[c] @ columns[:, c].astype(np.float32) for c in range(3)], axis=1).astype(np.float64)
 
     @classmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:

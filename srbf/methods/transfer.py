@@ -9,11 +9,12 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64
+from srbf.arrays import Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import NOWHERE, CapturedLight
+from srbf.compute.full_precision import by_channel
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.lights import Light, NamedLight
@@ -133,6 +134,8 @@ class Transfer(LightsInsideMaps):
         if self.surfels != "auto":
             groups = surfel_groups(operator.cells, inside.occluders, inside.free, int(self.surfels), self.seed)
             inside = replace(inside, cells=groups.cells)
+        if self.editable:  # what emits is told by object
+            inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
         received = ReceivedLight(operator.cells, inside.occluders)
         lit = training_light(operator, received, inside.free, self.seed)
         most = max(1, min(MOST_RANK, MOST_BYTES // (12 * capture.width * capture.height)))
@@ -182,14 +185,19 @@ class Transfer(LightsInsideMaps):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
             else:
                 received += inside.on_patches(light)
-        table = asset.tables["surfel_transfer"].astype(np.float32)
-        columns = np.stack([table[:, :, c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
+        table = by_channel(asset.tables["surfel_transfer"])
+        columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
 
     @classmethod
     def summary(cls, asset: Asset) -> str:
         told = asset.manifest["surfel_transfer"]
         return f"{told['surfels']} surfels, rank {told['rank']}, {asset.clusters} clusters of {asset.components} components"
+
+
+def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
+    """Patches of one object each."""
+    return np.unique(np.stack([patches, objects]), axis=1, return_inverse=True)[1].ravel()
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:
