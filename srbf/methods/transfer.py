@@ -29,10 +29,11 @@ from srbf.visibility.transfer_basis import MOST_RANK, TransferBasis, grouped, tr
 from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
-MOST_SURFELS = 8000
+SURFELS, MOST_SURFELS = 3000, 8000
+BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
 MOST_TRIED = 64  # components of a candidate
-FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 192
-TEXELS_PER_CLUSTER = 32  # at least, of a candidate
+FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
+TEXELS_PER_CLUSTER = 24  # at least, of a candidate
 MOST_BYTES = 3 << 30  # of the shapes in memory
 
 
@@ -49,9 +50,9 @@ class Transfer(LightsInsideMaps):
     Parameters
     ----------
     surfels
-        How many parts of the surfaces a light is measured by; `auto`: as the capture groups them, about 2000.
+        How many parts of the surfaces a light is measured by; `auto`: about 3000, or as many as the capture has.
     rank
-        How many shapes; `auto`: as many as leave out 3 % of many lights' pictures, by norm, at most 768.
+        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 768.
     clusters
         1 to 256: the index per texel is one byte.
     components
@@ -131,9 +132,8 @@ class Transfer(LightsInsideMaps):
             raise InputError(
                 f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
             )
-        if self.surfels != "auto":
-            groups = surfel_groups(operator.cells, inside.occluders, inside.free, int(self.surfels), self.seed)
-            inside = replace(inside, cells=groups.cells)
+        count = SURFELS if self.surfels == "auto" else int(self.surfels)
+        inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed).cells)
         if self.editable:  # what emits is told by object
             inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
         received = ReceivedLight(operator.cells, inside.occluders)
@@ -150,7 +150,7 @@ class Transfer(LightsInsideMaps):
             asset.manifest["light_values"]["channels"] = 1
         count = inside.cells.patch_count
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
-        asset.tables["surfel_transfer"], entry = stored_values(own)
+        asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
         if self.editable:
             told = capture.manifest["surfels"]
@@ -198,6 +198,13 @@ class Transfer(LightsInsideMaps):
 def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
     """Patches of one object each."""
     return np.unique(np.stack([patches, objects]), axis=1, return_inverse=True)[1].ravel()
+
+
+def _rounded(values: Float32[ndarray, "r S 3"]) -> Float32[ndarray, "r S 3"]:
+    """Values as multiples of a power of two for each row and color."""
+    largest = np.maximum(np.abs(values).max(axis=1, keepdims=True), np.float32(1e-30))
+    step = np.exp2(np.ceil(np.log2(largest / (2 ** (BITS - 1) - 1))))
+    return (np.round(values / step) * step).astype(np.float32)
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:
