@@ -16,6 +16,7 @@ from srbf.demo import SCENES, inside
 from srbf.demo.inside import INSIDE, Amount
 from srbf.demo.pictures import bilinear
 from srbf.methods.surface_changes import Surfaces
+from srbf.visibility import transfer_basis
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -63,13 +64,16 @@ def test_directions_mean_nothing_inside(tmp_path: Path) -> None:
 def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("embreex")
     loft = INSIDE["loft"]
-    small = replace(loft, places=loft.places[:1], draft=Amount(64, 300, 1, 2, (40, 30)))
+    small = replace(loft, places=loft.places[:1], draft=Amount(48, 150, 1, 4, (40, 30)))
     monkeypatch.setattr(inside, "INSIDE", {"loft": small})
+    monkeypatch.setattr(inside, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
+    for name in ("PLACED", "NEAR", "SPOTS"):
+        monkeypatch.setattr(transfer_basis, name, 40)
     done = CliRunner().invoke(app, ["demo", "--scene", "loft", "-o", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert f"srbf view {tmp_path / 'asset'} {tmp_path / 'capture'} --mesh {tmp_path / 'scene.glb'}" in done.output
     asset = Asset.open(tmp_path / "asset")
     assert {"Picture", "Walls", "Floor", "Partition"} <= set(Surfaces.of(asset).names)
     error = json.loads((tmp_path / "asset" / "asset.json").read_text())["error"]["holdout"]
-    assert error["relative_rmse"] < 1, "better than darkness"
+    assert 0 < error["relative_rmse"] < 1, "nearer than darkness, though the reference has four samples"
     assert (tmp_path / "beside_cycles.png").stat().st_size > 10_000

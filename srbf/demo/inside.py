@@ -87,7 +87,7 @@ INSIDE = {
         "atlas",
         ("--unlit", "--diffuse"),
         ((2.9, 2.3, 1.6), (5.0, 2.55, 1.3), (6.6, 2.4, 1.4)),
-        Amount(256, SURFELS, 6, 64, (400, 300)),
+        Amount(256, SURFELS, 6, 64, (360, 270)),
         Amount(512, MOST_SURFELS, 12, 256, (800, 600)),
     )
 }
