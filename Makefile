@@ -26,6 +26,7 @@ $(VENV)/.tested-by: $(VENV)/.installed
 	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev,docs]'
 	touch $@
 
+# SCENE: caustics and house under directional lights, loft with lights inside.
 demo: setup $(PAGE)
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 

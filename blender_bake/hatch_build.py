@@ -8,7 +8,19 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-SCENES = ("caustics.py", "coin.py", "colored_room.py", "house.py", "lattice.py", "staging.py", "still_life.py")
+SCENES = (
+    "caustics.py",
+    "coin.py",
+    "colored_room.py",
+    "house.py",
+    "interior.py",
+    "lattice.py",
+    "lightmap_charts.py",
+    "loft.py",
+    "loft_furniture.py",
+    "staging.py",
+    "still_life.py",
+)
 
 
 class ScenesHook(BuildHookInterface):

@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Vector
 
 LAYER, GAP = "lightmap", 2.5 / 256  # UV layer of every object; distance between its charts
+LEAST = 1.5 / 256  # side of the thinnest chart of an atlas
 
 
 def unwrap_curved(thing, gap=GAP):
@@ -24,16 +25,30 @@ def unwrap_curved(thing, gap=GAP):
 
 def unwrap_planes(mesh):
     """One chart for each connected piece of a plane, all at one scale, packed in rows of falling height."""
-    charts = list(_charts(mesh))
-    sizes = np.array([places.max(axis=0) for _, places in charts])
+    _lay_out([mesh], LAYER, 0.0)
+
+
+def share_atlas(things, layer, least=LEAST):
+    """A UV `layer` of several objects made of flat faces, one chart for each piece of a plane, side by side.
+
+    All at one scale, but no chart is thinner than `least`: thin ones are stretched, so that they have texels of their own.
+    """
+    _lay_out([thing.data for thing in things], layer, least)
+
+
+def _lay_out(meshes, layer, least):
+    charts = [(mesh, loops, places) for mesh in meshes for loops, places in _charts(mesh)]
+    sizes = np.array([places.max(axis=0) for _, _, places in charts])
     low, high = 0.0, 1 / sizes.max()
     for _ in range(40):
         scale = (low + high) / 2
-        low, high = (scale, high) if _rows(sizes * scale) is not None else (low, scale)
-    corners = np.empty((len(mesh.loops), 2))
-    for (loops, places), corner in zip(charts, _rows(sizes * low), strict=True):
-        corners[loops] = places * low + corner
-    mesh.uv_layers.new(name=LAYER, do_init=False).uv.foreach_set("vector", corners.astype(np.float32).ravel())
+        low, high = (scale, high) if _rows(np.maximum(sizes * scale, least)) is not None else (low, scale)
+    shown = np.maximum(sizes * low, least)
+    corners = {mesh: np.empty((len(mesh.loops), 2)) for mesh in meshes}
+    for (mesh, loops, places), size, stretched, corner in zip(charts, sizes, shown, _rows(shown), strict=True):
+        corners[mesh][loops] = places * (stretched / size) + corner
+    for mesh, uv in corners.items():
+        mesh.uv_layers.new(name=layer, do_init=False).uv.foreach_set("vector", uv.astype(np.float32).ravel())
 
 
 def _charts(mesh):

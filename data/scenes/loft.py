@@ -5,11 +5,15 @@ Living room, kitchen and bedroom behind a partition with a doorway; inside |0 ..
 The walls are 0.25 m thick, so the sun and the world come in through the windows alone. Receivers, each with the UV layer "lightmap":
 `Floor`, `Ceiling`, `Walls`, `Partition` and all furniture (`Sofa`, `Rug`, `Dining table`, `Bed`, …); `Facade` is the outside.
 
+`Picture` hangs on the wall behind the sofa, `Painting` in the bedroom: plain canvases, which may be made to emit. With --unlit nothing
+emits, so that all light is added after the bake; with --diffuse nothing is glossy. The collection `Receivers` has all objects but
+`NO_RECEIVERS`, side by side in the UV layer "atlas".
+
 Lights: World, Sun; points Pendant 1-3, Desk light, Bedside left, Bedside right, Reading light; spots Track spot 1-4, Picture spot; areas
 Ceiling panel, Counter strip, Mirror panel; emissive objects TV, Neon sign, Shelf strip, Paper globe, Stove, Alarm clock, Aquarium.
 The collections `Living room`, `Kitchen` and `Bedroom` hold them as groups, without World and Sun.
 
-    python data/scenes/loft.py OUT.blend
+    python data/scenes/loft.py OUT.blend [--unlit] [--diffuse]
 """
 
 import sys
@@ -18,6 +22,7 @@ from math import radians
 import bpy
 from house import noise, ramp, surface, wood
 from interior import add, arguments_of, carved, light, save, split
+from lightmap_charts import share_atlas
 from loft_furniture import emissive_objects, furnish
 from mathutils import Vector
 from staging import add_camera, add_daylight, start_cycles
@@ -37,6 +42,8 @@ GROUPS = {
     "Kitchen": ("Pendant 1", "Pendant 2", "Pendant 3", "Track spot 3", "Track spot 4", "Counter strip", "Stove"),
     "Bedroom": ("Desk light", "Bedside left", "Bedside right", "Picture spot", "Mirror panel", "Paper globe", "Alarm clock"),
 }
+ATLAS = "atlas"
+NO_RECEIVERS = ("Facade", "Neon sign", "Shelf strip", "Paper globe", "Alarm clock", "Shade 1", "Shade 2", "Shade 3")  # outside, or thin
 
 
 def plaster(low, high):
@@ -106,17 +113,28 @@ def group():
             scene.collection.objects.unlink(scene.objects[member])
 
 
-def build():
+def receivers():
+    """The objects of the demo's lightmap, in a collection and an atlas of their own."""
+    collection = bpy.data.collections.new("Receivers")
+    bpy.context.scene.collection.children.link(collection)
+    things = [thing for thing in bpy.data.objects if thing.type == "MESH" and thing.name not in NO_RECEIVERS]
+    for thing in things:
+        collection.objects.link(thing)
+    share_atlas(things, ATLAS)
+
+
+def build(unlit, diffuse):
     shell()
-    furnish()
-    emissive_objects()
+    furnish(diffuse)
+    emissive_objects(unlit)
     lights()
     group()
-    add_camera((5.3, 0.3, 2.2), (1.5, 4.0, 0.6), 17)
+    receivers()
+    add_camera((0.5, 0.45, 1.9), (4.4, 3.3, 0.95), 17)
     cycles = start_cycles(bpy.context.scene)
     cycles.max_bounces = cycles.diffuse_bounces = 8
 
 
 if __name__ == "__main__":
-    options = arguments_of("loft", sys.argv[1:])
-    sys.exit(save(options.out, build))
+    options = arguments_of("loft", sys.argv[1:], unlit=False, diffuse=False)
+    sys.exit(save(options.out, lambda: build(options.unlit, options.diffuse)))

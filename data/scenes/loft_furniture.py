@@ -3,11 +3,13 @@
 
 from math import pi
 
-from house import box, lathe, moved, profile, surface, wood
-from interior import add, glow, joined
+from house import box, lathe, moved, noise, profile, ramp, surface, wood
+from interior import add, joined
+from interior import glow as emission
 from mathutils import Euler, Matrix, Vector
 
 CONE = ((0.17, 0.0), (0.06, 0.16), (0.015, 0.2))  # m: radius and height of a shade
+LACQUER, BLACK = ("Lacquer", (0.78, 0.78, 0.76)), ("Black", (0.03, 0.03, 0.035))
 OFF = 0.002  # m between an object and what it stands on
 
 
@@ -30,12 +32,13 @@ def chair():
     return [*legs(0.19, 0.19, 0.438, 0.035), box((-0.22, -0.22, 0.44), (0.22, 0.22, 0.49)), *back]
 
 
-def furnish():
+def furnish(diffuse):
+    """All but what emits; `diffuse`: without gloss and metal."""
     oak = surface("Oak", wood((0.30, 0.17, 0.08), (0.52, 0.34, 0.18)), 1.0)
     cloth, wool = surface("Cloth", (0.10, 0.22, 0.30), 1.0), surface("Wool", (0.62, 0.20, 0.10), 1.0)
     linen = surface("Linen", (0.72, 0.70, 0.64), 1.0)
-    lacquer, steel = surface("Lacquer", (0.78, 0.78, 0.76), 0.45), surface("Steel", (0.55, 0.56, 0.58), 0.35, metallic=1.0)
-    black = surface("Black", (0.03, 0.03, 0.035), 0.5)
+    lacquer, black = (surface(*of, 1.0 if diffuse else gloss) for of, gloss in ((LACQUER, 0.45), (BLACK, 0.5)))
+    steel = surface("Steel", (0.55, 0.56, 0.58), 1.0 if diffuse else 0.35, metallic=1.0)
     add("Rug", [box((-1.2, -0.9, 0), (1.2, 0.9, 0.012))], wool, matrix=at(1.9, 1.9))
     seats = [box((-1.0 + i, -0.35, 0.16), (-0.02 + i, 0.42, 0.44)) for i in (0.0, 1.0)]
     arms = [box((x, -0.35, 0), (x + 0.18, 0.64, 0.62)) for x in (-1.2, 1.02)]
@@ -66,13 +69,20 @@ def furnish():
     add("Desk", table(0.6, 0.32, 0.74), oak, matrix=at(7.2, 0.36))
     add("Desk chair", chair(), oak, matrix=at(7.2, 0.95, 0, 0.3))
     add("Wardrobe", [box((-0.3, -0.6, 0.05), (0.3, 0.6, 2.2))], lacquer, matrix=at(5.92, 0.68))
+    canvas = surface("Canvas", lambda tree: ramp(tree, noise(tree, 1.2), (0.40, (0.62, 0.30, 0.16)), (0.60, (0.75, 0.68, 0.52))), 1.0)
+    add("Picture", [box((-0.65, -0.015, 0), (0.65, 0, 0.9))], canvas, matrix=at(2.3, 4.998, 1.15))
+    add("Painting", [box((-0.4, -0.015, 0), (0.4, 0, 0.6))], canvas, matrix=at(7.998, 2.8, 1.1, -pi / 2))
     shade = lathe(CONE, 24)
     for i, x in enumerate((3.8, 4.3, 4.8)):
         add(f"Shade {i + 1}", [shade], black, flat=False, matrix=at(x, 2.0, 1.75))
 
 
-def emissive_objects():
-    """Seven objects that light the room."""
+def emissive_objects(unlit):
+    """Seven objects that light the room; `unlit` ones are of their color by day."""
+
+    def glow(name, color, strength):
+        return surface(name, tuple(0.1 + 0.5 * c for c in color), 1.0) if unlit else emission(name, color, strength)
+
     add("TV", [box((-0.6, 0.002, 0.49), (0.6, 0.006, 1.2))], glow("Screen", (0.35, 0.55, 1.0), 4.0), matrix=at(1.9, 0.32))
     stroke = [Vector((0, y, z)) for y, z in ((0, 0), (0.12, 0.4), (0.24, 0.05), (0.36, 0.4), (0.48, 0), (0.62, 0), (0.62, 0.4))]
     tubes = []

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy import ndarray
 
 from srbf import methods
+from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.bake.job import AMBIENT_SEED, base_job
 from srbf.bake.light_sets import PlacedLight
@@ -62,7 +64,9 @@ def compare_with_point_lights(
     covered = asset.covered
     positions = asset.images["position"][covered]  # (p, 3)
     point_lights = point_light_positions(asset, count, seed)
-    references = _render(asset, described, scene, point_lights, samples, seed, progress, say, blender)
+    chosen = asset.manifest["source"].get("settings", {}).get("scene")
+    settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
+    references = render_point_lights(scene, settings, point_lights, samples, seed, progress, say, blender)
     distances: list[np.ndarray] = []
     errors: dict[Falloff, list[tuple[np.ndarray, np.ndarray]]] = {falloff: [] for falloff in FALLOFFS}
     for point_light, reference in zip(point_lights, references, strict=True):
@@ -93,19 +97,17 @@ def point_light_positions(asset: Asset, count: int, seed: int) -> np.ndarray:
     return positions[chosen] + normals[chosen] * distance[:, None]
 
 
-def _render(
-    asset: Asset,
-    described: list[dict[str, Any]],
+def render_point_lights(
     scene: Path,
-    point_lights: np.ndarray,
+    settings: BakeSettings,
+    point_lights: Float64[ndarray, "n 3"],
     samples: int,
-    seed: int,
-    progress: Callable[[float, float], None],
-    say: Callable[[str], None],
-    blender: Path | None,
+    seed: int = 0,
+    progress: Callable[[float, float], None] = lambda done, total: None,
+    say: Callable[[str], None] = lambda line: None,
+    blender: Path | None = None,
 ) -> list[np.ndarray]:
-    chosen = asset.manifest["source"].get("settings", {}).get("scene")
-    settings = BakeSettings(Receiver.of_manifest(described), asset.width, asset.height, quantity=asset.quantity, scene=chosen)
+    """The receivers of `settings` under point lights at places (m) of unit irradiance at 1 m, by Cycles, without the scene's own light."""
     lights = [
         PlannedLight(i, PlacedLight("point", tuple(place.tolist())), "holdout", samples, noise_seed(seed, i))
         for i, place in enumerate(point_lights)

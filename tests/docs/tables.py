@@ -57,6 +57,7 @@ ELSEWHERE = {
     "python scripts/build_extension.py *": "tests/extension/test_zip.py::test_the_zip_builds_and_validates",
     "blender --command srbf bake *": "tests/extension/test_extension.py::test_the_command_bakes_the_open_file",
     "blender --command srbf fit *": "tests/extension/test_extension.py::test_what_the_command_adds",
+    "srbf demo --scene loft *": "tests/test_demo.py::test_a_loft_from_script_to_picture",
     "npm ci *": "tests/npm_package.py::npm",
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
     "npm run check *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",

@@ -6,7 +6,7 @@ import importlib.util
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -70,11 +70,15 @@ def scene_script(name: str) -> Path:
     raise InputError(f"expected a demo scene of {', '.join(SCENES)} with its script installed, found none named {name!r}")
 
 
-def build_scene(name: str, path: Path) -> None:
+def build_scene(name: str, path: Path, options: Sequence[str] = ()) -> None:
     """Run the scene's script in a separate process to write the .blend at `path`; BakeError with its last output on failure."""
     temporary = path.with_name(f".{path.stem}.partial.blend")
     finished = subprocess.run(
-        [sys.executable, str(scene_script(name)), str(temporary)], capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False
+        [sys.executable, str(scene_script(name)), str(temporary), *options],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        check=False,
     )
     if finished.returncode != 0 or not temporary.is_file():
         temporary.unlink(missing_ok=True)
@@ -83,14 +87,26 @@ def build_scene(name: str, path: Path) -> None:
     temporary.replace(path)
 
 
+def bake_once(bake: Bake, reporter: Reporter) -> bool:
+    """Whether lights were rendered; OutputExistsError where another capture is in the bake's folder."""
+    try:
+        return bake.run(reporter)
+    except OutputExistsError as error:
+        raise OutputExistsError(
+            f"expected the capture of this demo at {bake.folder}, found another; choose another folder, or delete it"
+        ) from error
+
+
 @dataclass(frozen=True)
 class Demo:
-    """The results of a demo: the report's page, the assets (the first is shown first), their capture, and a lightmap's scene."""
+    """The results of a demo: the report's page, the assets (the first is shown first), their capture, a lightmap's scene, and a picture
+    in the scene's camera beside Cycles."""
 
     page: Path
     assets: tuple[Path, ...]
     capture: Path
     mesh: Path | None
+    picture: Path | None = None
 
 
 def run_demo(
@@ -108,13 +124,7 @@ def run_demo(
         build_scene(name, blend)
     settings = scene.settings(lights, quality)
     reporter.say(f"baking {lights} directions at {settings.width}x{settings.height} with Cycles")
-    try:
-        baked = Bake(blend, capture_folder, settings).run(reporter)
-    except OutputExistsError as error:
-        raise OutputExistsError(
-            f"expected the capture of this demo at {capture_folder}, found another; choose another folder, or delete it"
-        ) from error
-    if baked:
+    if bake_once(Bake(blend, capture_folder, settings), reporter):
         timings["bake"] = clock() - started
     capture = Capture.open(capture_folder)
     started = clock()
