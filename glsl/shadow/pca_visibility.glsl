@@ -2,7 +2,7 @@
 /* srbfPcaVisibility: how much of a light a point sees, 0 to 1: four depths around its direction, each compared, the results mixed.
    use:    float srbfPcaVisibility(highp sampler2D coefficients, highp sampler2D bases, int point, int cluster, int groups, vec2 place,
                                    float lightDistance)
-   domain: place: srbfHemispherePlace of the light; lightDistance in m, of a sun `far` / 0.95; a light with a size: the mean of 25 places
+   domain: place: srbfHemispherePlace of the light; lightDistance in m, of a sun 1.05 `far` / 0.95; a light with a size: the mean of 25 places
            of it, weighted by the light that each adds; the rest as srbfPcaDepth
    twin:   srbf.visibility.pca_visibility.PcaVisibility.visible
    cite:   Nowrouzezahrai2007 */

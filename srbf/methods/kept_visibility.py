@@ -141,19 +141,19 @@ def by_depths(asset: Asset) -> Asset:
     >>> from srbf.methods.kept_visibility import by_depths
     >>> linear_response(by_depths(asset), lights)  # doctest: +SKIP
     """
-    if "surfel_visibility" not in asset.manifest:
+    if not has_depths(asset):
         raise InputError("expected an asset with compressed depths for `shadows=pca`, found none; fit with `visibility=pca:50`")
     return replace(asset, scene=None)
 
 
-def has_shadows(asset: Asset) -> bool:
-    """Whether light of any kind can be measured on the asset's surfels: by rays, or by compressed depths."""
-    return has_embree() or "surfel_visibility" in asset.manifest
+def has_depths(asset: Asset) -> bool:
+    """Whether light of any kind can be measured on the asset's surfels without rays."""
+    return "surfel_visibility" in asset.manifest
 
 
 def light_on_patches(asset: Asset) -> Callable[[Light], Float64[ndarray, "K 3"]]:
     """What gives the mean irradiance of a light on every patch: by rays, or without them by compressed depths."""
-    if "surfel_visibility" not in asset.manifest or (asset.scene is not None and has_embree()):
+    if not has_depths(asset) or (asset.scene is not None and has_embree()):
         return CloudLights.of_asset(asset).on_patches
     if asset not in _received:
         cells = Cells.of_image(asset.tables["cells"])

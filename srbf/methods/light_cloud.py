@@ -125,6 +125,10 @@ class LightCloud(LightsInsideMaps):
             weight = getattr(self, name)
             if weight != "auto" and not (0 <= weight < np.inf and self.merge != "none"):
                 raise InputError(f"expected `{name}` auto, or 0 or more with `merge`, found {weight}")
+        if self.interpolation == "kernel" and self.visibility != "none":
+            raise InputError(
+                "expected `visibility=none` with `interpolation=kernel`, which needs rays between lights, found another; leave it out"
+            )
         if self.interpolation != "kernel" and (self.zones > 1 or self.merge != "none"):
             raise InputError("expected `zones` and `merge` with `interpolation=kernel`, found another; add it")
 
@@ -163,7 +167,8 @@ class LightCloud(LightsInsideMaps):
         else:
             kernel = CloudKernel(capture.positions(train), inside.visible, self.nearest)
             unseen = unseen_lights(capture, inside, self.seed) if self.interpolation != "kernel" else None
-            kind, report = chosen_interpolation(self.interpolation, unseen, kernel)
+            wanted = "fingerprint" if self.visibility != "none" else self.interpolation
+            kind, report = chosen_interpolation(wanted, unseen, kernel)
             mixtures = np.eye(len(train))
             if kind == "fingerprint" and unseen is not None:  # sums of captured lights have less noise than single ones
                 mixtures = unseen.prints.weights(inside.received(inside.free[:VIRTUAL_LIGHTS]))

@@ -23,6 +23,7 @@ from srbf.lights import Light, NamedLight, PointLight
 from srbf.methods import kept_visibility
 from srbf.methods.light_table_maps import LightTableMaps
 from srbf.visibility.cloud_lights import CloudLights
+from srbf.visibility.embree import has_embree
 
 
 class LightsInsideMaps(LightTableMaps):
@@ -73,7 +74,7 @@ class LightsInsideMaps(LightTableMaps):
             raise InputError(
                 f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
             )
-        if not kept_visibility.has_shadows(asset):
+        if not has_embree() and not kept_visibility.has_depths(asset):
             return np.sum([_from_table(asset, light) for light in lights], axis=0)
         return super().projected_weights(asset, lights)
 

@@ -28,7 +28,7 @@ PLACE_WEIGHT = 4.0  # of the points' longest side, beside their normals
 CLEARANCE = 0.05  # m, around the free places: where lights may be
 ROUNDS = 40
 OUTLIER = 1.0  # m, above which errors of depth count in proportion
-WALL, SKY, OPEN = 0.9, 1.0, 1.1  # of `far`: the largest depth of a surface, where a sun is, the least depth without any surface
+SKY, OPEN = 1.05, 1.1  # of `far`: where a sun is, the least depth where no surface is met
 MOST_AT_ONCE = 1 << 13  # points whose depths are reconstructed at a time
 RAYS = 1 << 20
 
@@ -37,7 +37,7 @@ RAYS = 1 << 20
 class PcaVisibility:
     """Compressed depths at P points in K clusters: depth d of point p is sum_j (2 byte_pj / 255 - 1) basis_kjd, of j = 0 the mean, once.
 
-    `bases` are bytes with a `low` and a `span` (m) per row. `far` (m): larger than any distance in the scene; a sun is so far away.
+    `bases` are bytes with a `low` and a `span` (m) per row. `far` (m): no distance in the scene is larger.
     """
 
     normals: Float32[ndarray, "P 3"]
@@ -170,9 +170,9 @@ def bounded_depths(
         leaves = np.nan_to_num(np.maximum(*ends), nan=np.inf).min(axis=2)
     leaves = np.maximum(leaves, 0)  # how far along each direction a light may be
     open_ = np.isinf(depth)
-    start = np.minimum(depth, np.float32(WALL * maps.far))
+    start = np.minimum(depth, np.float32(maps.far))
     low = np.where(start < CLEARANCE, -np.inf, np.minimum(start, leaves))
-    high = np.where(start >= leaves, np.float32(WALL * maps.far), start)
+    high = np.where(start >= leaves, np.float32(maps.far), start)
     start = np.where(open_, np.float32(OPEN * maps.far), start)
     low, high = np.where(open_, start, low), np.where(open_, np.inf, high)
     return start, (low.astype(np.float32), high.astype(np.float32))
