@@ -16,7 +16,7 @@ import numpy as np
 from lights_inside import placed
 from numpy import ndarray
 
-from srbf.capture import Capture
+from srbf.capture import COVERED, Capture
 from srbf.light_geometry import points_on
 from srbf.lights import AreaLight, Light, PointLight
 from srbf.visibility.cloud_lights import CloudLights
@@ -120,6 +120,16 @@ def direct(cells: Cells, starts: ndarray, light: Light, sees: Sees, side: int) -
     return irradiance, own, share
 
 
+def texels_of(capture: Capture) -> Cells:
+    """The covered texels as cells of one area."""
+    covered = capture.coverage() >= COVERED
+    position, normal = capture.geometry("position"), capture.geometry("normal")
+    assert position is not None and normal is not None
+    count = int(covered.sum())
+    area = np.full(count, 1e-3, np.float32)
+    return Cells(position[covered], normal[covered], area, np.zeros((count, 3), np.float32), np.zeros(count, np.int64))
+
+
 def main() -> None:
     """Print a row per way of knowing shadows."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -128,10 +138,11 @@ def main() -> None:
     parser.add_argument("--areas", type=int, default=12)
     parser.add_argument("--coefficients", default="10,25,50,100")
     parser.add_argument("--cubes", default="128,256")
+    parser.add_argument("--receivers", action="store_true", help="At the covered texels in place of the surfels.")
     asked = parser.parse_args()
     capture = Capture.open(asked.capture)
     inside = CloudLights.of(capture)
-    cells = inside.cells
+    cells = texels_of(capture) if asked.receivers else inside.cells
     starts = starts_of(cells.places, cells.normals)
     points = placed(capture, "point", asked.lights, np.random.default_rng([3, 5]))
     areas = placed(capture, "area", asked.areas, np.random.default_rng([3, 4]))

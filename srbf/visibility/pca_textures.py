@@ -1,4 +1,4 @@
-"""Compressed depths as the textures that `glsl/shadow/pca_depth.glsl` reads: four numbers a texel."""
+"""Compressed depths as the textures that `glsl/shadow/pca_depth.glsl` reads: four numbers per texel."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ PLACE_WEIGHT = 4.0  # of the points' longest side, beside their normals
 CLEARANCE = 0.05  # m, around the free places: where lights may be
 ROUNDS = 40
 OUTLIER = 1.0  # m, above which errors of depth count in proportion
-SKY, OPEN = 1.05, 1.1  # of `far`: where a sun is, the least depth where no surface is met
+SUN_AT, OPEN_FROM = 1.05, 1.1  # of `far`: where a sun is, the least depth where no surface is met
 MOST_AT_ONCE = 1 << 13  # points whose depths are reconstructed at a time
 RAYS = 1 << 20
 
@@ -60,7 +60,7 @@ class PcaVisibility:
             part = slice(first, first + MOST_AT_ONCE)
             own = points[part]
             texels, weights = four_around(places(self.local(own, toward[part])), SIDE)
-            reach = np.full(len(own), SKY * self.far) if distance is None else (1 - BIAS) * np.asarray(distance[part])
+            reach = np.full(len(own), SUN_AT * self.far) if distance is None else (1 - BIAS) * np.asarray(distance[part])
             result[part] = (weights * (reach[:, None] <= self.depths(own, texels))).sum(axis=1)
         return result
 
@@ -119,7 +119,7 @@ class DepthMaps:
 
 
 def clusters_of(positions: Float32[ndarray, "P 3"], normals: Float32[ndarray, "P 3"]) -> Int[ndarray, " P"]:
-    """Clusters of points that lie near each other and face alike: of about POINTS_PER_CLUSTER, or FEWEST_CLUSTERS where there are few."""
+    """Clusters of points that lie near each other and face the same way: about POINTS_PER_CLUSTER, or FEWEST_CLUSTERS of few."""
     most = max(1, len(positions) // FEWEST_POINTS)
     count = int(np.clip(len(positions) // POINTS_PER_CLUSTER, min(FEWEST_CLUSTERS, most), MOST_CLUSTERS))
     extent = max(float(np.ptp(positions, axis=0).max(initial=0)), 1e-9)
@@ -173,6 +173,6 @@ def bounded_depths(
     start = np.minimum(depth, np.float32(maps.far))
     low = np.where(start < CLEARANCE, -np.inf, np.minimum(start, leaves))
     high = np.where(start >= leaves, np.float32(maps.far), start)
-    start = np.where(open_, np.float32(OPEN * maps.far), start)
+    start = np.where(open_, np.float32(OPEN_FROM * maps.far), start)
     low, high = np.where(open_, start, low), np.where(open_, np.inf, high)
     return start, (low.astype(np.float32), high.astype(np.float32))

@@ -12,7 +12,7 @@ from made_rooms import Room, room_of_patches
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import ImageError, InputError
-from srbf.lights import AreaLight, PointLight, SpotLight
+from srbf.lights import AreaLight, Light, PointLight, SpotLight
 from srbf.methods import linear_response, relight
 from srbf.methods.kept_visibility import by_depths, coefficient_count
 from srbf.methods.light_cloud import LightCloud
@@ -24,8 +24,9 @@ pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
 
 ROOM = Room.box((3, 2, 2), 0.5, 0.6, (1.5, 0.6, 1.4))
-LIGHTS = [
-    PointLight((0.7, 0.8, 1.1), (1.0, 0.5, 0.2), falloff="inverse-square"),
+POINT = PointLight((0.7, 0.8, 1.1), (1.0, 0.5, 0.2), falloff="inverse-square")
+LIGHTS: list[Light] = [
+    POINT,
     SpotLight((2.4, 1.0, 1.5), falloff="inverse-square", direction=(-1, 0, -0.5), inner=0.5, outer=0.8),
     AreaLight((0.8, 1.0, 1.7), u=(0.4, 0, 0), v=(0, -0.4, 0)),
 ]
@@ -65,7 +66,9 @@ def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
     opened = Asset.open(tmp_path / "asset")
     np.testing.assert_array_equal(linear_response(by_depths(opened), LIGHTS), linear_response(by_depths(asset), LIGHTS))
     with Added(asset, "pca") as one, Added(opened, "pca") as other:
-        np.testing.assert_array_equal(one.response(LIGHTS), other.response(LIGHTS))
+        first, second = one.response(LIGHTS), other.response(LIGHTS)
+        assert first is not None and second is not None
+        np.testing.assert_array_equal(first, second)
     told = opened.manifest["receiver_visibility"]
     assert told["points"] == len(ROOM.places) or told["points"] == opened.covered.sum()
     opened.manifest["surfel_visibility"]["points"] += 1
@@ -77,12 +80,11 @@ def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
 
 def test_direct_light_by_depths_is_that_of_rays(asset: Asset) -> None:
     """From the middles of the texels."""
-    light = LIGHTS[0]
     with Added(asset, chosen(asset, "pca")) as pca:
-        found = pca.response([light])
+        found = pca.response([POINT])
         assert found is not None
-        seen = ROOM.sees(ROOM.places + 1e-3 * ROOM.normals, np.broadcast_to(light.position, ROOM.places.shape))
-        exact = (irradiance_from(light, ROOM.places, ROOM.normals) * seen)[:, None] * light.color
+        seen = ROOM.sees(ROOM.places + 1e-3 * ROOM.normals, np.broadcast_to(POINT.position, ROOM.places.shape))
+        exact = (irradiance_from(POINT, ROOM.places, ROOM.normals) * seen)[:, None] * POINT.color
         assert 0 < relative(found.reshape(-1, 3)[: len(exact)], exact) < 0.06
         assert pca.notes(LIGHTS) == ["added direct light by compressed depths"]
         whole = relight(by_depths(asset), LIGHTS, pca.response(LIGHTS))

@@ -7,7 +7,7 @@ import pytest
 from closed_forms import build_plane, quad
 from made_rooms import Room
 
-from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, PointLight, SphereLight
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight
 from srbf.sphere import random_directions
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
@@ -112,7 +112,7 @@ def test_a_light_with_a_size_has_a_penumbra(below_a_roof: PcaDirect, light: Area
 def test_an_open_plane_never_shades_itself() -> None:
     receivers = build_plane(size=12)
     free = np.random.default_rng(3).uniform([-1, -1, 0.05], [1, 1, 1], (50, 3))
-    lights = [PointLight((0.9, 0.1, 0.06)), DirectionalLight((0.98, 0.0, 0.19899749))]
+    lights: list[Light] = [PointLight((0.9, 0.1, 0.06)), DirectionalLight((0.98, 0.0, 0.19899749))]
     for light in lights:
         exact = irradiance_from(light, *(receivers.images[name].reshape(-1, 3) for name in ("position", "normal")))
         np.testing.assert_allclose(fitted(receivers, free, 4).response([light])[..., 0].ravel(), exact, rtol=1e-5)
