@@ -143,7 +143,7 @@ def by_depths(asset: Asset) -> Asset:
     """
     if not has_depths(asset):
         raise InputError("expected an asset with compressed depths for `shadows=pca`, found none; fit with `visibility=pca:50`")
-    return replace(asset, scene=None)
+    return replace(asset, scene=None, manifest={key: told for key, told in asset.manifest.items() if key != "scene"})
 
 
 def has_depths(asset: Asset) -> bool:

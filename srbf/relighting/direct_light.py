@@ -14,6 +14,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
+from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, NamedLight, moved
 from srbf.methods import method_of
@@ -66,7 +67,11 @@ def by_receiver_depths(source: Asset | Capture) -> PcaDirect:
             "fit with `visibility=pca:50` and `receiver_visibility`"
         )
     _, normals = receiver_points(source)
-    return PcaDirect(Receivers.of(source), kept_visibility(source, "receiver_visibility", normals))
+    none = np.zeros((0, 3, 3), np.float32)  # no triangle is looked at
+    triangles = Triangles(none, none, np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, KNOTS, 3), np.float32))
+    sampling = source.manifest.get("direct", {"sun_angle": 0.0})
+    receivers = Receivers(source.width, source.height, source.quantity, dict(source.images), triangles, sampling)
+    return PcaDirect(receivers, kept_visibility(source, "receiver_visibility", normals))
 
 
 class Added:

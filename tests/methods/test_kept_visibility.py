@@ -66,7 +66,11 @@ def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
     asset.save(tmp_path / "asset")
     opened = Asset.open(tmp_path / "asset")
     np.testing.assert_array_equal(linear_response(by_depths(opened), LIGHTS), linear_response(by_depths(asset), LIGHTS))
-    with Added(asset, "pca") as one, Added(opened, "pca") as other:
+    by_depths(asset).save(tmp_path / "without")
+    without = Asset.open(tmp_path / "without")
+    assert without.scene is None and not (tmp_path / "without" / "scene.glb").exists()
+    np.testing.assert_array_equal(linear_response(without, LIGHTS), linear_response(by_depths(asset), LIGHTS))
+    with Added(asset, "pca") as one, Added(without, "pca") as other:
         first, second = one.response(LIGHTS), other.response(LIGHTS)
         assert first is not None and second is not None
         np.testing.assert_array_equal(first, second)
