@@ -18,6 +18,7 @@ from srbf.errors import ManifestError
 from srbf.io.image import size_of
 from srbf.light_domain import domain_of_asset
 from srbf.methods import method_of
+from srbf.methods.kept_visibility import SETS
 
 UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
 OF_PATCHES = ("point", "spot", "area", "sphere", "directional", "environment")  # light kinds that patches can express
@@ -125,6 +126,11 @@ def light_facts(asset: Asset) -> dict[str, Any]:
         told = manifest["position_table"]
         size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith("position_"))
         facts["position_table"] = {"nodes": told["nodes"], "spacing": told["spacing"], "rank": told["rank"], "bytes": size}
+    for kind in SETS:
+        if kind in manifest:
+            told = manifest[kind]
+            size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith(f"{kind}_"))
+            facts[kind] = {**{key: told[key] for key in ("points", "coefficients", "clusters")}, "bytes": size}
     return facts
 
 

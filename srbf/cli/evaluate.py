@@ -45,7 +45,7 @@ def evaluate(
         ),
     ] = None,
     direct: Annotated[
-        Literal["none", "ray", "shadow-map"] | None,
+        Literal["none", "ray", "shadow-map", "pca"] | None,
         typer.Option(
             help="Direct light added to an indirect asset, to compare with the combined response; default none, with point lights ray.",
             show_default=False,

@@ -108,6 +108,8 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
         implied = any(entry.name in method_named(method).implied_by for method, _, _ in owners)
         words = _flag(entry) if implied else f"{_flag(entry)}/--no-{_flag(entry).removeprefix('--')}"
         return Annotated[bool | None, typer.Option(words, help=help_text, show_default=False)]
+    if hints == {str}:
+        return Annotated[str | None, typer.Option(_flag(entry), metavar="TEXT", help=help_text, show_default=False)]
     if hints == {int}:
         return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", parser=COUNT, help=help_text, show_default=False)]
     choices = tuple(dict.fromkeys(choice for hint in hints for choice in _choices(hint)))

@@ -28,18 +28,22 @@ from srbf.cli.light_arguments import (
 from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
+from srbf.errors import MissingLibraryError
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
 from srbf.light_domain import domain_of_asset
 from srbf.lights import Light, NamedLight
 from srbf.methods import outside_domain
+from srbf.methods.kept_visibility import by_depths
 from srbf.methods.surface_changes import with_albedo
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
+from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
 Viewer = tuple[float, float, float] | None
+Shadows = Literal["ray", "pca"]
 
 
 def relight(
@@ -120,8 +124,15 @@ def relight(
     fps: Annotated[float, typer.Option(metavar="N", parser=POSITIVE, help="With --fade: frames per second.")] = 24.0,
     ambient_only: Annotated[bool, typer.Option("--ambient-only", help="No light: the ambient light that the scene itself emits.")] = False,
     direct: Annotated[
-        Literal["none", "ray", "shadow-map"] | None,
+        Literal["none", "ray", "shadow-map", "pca"] | None,
         typer.Option(help="Direct light added to an indirect asset; default: ray, without embreex shadow-map.", show_default=False),
+    ] = None,
+    shadows: Annotated[
+        Shadows | None,
+        typer.Option(
+            help="Of the light that bounces, on the surfels of an asset fitted with --visibility; default: ray, without embreex pca.",
+            show_default=False,
+        ),
     ] = None,
     viewer: Annotated[
         str | None,
@@ -180,7 +191,7 @@ def relight(
     if lights is not None:
         opened = _opened(asset, painted)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
-        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps)
+        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
@@ -191,7 +202,7 @@ def relight(
     for line in outside_domain(opened, placed):
         note(line)
     with Added(opened, chosen(opened, direct)) as added:
-        (image,) = _render(opened, [placed], renderer, added, seen_from)
+        (image,) = _render(_shadowed(opened, shadows), [placed], renderer, added, seen_from)
         for line in added.notes(placed):
             note(line)
     if picture:
@@ -212,6 +223,7 @@ def _relight_frames(
     viewer: Viewer,
     fade: float | None,
     seconds: float,
+    shadows: Shadows | None,
 ) -> None:
     """An image of each frame's lights in the folder `output`."""
     opacity = alpha_of(opened)
@@ -223,7 +235,8 @@ def _relight_frames(
         for number, frame in enumerate(frames):
             for line in outside_domain(opened, frame):
                 note(f"frame {number}: {line}")
-        images = _render(opened, frames, renderer, added, viewer) if fade is None else _faded(opened, frames, added, fade, seconds)
+        drawn = _shadowed(opened, shadows)
+        images = _render(drawn, frames, renderer, added, viewer) if fade is None else _faded(drawn, frames, added, fade, seconds)
         for number, image in enumerate(images):
             write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
             update(number + 1, len(frames))
@@ -235,6 +248,13 @@ def _relight_frames(
 def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]]) -> Asset:
     opened = Asset.open(folder)
     return with_albedo(opened, albedo) if albedo else opened
+
+
+def _shadowed(asset: Asset, shadows: Shadows | None) -> Asset:
+    """As its surfels are to be shadowed; MissingLibraryError for rays without embreex."""
+    if shadows == "ray" and not has_embree():
+        raise MissingLibraryError("rays from surfels need embreex: pip install embreex; or use `shadows=pca`")
+    return by_depths(asset) if shadows == "pca" else asset
 
 
 def check_image_output(path: Path, force: bool) -> None:

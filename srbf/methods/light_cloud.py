@@ -19,6 +19,7 @@ from srbf.io.image import Encoding
 from srbf.light_domain.cloud import isotropic
 from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
 from srbf.lights import Light
+from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, Moving, setting
@@ -66,6 +67,10 @@ class LightCloud(LightsInsideMaps):
         Average components over neighbors on the surface that differ by no more than the capture's noise.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
+    visibility
+        `pca:COUNT`: keep what each surfel sees as so many coefficients, for light without rays [Nowrouzezahrai2007]; `none`.
+    receiver_visibility
+        Keep what each receiver sees as well, for direct light without shadow maps.
     seed
         Of the clustering's random numbers.
 
@@ -99,10 +104,13 @@ class LightCloud(LightsInsideMaps):
     response_weight: Weight = setting("auto", "merge: weight of difference between lights, one over the unit of light.", words=("auto",))
     smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
+    visibility: str = setting("none", VISIBILITY_HELP)
+    receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
     seed: int = 0
 
     def __post_init__(self) -> None:
         check_table_settings(self.components, self.clusters, self.encoding)
+        check_visibility(self.visibility, self.receiver_visibility)
         if self.interpolation not in get_args(Interpolation):
             raise InputError(f"expected an interpolation of auto, fingerprint, kernel, found {self.interpolation!r}")
         if self.merge not in ("none", *get_args(Mean)):
@@ -117,6 +125,10 @@ class LightCloud(LightsInsideMaps):
             weight = getattr(self, name)
             if weight != "auto" and not (0 <= weight < np.inf and self.merge != "none"):
                 raise InputError(f"expected `{name}` auto, or 0 or more with `merge`, found {weight}")
+        if self.interpolation == "kernel" and self.visibility != "none":
+            raise InputError(
+                "expected `visibility=none` with `interpolation=kernel`, which needs rays between lights, found another; leave it out"
+            )
         if self.interpolation != "kernel" and (self.zones > 1 or self.merge != "none"):
             raise InputError("expected `zones` and `merge` with `interpolation=kernel`, found another; add it")
 
@@ -155,7 +167,8 @@ class LightCloud(LightsInsideMaps):
         else:
             kernel = CloudKernel(capture.positions(train), inside.visible, self.nearest)
             unseen = unseen_lights(capture, inside, self.seed) if self.interpolation != "kernel" else None
-            kind, report = chosen_interpolation(self.interpolation, unseen, kernel)
+            wanted = "fingerprint" if self.visibility != "none" else self.interpolation
+            kind, report = chosen_interpolation(wanted, unseen, kernel)
             mixtures = np.eye(len(train))
             if kind == "fingerprint" and unseen is not None:  # sums of captured lights have less noise than single ones
                 mixtures = unseen.prints.weights(inside.received(inside.free[:VIRTUAL_LIGHTS]))
@@ -175,6 +188,7 @@ class LightCloud(LightsInsideMaps):
         asset.manifest["interpolation"] = {"kind": kind, **({"nearest": self.nearest} if kind == "kernel" else {})}
         asset.manifest["source"]["fit"] |= report
         self.add_places(asset, inside)
+        self.add_visibility(asset, inside)
         return asset
 
     @classmethod
@@ -195,7 +209,8 @@ class LightCloud(LightsInsideMaps):
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """Of patches: the irradiance that all lights lay on them."""
-        return np.sum([CloudLights.of_asset(asset).on_patches(light) for light in lights], axis=0)
+        on_patches = light_on_patches(asset)
+        return np.sum([on_patches(light) for light in lights], axis=0)
 
     @classmethod
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:

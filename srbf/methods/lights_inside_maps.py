@@ -6,7 +6,8 @@ What the light cloud and the transfer of direct light share.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy import ndarray
@@ -19,6 +20,7 @@ from srbf.encode.position_table import FILES, PositionTable, position_table
 from srbf.errors import InputError
 from srbf.light_domain.cloud import isotropic
 from srbf.lights import Light, NamedLight, PointLight
+from srbf.methods import kept_visibility
 from srbf.methods.light_table_maps import LightTableMaps
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.embree import has_embree
@@ -27,7 +29,10 @@ from srbf.visibility.embree import has_embree
 class LightsInsideMaps(LightTableMaps):
     """A method whose lights are inside the scene."""
 
-    tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", **FILES}
+    tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", **FILES, **kept_visibility.FILES}
+
+    visibility: str = "none"  # compressed depths of the surfels; and of the receivers:
+    receiver_visibility: bool = False
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
@@ -40,7 +45,16 @@ class LightsInsideMaps(LightTableMaps):
         tables["position_basis"] = reader.table("position_basis", (told["rank"], functions), 3).astype(np.float16)
         shape = (fine * (nz - 1) * fine * (ny - 1), 8 * fine * (nx - 1))
         seen = np.round(reader.table("position_visibility", shape, 1)[:, :, 0] * 255)
-        return {**tables, "position_visibility": seen.astype(np.uint8)}
+        return {**tables, "position_visibility": seen.astype(np.uint8), **kept_visibility.read_visibility(reader)}
+
+    def on_sample(self, ratio: float) -> LightTableMaps:
+        """A trial measures by rays."""
+        settings: Any = super().on_sample(ratio)
+        return replace(settings, visibility="none", receiver_visibility=False)
+
+    def add_visibility(self, asset: Asset, inside: CloudLights) -> None:
+        """Compressed depths, as the settings ask for."""
+        kept_visibility.add_visibility(asset, inside, self.visibility, self.receiver_visibility)
 
     @classmethod
     def add_places(cls, asset: Asset, inside: CloudLights) -> None:
@@ -53,14 +67,14 @@ class LightsInsideMaps(LightTableMaps):
 
     @classmethod
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "F 3"]:
-        """By rays where Embree is installed, else by the table of places, which point lights alone are in."""
+        """By rays where Embree is installed, else by compressed depths, else by the table of places, which point lights alone are in."""
         if not lights:
             return np.zeros((len(asset.tables["light_values"]), 3))
         if not cls.takes_objects and any(isinstance(light, NamedLight) for light in lights):
             raise InputError(
                 f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
             )
-        if not has_embree():
+        if not has_embree() and not kept_visibility.has_depths(asset):
             return np.sum([_from_table(asset, light) for light in lights], axis=0)
         return super().projected_weights(asset, lights)
 

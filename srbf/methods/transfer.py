@@ -18,6 +18,7 @@ from srbf.compute.full_precision import by_channel
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.lights import Light, NamedLight
+from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, setting
@@ -63,6 +64,10 @@ class Transfer(LightsInsideMaps):
         Average components over neighbors on the surface that differ by no more than the noise of the rays.
     encoding
         Of the layers on disk: `half`, `float` or `uint8`.
+    visibility
+        `pca:COUNT`: keep what each surfel sees as so many coefficients, for light without rays [Nowrouzezahrai2007]; `none`.
+    receiver_visibility
+        Keep what each receiver sees as well, for direct light without shadow maps.
     seed
         Of random numbers.
 
@@ -90,10 +95,13 @@ class Transfer(LightsInsideMaps):
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
     smooth: bool = setting(True, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
+    visibility: str = setting("none", VISIBILITY_HELP)
+    receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
     seed: int = 0
 
     def __post_init__(self) -> None:
         check_table_settings(self.components, self.clusters, self.encoding)
+        check_visibility(self.visibility, self.receiver_visibility)
         if self.surfels != "auto" and not 1 <= self.surfels <= MOST_SURFELS:
             raise InputError(f"expected `surfels` auto or 1 to {MOST_SURFELS}, found {self.surfels}")
         if self.rank != "auto" and not self.rank >= 1:
@@ -159,6 +167,7 @@ class Transfer(LightsInsideMaps):
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)
+        self.add_visibility(asset, inside)
         return asset
 
     @classmethod
@@ -177,14 +186,14 @@ class Transfer(LightsInsideMaps):
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """A named light is an object whose surfaces emit radiance of its color."""
-        inside = CloudLights.of_asset(asset)
+        on_patches = light_on_patches(asset)
         received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
         emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
         for light in lights:
             if isinstance(light, NamedLight):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
             else:
-                received += inside.on_patches(light)
+                received += on_patches(light)
         table = by_channel(asset.tables["surfel_transfer"])
         columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted

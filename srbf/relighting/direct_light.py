@@ -14,16 +14,23 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import InputError
+from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, NamedLight, moved
 from srbf.methods import method_of
+from srbf.methods.kept_visibility import kept_visibility, receiver_points
 from srbf.visibility.embree import has_embree
+from srbf.visibility.pca_direct import PcaDirect
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.shadow_map import ShadowMapper
 
-Direct = Literal["none", "ray", "shadow-map"]
-NAMES = {"ray": "exact direct light by rays", "shadow-map": "direct light by shadow maps"}
+Direct = Literal["none", "ray", "shadow-map", "pca"]
+NAMES = {
+    "ray": "exact direct light by rays",
+    "shadow-map": "direct light by shadow maps",
+    "pca": "direct light by compressed depths",
+}
 
 
 class DirectLight(Protocol):
@@ -52,6 +59,21 @@ def chosen(asset: Asset, asked: Direct | None) -> Direct:
     return "ray" if has_embree() else "shadow-map"
 
 
+def by_receiver_depths(source: Asset | Capture) -> PcaDirect:
+    """InputError where the source is no asset, or one that does not keep what its receivers see."""
+    if not isinstance(source, Asset) or "receiver_visibility" not in source.manifest:
+        raise InputError(
+            "expected an asset that keeps what its receivers see for `direct=pca`, found none; "
+            "fit with `visibility=pca:50` and `receiver_visibility`"
+        )
+    _, normals = receiver_points(source)
+    none = np.zeros((0, 3, 3), np.float32)  # no triangle is looked at
+    triangles = Triangles(none, none, np.zeros(0, np.int64), np.zeros(0, bool), np.zeros((0, KNOTS, 3), np.float32))
+    sampling = source.manifest.get("direct", {"sun_angle": 0.0})
+    receivers = Receivers(source.width, source.height, source.quantity, dict(source.images), triangles, sampling)
+    return PcaDirect(receivers, kept_visibility(source, "receiver_visibility", normals))
+
+
 class Added:
     """The direct light of one asset or capture, made ready once; a context manager."""
 
@@ -65,6 +87,8 @@ class Added:
             self._light = RayTracer(Receivers.of(source))
         elif kind == "shadow-map":
             self._light = self._stack.enter_context(ShadowMapper(Receivers.of(source)))
+        elif kind == "pca":
+            self._light = by_receiver_depths(source)
 
     def __enter__(self) -> Added:
         return self

@@ -27,8 +27,8 @@ def relight(
     lights
         Directional, point, spot and environment lights in Blender's world: z up, meters, linear Rec.709. None of them gives the ambient.
     direct
-        How the direct light of an indirect asset is added: `ray`, `shadow-map`, or `none`. By default by rays where embreex is installed,
-        else by a shadow map. A combined asset holds its direct light already.
+        How the direct light of an indirect asset is added: `ray`, `shadow-map`, `pca` (with `receiver_visibility`) or `none`. By default by
+        rays where embreex is installed, else by a shadow map. A combined asset holds its direct light already.
     renderer
         `numpy`, the reference, or `gl`, the shaders.
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64
+from srbf.arrays import Float, Float32, Float64, Int
 from srbf.io.scene_glb import read_triangles
 from srbf.light_geometry import environment_samples, spot_cone
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
@@ -28,15 +29,45 @@ def occluders_of(scene: bytes) -> EmbreeTriangles:
     return EmbreeTriangles(triangles.corners[triangles.occluders])
 
 
-class ReceivedLight:
-    """Irradiance of lights on N cells, shadowed by `occluders`."""
+class Shadows(Protocol):
+    """What cells see of lights."""
 
-    def __init__(self, cells: Cells, occluders: EmbreeTriangles) -> None:
-        self._cells, self._occluders = cells, occluders
+    @property
+    def side(self) -> int:
+        """Looks per side of an area light."""
+
+    def visible(self, points: Int[ndarray, " n"], toward: Float[ndarray, "n 3"], distance: Float[ndarray, " n"] | None) -> ndarray:
+        """(n,) how much of a light in the direction `toward` some cells see, 0 to 1; distance (m), None: of suns."""
+
+
+class RayShadows:
+    """By one ray each from `starts` (m)."""
+
+    side = SIDE
+
+    def __init__(self, starts: Float32[ndarray, "N 3"], occluders: EmbreeTriangles) -> None:
+        self._starts, self._occluders = starts, occluders
+
+    def visible(self, points: Int[ndarray, " n"], toward: Float[ndarray, "n 3"], distance: Float[ndarray, " n"] | None) -> ndarray:
+        """(n,) bool."""
+        return ~self._occluders.occluded(self._starts[points], toward, distance)
+
+
+def starts_of(positions: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
+    """Where shadow rays from surfaces start: a little above them, m."""
+    lift = OFFSET * float(np.ptp(positions, axis=0).max()) if len(positions) else 0.0
+    return (positions + lift * normals).astype(np.float32)
+
+
+class ReceivedLight:
+    """Irradiance of lights on N cells, shadowed by rays to `occluders`, or otherwise."""
+
+    def __init__(self, cells: Cells, occluders: EmbreeTriangles | Shadows) -> None:
+        self._cells = cells
         self._normals = cells.normals.astype(np.float64)
-        places = cells.places.astype(np.float64)
-        lift = OFFSET * float(np.ptp(places, axis=0).max()) if len(places) else 0.0
-        self._places, self._starts = places, (places + lift * self._normals).astype(np.float32)
+        self._places = cells.places.astype(np.float64)
+        self._starts = starts_of(self._places, self._normals)
+        self._shadows: Shadows = RayShadows(self._starts, occluders) if isinstance(occluders, EmbreeTriangles) else occluders
         self._areas = cells.areas.astype(np.float64)
 
     def irradiance(self, light: Light) -> Float64[ndarray, "N 3"]:
@@ -76,9 +107,10 @@ class ReceivedLight:
         def strength(squared: ndarray, unit: ndarray, least: ndarray) -> ndarray:
             return np.maximum(-(unit @ facing), 0) * light.a0**2 / np.maximum(squared, least)
 
-        steps = (np.arange(SIDE) + 0.5) / SIDE - 0.5
+        side = self._shadows.side
+        steps = (np.arange(side) + 0.5) / side - 0.5
         places = [center + s * u + t * v for s in steps for t in steps]
-        return np.sum([self._from_place(place, strength) for place in places], axis=0) / SIDE**2
+        return np.sum([self._from_place(place, strength) for place in places], axis=0) / side**2
 
     def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength) -> Float64[ndarray, " N"]:
         """The mean of cos times `strength` over every cell that sees a place.
@@ -125,7 +157,7 @@ class ReceivedLight:
         front = np.flatnonzero(cosine > 0)
         toward = np.broadcast_to(direction, (len(front), 3))
         result = np.zeros(len(cosine))
-        result[front] = cosine[front] * ~self._occluders.occluded(self._starts[front], toward, None)
+        result[front] = cosine[front] * self._shadows.visible(front, toward, None)
         return result
 
     def _shadowed(self, amount: Float64[ndarray, " N"], place: Float64[ndarray, " 3"]) -> Float64[ndarray, " N"]:
@@ -133,9 +165,8 @@ class ReceivedLight:
         front = np.flatnonzero(amount > 0)
         vector = place - self._starts[front]
         distance = np.linalg.norm(vector, axis=1)
-        blocked = self._occluders.occluded(self._starts[front], vector / np.maximum(distance, 1e-30)[:, None], distance)
         result = np.zeros(len(amount))
-        result[front[~blocked]] = amount[front[~blocked]]
+        result[front] = amount[front] * self._shadows.visible(front, vector / np.maximum(distance, 1e-30)[:, None], distance)
         return result
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from closed_forms import glb, quad
 from made_captures import write_capture
-from test_commands import ok, refused, srbf
+from test_commands import misused, ok, refused, srbf
 
 from srbf.asset import Asset
 from srbf.capture import Capture
@@ -198,3 +198,16 @@ def test_a_capture_without_direct_images_has_no_combined_response(asset: Path, c
     files.write_json(capture.folder / "capture.json", capture.manifest)
     assert "direct image" in refused("evaluate", asset, capture.folder, "--direct", "ray")
     ok("evaluate", asset, capture.folder)
+
+
+def test_compressed_depths_are_asked_for_in_words_that_exist(asset: Path, capture: Capture, tmp_path: Path) -> None:
+    """Each a line that names the flag."""
+    for text in ("pca:0", "pca:5000", "rays"):
+        line = misused("fit", capture.folder, "-o", tmp_path / "new", "--method", "transfer", "--visibility", text)
+        assert "expected --visibility none or pca:COUNT with 1 to 256 coefficients" in line and text in line
+    assert "--visibility pca:50" in misused("fit", capture.folder, "-o", tmp_path / "new", "--method", "transfer", "--receiver-visibility")
+    command = ("relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1")
+    assert "expected an asset with compressed depths for --shadows pca" in refused(*command, "--shadows", "pca")
+    assert "keeps what its receivers see for --direct pca" in refused(*command, "--direct", "pca")
+    misused(*command, "--shadows", "map")
+    assert not (tmp_path / "new").exists() and not (tmp_path / "x.exr").exists()

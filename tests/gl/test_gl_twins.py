@@ -12,6 +12,7 @@ from typing import Any
 import depth_twins  # noqa: F401  registers its twins
 import many_lights_twins  # noqa: F401
 import numpy as np
+import pca_visibility_twins  # noqa: F401
 import point_shadow_twins  # noqa: F401
 import pytest
 import rounded_twins  # noqa: F401
