@@ -45,34 +45,40 @@ def harmonics(asset: Asset, irradiance: Float32[ndarray, "H W 3"]) -> Float32[nd
 
 
 def light_at(
-    grid: ProbeGrid, radiance: Float[ndarray, "N 9 3"], points: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]
+    asset: Asset, radiance: Float[ndarray, "N 9 3"], points: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]
 ) -> Float32[ndarray, "n 3"]:
     """Irradiance at places between the probes, on surfaces that face `normals`.
 
     Parameters
     ----------
-    grid
-        `asset.probes`.
+    asset
+        Whose receivers are probes.
     radiance
         (N, 9, 3): of `harmonics`.
     points
-        (n, 3), m, in the frame of the asset.
+        (n, 3), m, in the world.
     normals
-        (n, 3), unit vectors.
+        (n, 3), unit vectors, in the world.
 
     Returns
     -------
     ndarray
         (n, 3) float32, not negative.
 
+    Raises
+    ------
+    InputError
+        On an asset of other receivers.
+
     Examples
     --------
-    >>> light_at(asset.probes, harmonics(asset, picture), points, normals).shape  # doctest: +SKIP
+    >>> light_at(asset, harmonics(asset, picture), points, normals).shape  # doctest: +SKIP
     (50, 3)
     """
-    probe, weight = grid.weights(points)
+    turn, shift = asset.asset_from_world[:3, :3], asset.asset_from_world[:3, 3]
+    probe, weight = grid_of(asset).weights(points @ turn.T + shift)
     mixed = np.einsum("ne,nekc->nkc", weight, np.asarray(radiance, np.float64)[probe])
-    return irradiance_at(mixed, normals).astype(np.float32)
+    return irradiance_at(mixed, normals @ turn.T).astype(np.float32)
 
 
 def grid_of(asset: Asset) -> ProbeGrid:
