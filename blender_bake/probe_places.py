@@ -12,7 +12,7 @@ import numpy as np
 from blender_bake.free_places import FreeSpace, even_directions
 from blender_bake.ipc import WorkerError
 
-PROBES = 1000  # in free space, about, unless a spacing is given
+PROBES = 2500  # in free space, about, unless a spacing is given
 MOST_PROBES = 20_000  # nodes of the grid
 CLEARANCES = (0.2, 0.05)  # of the spacing, off all surfaces: the first where there is room for it
 STEPS = (0.2, 0.35, 0.5)  # of the spacing: how far a probe may move
@@ -23,7 +23,7 @@ SURVEYED = 4  # stream of random numbers, one that free places do not use
 def places(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     """{origin, spacing, counts, places (N, 3), valid (N,), moved}: the nodes of a grid over all that renders, x running fastest.
 
-    asked: `spacing` (m), or null for about a thousand probes in free space; `seed`. The grid is centered in the box of all that renders. A
+    asked: `spacing` (m), or null for about 2500 nodes in free space; `seed`. The grid is centered in the box of all that renders. A
     node that is not free, or too close to a surface, is moved by half a spacing at most; one for which that does not help is not valid.
     WorkerError where no node is, and for more than 20000 nodes.
     """

@@ -358,7 +358,7 @@ class Asset:
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
         tables = {name: table for name, table in self.tables.items() if name != "cluster_index"}
         looked_up = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in tables.values())
-        probes = 0 if self.probes is None else self.probes.depth.nbytes + 16 * self.probes.count
+        probes = 0 if self.probes is None else self.probes.nearness.nbytes + 16 * self.probes.count
         return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"") + probes
 
     def save(self, folder: Path, force: bool = False) -> None:

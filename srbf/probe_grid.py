@@ -16,11 +16,10 @@ from srbf.basis.octahedral_table import lookup
 from srbf.errors import ImageError
 from srbf.io.image import write_image
 
-PLACES_FILE, DEPTH_FILE = "probes.exr", "probe_depth.exr"
-DEPTH_SIZE = 17  # nodes on a side of a probe's octahedral tile
+PLACES_FILE, NEARNESS_FILE = "probes.exr", "probe_nearness.exr"
+TILE = 17  # nodes on a side of a probe's octahedral tile
 UNSEEN = 1e-5  # weight of a probe that a place does not see, or that has another's light, beside those that it sees
-SOFTEST = 0.01  # of the spacing: least spread of the distances around a direction
-SHARPNESS = 3  # power of Chebyshev's bound [Majercik2019, section 4.3]
+SOFT = 0.1  # of a surface's distance: how far behind it a probe's weight falls to nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +27,8 @@ class ProbeGrid:
     """N = X Y Z nodes, `spacing` meters apart from `origin` on, x running fastest.
 
     `places` (N, 3): where each node's probe really is, m, moved off surfaces. `sources` (N,): the probe whose light a node has: its own, or
-    where it has none, inside geometry, the nearest one's. `depth`: octahedral tiles in an atlas, one a probe, of the mean distance to
-    surfaces around a direction and its standard deviation, m.
+    where it has none, inside geometry, the nearest one's. `nearness`: octahedral tiles in an atlas, one a probe, of 1 / distance to the
+    surfaces around, 1/m.
     """
 
     origin: tuple[float, float, float]
@@ -37,7 +36,7 @@ class ProbeGrid:
     counts: tuple[int, int, int]
     places: Float32[ndarray, "N 3"]
     sources: Int[ndarray, " N"]
-    depth: Float16[ndarray, "rows columns 2"]
+    nearness: Float16[ndarray, "rows columns 1"]
 
     @property
     def count(self) -> int:
@@ -67,8 +66,9 @@ class ProbeGrid:
     def weights(self, points: Float[ndarray, "n 3"]) -> tuple[Int[ndarray, "n 8"], Float64[ndarray, "n 8"]]:
         """(probes, weights that add up to 1) of the nodes around each point (m): trilinear, times what the probe sees of the point.
 
-        A probe sees it as Chebyshev's inequality bounds the share of surfaces around that direction that are farther away [Majercik2019].
-        What no probe around sees takes the light of all of them. Beyond the grid the outermost probes hold on.
+        A probe knows how far it sees in every direction, as in [Majercik2019]; but of 1 / distance, which is linear in the direction on a
+        plane, so that a wall is where it is at all angles. What no probe around sees takes the light of all of them. Beyond the grid the
+        outermost probes hold on.
         """
         place = np.asarray(points, np.float64)
         most = np.array(self.counts) - 1
@@ -84,11 +84,9 @@ class ProbeGrid:
 
     def _seen(self, probe: Int[ndarray, "n 8"], place: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n 8"]:
         way = place[:, None] - self.places[probe]
-        distance = np.linalg.norm(way, axis=2)
-        mean, spread = np.moveaxis(lookup(self.depth, DEPTH_SIZE, self.depth.shape[1] // DEPTH_SIZE, probe, way), 2, 0)
-        variance = np.maximum(spread, SOFTEST * self.spacing).astype(np.float64) ** 2
-        beyond = np.maximum(distance - mean, 0)
-        return (variance / (variance + beyond**2)) ** SHARPNESS
+        nearness = lookup(self.nearness, TILE, self.nearness.shape[1] // TILE, probe, way)[..., 0]
+        beyond = np.linalg.norm(way, axis=2) * nearness - 1
+        return np.clip(1 - beyond / SOFT, 0, 1) ** 2
 
     def described(self) -> dict[str, Any]:
         """The manifest's entry of this receiver."""
@@ -99,33 +97,33 @@ class ProbeGrid:
             "counts": list(self.counts),
             "valid": int(self.valid.sum()),
             "places": PLACES_FILE,
-            "depth": DEPTH_FILE,
+            "nearness": NEARNESS_FILE,
         }
 
     def write(self, folder: Path) -> None:
-        """The files that `described` names: (x, y, z, source) of every probe, and the depth atlas."""
+        """The files that `described` names: (x, y, z, source) of every probe, and the atlas of nearness."""
         x, y, z = self.counts
         rows = np.column_stack([self.places, self.sources.astype(np.float32)])
         write_image(folder / PLACES_FILE, rows.reshape(y * z, x, 4), "float")
-        write_image(folder / DEPTH_FILE, self.depth, "half")
+        write_image(folder / NEARNESS_FILE, self.nearness, "half")
 
     @staticmethod
     def read(told: dict[str, Any], pixels: Callable[[str, int], Float32[ndarray, "H W C"]]) -> ProbeGrid:
         """Of a manifest's entry, by a function that reads (file, channels); ImageError where the files do not fit it."""
         x, y, z = counts = (int(told["counts"][0]), int(told["counts"][1]), int(told["counts"][2]))
-        rows, depth = pixels(told["places"], 4), pixels(told["depth"], 2)
+        rows, nearness = pixels(told["places"], 4), pixels(told["nearness"], 1)
         if rows.shape[:2] != (y * z, x):
             raise ImageError(f"expected {x}x{y * z} probes in {told['places']}, found {rows.shape[1]}x{rows.shape[0]}; bake or fit again")
         sources = np.round(rows[:, :, 3]).astype(np.int64).ravel()
         count = x * y * z
         if sources.min() < 0 or sources.max() >= count:
             raise ImageError(f"expected sources of 0 to {count - 1} in {told['places']}, found others; bake or fit again")
-        columns = depth.shape[1] // DEPTH_SIZE
-        if depth.shape[0] % DEPTH_SIZE or depth.shape[1] % DEPTH_SIZE or depth.shape[0] // DEPTH_SIZE * columns < count:
-            raise ImageError(f"expected {count} tiles of {DEPTH_SIZE}x{DEPTH_SIZE} in {told['depth']}, found fewer; bake or fit again")
+        columns = nearness.shape[1] // TILE
+        if nearness.shape[0] % TILE or nearness.shape[1] % TILE or nearness.shape[0] // TILE * columns < count:
+            raise ImageError(f"expected {count} tiles of {TILE}x{TILE} in {told['nearness']}, found fewer; bake or fit again")
         x0, y0, z0 = (float(value) for value in told["origin"])
         places = np.ascontiguousarray(rows[:, :, :3]).reshape(-1, 3)
-        return ProbeGrid((x0, y0, z0), float(told["spacing"]), counts, places, sources, depth.astype(np.float16))
+        return ProbeGrid((x0, y0, z0), float(told["spacing"]), counts, places, sources, nearness.astype(np.float16))
 
 
 def probes_of(receiver: dict[str, Any], pixels: Callable[[str, int], Float32[ndarray, "H W C"]]) -> ProbeGrid | None:

@@ -13,7 +13,7 @@ from srbf.errors import InputError
 from srbf.io import files
 from srbf.probe_grid import ProbeGrid
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.probe_depth import depth_atlas
+from srbf.visibility.probe_nearness import nearness_atlas
 
 PROBES_FILE = "probes.npz"  # of a worker's job
 WIDEST = 16_384  # texels of an image's side
@@ -32,9 +32,9 @@ def grid_of(facts: dict[str, Any], seed: int) -> ProbeGrid:
     sources = np.flatnonzero(valid)[cKDTree(places[valid]).query(places)[1]]
     sources[valid] = np.flatnonzero(valid)  # of probes that were moved to one place, each has its own
     spacing = float(told["spacing"])
-    depth = depth_atlas(EmbreeTriangles(arrays["occluders"]), places, sources, spacing, seed)
+    nearness = nearness_atlas(EmbreeTriangles(arrays["occluders"]), places, sources, seed)
     x0, y0, z0 = (float(value) for value in told["origin"])
-    return ProbeGrid((x0, y0, z0), spacing, (x, y, z), places[sources], sources, depth)
+    return ProbeGrid((x0, y0, z0), spacing, (x, y, z), places[sources], sources, nearness)
 
 
 def write_job(grid: ProbeGrid, path: Path) -> dict[str, Any]:
