@@ -173,7 +173,7 @@ def sphere() -> None:
     cycles.max_bounces = cycles.diffuse_bounces = 32
 
 
-def sky() -> None:
+def white_world() -> None:
     """Two small black crates, 4 m apart, under a white world of radiance 1."""
     black_paint = material("Black", "ShaderNodeBsdfDiffuse", (0, 0, 0))
     for name, low in (("Near", -2.0), ("Far", 1.95)):
@@ -186,7 +186,7 @@ def sky() -> None:
 
 
 SCENES: dict[str, Callable[[], None]] = {
-    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere, sky)
+    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere, white_world)
 }
 
 if __name__ == "__main__":

@@ -27,12 +27,12 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 def test_a_uniform_environment_gives_pi(scene, tmp_path: Path) -> None:
     capture, asset = tmp_path / "capture", tmp_path / "asset"
-    done("bake", scene("sky"), "-o", capture, "--receiver", "probes:2", "--light-set", "named", "--samples", "16", *UNTESTED)
+    done("bake", scene("white_world"), "-o", capture, "--receiver", "probes:2", "--light-set", "named", "--samples", "16", *UNTESTED)
     probes = Capture.open(capture).probes()
     assert probes is not None and probes.counts == (3, 3, 3)
     done("fit", capture, "-o", asset)
     done("relight", asset, "--light", "World=1", "-o", tmp_path / "sh.exr", "--harmonics")
-    radiance = probes.values(read_image(tmp_path / "sh.exr", 3))[13]  # of the middle, where nothing hides the sky
+    radiance = probes.values(read_image(tmp_path / "sh.exr", 3))[13]  # of the middle, where nothing hides the world
     np.testing.assert_allclose(radiance[0], np.sqrt(4 * np.pi), rtol=0.01)
     np.testing.assert_allclose(radiance[1:], 0, atol=0.03)
     (tmp_path / "places.csv").write_text("x,y,z,nx,ny,nz\n0.3,-0.2,0.1,0,0,1\n1,1,-1,0.6,-0.8,0\n")
