@@ -13,7 +13,10 @@ from light_set_commands import done, refused, scenes_in
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.io.image import read_image
+from srbf.lights import PointLight
 from srbf.methods import captured_responses
+from srbf.visibility.rays import RayTracer
+from srbf.visibility.receivers import Receivers
 
 pytestmark = pytest.mark.blender
 
@@ -59,6 +62,10 @@ def test_bounces_in_a_room(scene, tmp_path: Path) -> None:
     done("fit", capture, "-o", asset, "--method", "transfer", "--clusters", "4", "--components", "12", "--rank", "32")
     relit, covered = Asset.open(asset), opened.coverage() > 0.5
     assert relit.probes is not None and (relit.probes.nearness == probes.nearness).all()
+    (light,) = opened.lights
+    direct = RayTracer(Receivers.of(opened)).response([PointLight(light.position, falloff="inverse-square")])
+    truth = read_image(capture / str(light.direct), 3)
+    assert np.linalg.norm((direct - truth)[covered]) < 0.01 * np.linalg.norm(truth[covered]), "a point has no footprint in the image"
     truth, found = opened.image(0)[covered], captured_responses(relit, opened, [0])[0][covered]
     assert abs(found.sum() / truth.sum() - 1) < 0.05
 
