@@ -69,11 +69,15 @@ def message(light: Light) -> dict[str, Any]:
     return {"kind": "point", "position": light.position}
 
 
-def rendered(scene: Path, capture: Capture, lights: list[Light], samples: int) -> np.ndarray:
-    """(2, N, H, W, 3): the indirect light of every light, twice."""
+def settings_of(capture: Capture) -> BakeSettings:
+    """Those that render the receivers of a capture again."""
     receiver = capture.manifest["source"]["settings"]["receiver"]
     chosen = Receiver(receiver["kind"], receiver["name"], receiver.get("uv_layer"), tuple(receiver.get("also", ())))
-    settings = BakeSettings(chosen, capture.width, capture.height, quantity=capture.quantity, transport="indirect")
+    return BakeSettings(chosen, capture.width, capture.height, quantity=capture.quantity)
+
+
+def rendered(scene: Path, settings: BakeSettings, lights: list[Light], samples: int) -> np.ndarray:
+    """(2, N, H, W, 3): the indirect light of every light, twice."""
     images = []
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
@@ -88,12 +92,12 @@ def rendered(scene: Path, capture: Capture, lights: list[Light], samples: int) -
             for again in range(2)
             for i, light in enumerate(lights)
         ]
-        job = {**base_job(scene, settings, scratch), "transmittances": {}, "requests": requests}
+        job = {**base_job(scene, settings, scratch), "transport": "indirect", "transmittances": {}, "requests": requests}
         with Worker(job, scratch, scratch / "bake.log", None) as worker:
             for event in worker.events(print):
                 if event["event"] == "rendered":
                     images.append(np.load(scratch / event["files"]["indirect"]))
-    return np.array(images).reshape(2, len(lights), capture.height, capture.width, 3)
+    return np.array(images).reshape(2, len(lights), settings.height, settings.width, 3)
 
 
 def row(relit: np.ndarray, first: np.ndarray, second: np.ndarray) -> str:
@@ -127,7 +131,7 @@ def main() -> None:
     print(f"{'asset':>24}{'light':>8}{'pooled':>8}{'mean':>8}{'worst':>8}{'without 1 %':>14}{'energy':>9}{'noise':>8}")
     for kind in asked.kinds.split(","):
         lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
-        first, second = rendered(asked.scene, capture, lights, asked.samples)[:, :, covered]
+        first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples)[:, :, covered]
         for path in asked.assets:
             asset = Asset.open(path)
             relit = np.stack([linear_response(asset, [light])[covered] for light in lights])

@@ -44,10 +44,10 @@ def main() -> None:
 def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events) -> None:
     """Open the scene, prepare the receiver, send the images that the job asks for, emit `ready`, then render `messages` as they come.
 
-    Every job: scene, scene_name (null: the active one), scratch (folder for files handed over). A job with `query` gets the facts that it
-    asks for (see `scene_query`), one with `mesh` the scene's triangles and materials (see `scene_mesh`), and no more.
-    Others: receiver {kind, object | objects, uv_layer, unwrap | camera}, width, height, quantity, transport, keep_scene_lights, sun_angle
-    (rad), no_shadow (names of objects), coverage_samples;
+    Every job: scene, scene_name (null: the active one), scratch (folder for files handed over). A job with `query` gets the facts
+    that it asks for (see `scene_query`), one with `mesh` the scene's triangles and materials (see `scene_mesh`), and no more.
+    Others: receiver {kind, object | objects, uv_layer, unwrap | camera | file, described}, width, height, quantity, transport,
+    keep_scene_lights, sun_angle (rad), no_shadow (names of objects), coverage_samples;
     channels: names of the receiver's images to send first (see `channels`);
     ambient: a request without a light, or null; rendered only where the scene may emit;
     lit_by: {kind: own}, suns and point lights of ours; {kind: named, groups}, the scene's own lights; {kind: cloud | patches, file}, point
@@ -63,6 +63,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     from blender_bake.light import SoleLight
     from blender_bake.lightmap import LightmapReceiver
     from blender_bake.named_lights import NamedLights
+    from blender_bake.probes import ProbeReceiver
     from blender_bake.request import RenderRequest
     from blender_bake.vertices import VertexReceiver
     from blender_bake.view import ViewReceiver
@@ -77,7 +78,8 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     if "mesh" in job:
         events.emit("mesh", **scene_mesh.response(scene, job))
         return
-    kind = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver}[job["receiver"]["kind"]]
+    kinds = {"lightmap": LightmapReceiver, "vertices": VertexReceiver, "view": ViewReceiver, "probes": ProbeReceiver}
+    kind = kinds[job["receiver"]["kind"]]
     left_out = [*scenes.left_out(scene), *(frame.left_out(job["width"], job["height"]) if kind is ViewReceiver else ())]
     no_shadow.let_light_through(scene, job["no_shadow"])
     lit_by = job["lit_by"]
@@ -123,8 +125,8 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
         if transmittances is None:
             aims = [partial(light.aim, probe) for probe in job["probes"]]
             transmittances = translucency.fit_transmittances(translucent, aims, lambda: receiver.direct(1, 0))
-            lightmap = kind is LightmapReceiver
-            layers = {described["object"]: described["uv_layer"] for described in receiver.descriptions()} if lightmap else None
+            described = receiver.descriptions() if kind is LightmapReceiver else []
+            layers = None if kind in (VertexReceiver, ViewReceiver) else {one["object"]: one["uv_layer"] for one in described}
             (scratch / "scene.glb").write_bytes(scene_file.write_glb(list(scene_file.parts(layers)), transmittances))
             if missed := without_triangles.line(scene):
                 events.warn(missed)

@@ -96,7 +96,7 @@ class FreeSpace:
         self.low, self.high = self.low.astype(np.float64), self.high.astype(np.float64)
         self._seed = seed
         self.tried = self.free = 0
-        self._directions = _even_directions(RAYS)
+        self._directions = even_directions(RAYS)
         self._is_closed = self._is_faced = False
         seen = [self._look(place) for place in self.random(SURVEY, SURVEYED, 0.0)]
         self._is_faced = sum(backs == 0 and fronts >= FACING for _, backs, fronts in seen) >= TRUSTED * max(len(seen), 1)
@@ -152,6 +152,11 @@ class FreeSpace:
                 free[i] = not (self._is_closed and share >= OUTSIDE) and not (self._is_faced and backs >= BURIED)
         return free
 
+    def nearest(self, place: np.ndarray, farthest: float) -> np.ndarray | None:
+        """The nearest point of all surfaces within `farthest` meters; None without one."""
+        found = self._tree.find_nearest(Vector(place), farthest)[0]
+        return None if found is None else np.array(found)
+
     def open_share(self, place: np.ndarray) -> float:
         """Share of the rays from a place that leave the scene; 0 if the first few do not."""
         return self._look(place)[0]
@@ -188,7 +193,7 @@ def _solids_and_tree() -> tuple[list[Solid], BVHTree]:
     return solids, BVHTree.FromPolygons(points.tolist(), np.arange(len(points)).reshape(-1, 3).tolist(), all_triangles=True)
 
 
-def _even_directions(count: int) -> list[Vector]:
+def even_directions(count: int) -> list[Vector]:
     """Unit vectors of a spherical Fibonacci set, in an order of which every beginning is spread too; along no axis."""
     k = np.arange(count)
     z = 1 - (2 * k + 1) / count

@@ -13,7 +13,7 @@ from blender_bake.translucency import Switch
 
 
 class Receiver(Protocol):
-    """What is lit: a lightmap's texels, vertices, or a view's pixels. Arrays are (H, W, C) float32, row 0 at the top."""
+    """What is lit: a lightmap's texels, vertices, probes, or a view's pixels. Arrays are (H, W, C) float32, row 0 at the top."""
 
     kind: str
     renders: frozenset[str]  # which images of a light, see `RenderRequest.channels`

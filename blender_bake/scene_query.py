@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
-from blender_bake import free_places, point_grid, surfaces, unwrap, vertices
+from blender_bake import free_places, point_grid, probe_places, surfaces, unwrap, vertices
 from blender_bake.frame import Frame
 from blender_bake.ipc import Events, hand_over
 from blender_bake.named_lights import NamedLights
@@ -28,6 +29,8 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     frame: true                   -> `frame`: the aspect of the camera's picture in the scene's own render settings, see `Frame.record`
     points: {spacing, box, random, seed} -> `points`: free places for point lights, see `point_grid.free_points`
     named: {groups}               -> `named`: [{name, objects}], see `NamedLights.entries`
+    probes: {spacing, seed}       -> `probes`: {origin, spacing, counts, moved}, see `probe_places.places`; `files` in `scratch`:
+        `probe_places` (N, 3), `probe_valid` (N,), and `occluders`
     places                        -> `places`: see `free_places.places`
     surfaces: {cells, spacing, gloss} -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), with gloss as if it were diffuse where
         `gloss` is true, `object` (T,) and `transparent` (T,) of all surfaces in fragments no longer than a cell, if they were `cells`, or
@@ -52,9 +55,21 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
             events.warn(line)
     if question.get("points"):
         found["points"] = point_grid.free_points(scene, question["points"])
+    if question.get("probes"):
+        found |= _probes(scene, question["probes"], Path(scratch))
     if question.get("surfaces"):  # the last: it hides all objects
         found |= _surfaces(scene, question["surfaces"], Path(scratch), events)
     return found
+
+
+def _probes(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path) -> dict[str, Any]:
+    found = probe_places.places(scene, question)
+    arrays = {
+        "probe_places": found.pop("places"),
+        "probe_valid": found.pop("valid").astype(np.uint8),
+        "occluders": surfaces.occluders(scene),
+    }
+    return {"probes": found, "files": {name: hand_over(scratch, name, array) for name, array in arrays.items()}}
 
 
 def _surfaces(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path, events: Events) -> dict[str, Any]:

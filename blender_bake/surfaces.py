@@ -51,6 +51,12 @@ def area(scene: bpy.types.Scene) -> float:
     return sum(float(_areas(_moved(shapes[one.key].corners, one.matrix)).sum()) for one in placed)
 
 
+def occluders(scene: bpy.types.Scene) -> np.ndarray:
+    """(O, 3, 3) float32: the triangles that cast shadows and are of no material that light passes."""
+    show_as_rendered(scene)
+    return np.concatenate([np.zeros((0, 3, 3), np.float32), *_read_scene()[2]])
+
+
 def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: bool = False) -> dict[str, Any]:
     """All surfaces that render and that diffuse rays see, as T fragments: triangles with no edge longer than `longest` meters.
 

@@ -20,6 +20,7 @@ from srbf.errors import InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers.texture_array import level_bytes, level_size
 from srbf.io.image import Encoding, write_images
+from srbf.probe_grid import ProbeGrid, probes_of
 from srbf.receiver_images import Quantity
 from srbf.registry import method_named
 from srbf.schemas import check_version
@@ -58,6 +59,8 @@ class Asset:
         position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
     scene
         scene.glb of an indirect asset: what casts the shadows of the light to be added.
+    probes
+        Where they are, of an asset whose receivers are probes: see `srbf.relighting.probe_light`.
 
     Examples
     --------
@@ -74,6 +77,7 @@ class Asset:
     tables: dict[str, ndarray]
     images: dict[str, ndarray] = field(default_factory=dict)
     scene: bytes | None = None  # scene.glb of an indirect asset: what casts the shadows of the light to be added
+    probes: ProbeGrid | None = None
 
     @property
     def method(self) -> str:
@@ -135,7 +139,7 @@ class Asset:
 
     @property
     def receiver_kind(self) -> str:
-        """`view`, `lightmap` or `vertices`; a picture of which nothing is known is a view."""
+        """`view`, `lightmap`, `vertices` or `probes`; a picture of which nothing is known is a view."""
         return str(self.receiver.get("kind") or "view")
 
     @property
@@ -343,7 +347,7 @@ class Asset:
         Returns
         -------
         int
-            Bytes of layers, position, normal, albedo, ambient (RGBA float), coverage, the tables and the scene.
+            Bytes of layers, position, normal, albedo, ambient (RGBA float), coverage, the tables, the scene and where probes are.
 
         Examples
         --------
@@ -354,7 +358,8 @@ class Asset:
         channels = sum(1 if name == "coverage" else 4 for name in self.images)
         tables = {name: table for name, table in self.tables.items() if name != "cluster_index"}
         looked_up = sum(table.nbytes if table.ndim != 3 else table.nbytes // 3 * 4 for table in tables.values())
-        return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"")
+        probes = 0 if self.probes is None else self.probes.nearness.nbytes + 16 * self.probes.count
+        return self.layer_bytes() + texels * 4 * channels + looked_up + len(self.scene or b"") + probes
 
     def save(self, folder: Path, force: bool = False) -> None:
         """Write the folder whole or not at all, one image per layer; fills in `sha256` of the manifest.
@@ -396,6 +401,8 @@ class Asset:
         write_images(images)
         if self.scene is not None:
             (folder / self.manifest["scene"]).write_bytes(self.scene)
+        if self.probes is not None:
+            self.probes.write(folder)
         self.manifest["sha256"] = files.checksums(folder, MANIFEST)
         schemas.check_asset(self.manifest, method_named(self.method).stem(), MANIFEST)
         files.write_json(folder / MANIFEST, self.manifest)
@@ -452,7 +459,7 @@ class Asset:
         scale = np.array([entry["scale"] for entry in layers], np.float32)
         bias = np.array([entry["bias"] for entry in layers], np.float32)
         scene = reader.bytes(manifest["scene"]) if "scene" in manifest else None
-        return Asset(manifest, stored, scale, bias, tables, images, scene)
+        return Asset(manifest, stored, scale, bias, tables, images, scene, probes_of(manifest.get("receiver", {}), reader.pixels))
 
 
 TEXEL_BITS: dict[LayerEncoding, int] = {"half": 64, "float": 128, "uint8": 32, "bc7": 8, "bc1": 4}  # of a layer

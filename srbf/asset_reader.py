@@ -38,7 +38,7 @@ class AssetReader:
             raise ManifestError(f"expected unit centers in {self.path}, found length {lengths[np.abs(lengths - 1).argmax()]:.4g}")
 
     def image(self, name: str, channels: int) -> np.ndarray:
-        pixels = self._pixels(name, channels)
+        pixels = self.pixels(name, channels)
         expected = (self.manifest["height"], self.manifest["width"])
         if pixels.shape[:2] != expected:
             size = f"{pixels.shape[1]}x{pixels.shape[0]}"
@@ -48,7 +48,7 @@ class AssetReader:
     def table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
         """A table of the manifest's key `name`, (rows, columns, channels) float32."""
         file = self.manifest[name]["file"]
-        pixels = self._pixels(file, channels)
+        pixels = self.pixels(file, channels)
         if pixels.shape[:2] != shape:
             found = f"{pixels.shape[1]}x{pixels.shape[0]}"
             raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
@@ -57,7 +57,7 @@ class AssetReader:
     def rows(self, name: str, rows: int, channels: int) -> np.ndarray:
         """A table of the manifest's key `name` with `rows` rows of any length, (rows, n, channels) float32."""
         file = self.manifest[name]["file"]
-        pixels = self._pixels(file, channels)
+        pixels = self.pixels(file, channels)
         if len(pixels) != rows:
             raise ImageError(f"expected {rows} rows in {self.folder / file}, found {len(pixels)}")
         return pixels
@@ -83,7 +83,8 @@ class AssetReader:
             raise ImageError(f"expected {path} as it was written, found another checksum: damaged or changed since; fit or export again")
         return path
 
-    def _pixels(self, name: str, channels: int) -> np.ndarray:
+    def pixels(self, name: str, channels: int) -> np.ndarray:
+        """An image of any size, (H, W, channels) float32."""
         path = self._checked(name)
         pixels = read_image(path, channels)
         require_finite(pixels, path)

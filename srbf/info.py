@@ -100,6 +100,7 @@ def describe_asset(asset: Asset, folder: Path) -> dict[str, Any]:
         "height": asset.height,
         **method_of(asset).describe(asset),
         **light_facts(asset),
+        **({"receiver": asset.receiver} if asset.probes is not None else {}),
         "encoding": asset.encoding,
         **({"levels": asset.levels} if asset.levels > 1 else {}),
         "bytes_per_texel": bytes_by_light(asset),

@@ -14,7 +14,9 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32
 from srbf.channels import Channel, channels_of
 from srbf.errors import ImageError, ManifestError
+from srbf.io import files
 from srbf.io.image import read_image, read_stored, require_finite, size_of
+from srbf.probe_grid import ProbeGrid, probes_of
 
 Quantity = Literal["irradiance", "radiance"]
 Transport = Literal["combined", "indirect"]
@@ -73,6 +75,33 @@ class ReceiverImages:
         if len(image) != 2:
             raise ImageError(f"expected 2 rows in {path}, found {len(image)}")
         return image
+
+    def probes(self) -> ProbeGrid | None:
+        """Where the probes of the capture are.
+
+        Returns
+        -------
+        ProbeGrid or None
+            None where its receivers are others.
+
+        Raises
+        ------
+        ImageError
+            On a damaged file.
+
+        Examples
+        --------
+        >>> capture.probes() is None
+        True
+        """
+
+        def pixels(name: str, channels: int) -> Float32[ndarray, "H W C"]:
+            path = files.inside(self.folder, name, self.folder / MANIFEST)
+            image = read_image(path, channels)
+            require_finite(image, path)
+            return image
+
+        return probes_of(self.manifest.get("receiver", {}), pixels)
 
     def scene(self) -> bytes | None:
         """The triangles of receivers and occluders.

@@ -8,6 +8,7 @@ from typing import Any
 
 from srbf.bake.images import ASKED_FOR
 from srbf.bake.light_sets import LIGHT_SET_FILE, NamedSet, PlacedLight
+from srbf.bake.probes import PROBES_FILE, write_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
 from srbf.bake.viewers import viewer_directions
@@ -40,9 +41,9 @@ def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | 
 def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Sequence[RenderRequest] = ()) -> dict[str, Any]:
     """A job of `requests` alone, and what every job says of scene and receiver. Keys: see `blender_bake.__main__.run`.
 
-    What a light set knows of the scene goes into a file in `scratch`.
+    What a light set and probes know of the scene goes into files in `scratch`.
     """
-    light_set = settings.light_set
+    light_set, probes = settings.light_set, settings.receiver.probes
     lit_by: dict[str, Any] = {"kind": "own"}
     if isinstance(light_set, NamedSet):
         lit_by = {"kind": "named", "groups": list(light_set.groups)}
@@ -53,7 +54,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "lit_by": lit_by,
         "scene": str(scene.resolve()),
         "scene_name": settings.scene,
-        "receiver": settings.receiver.job(),
+        "receiver": settings.receiver.job() if probes is None else write_job(probes, scratch / PROBES_FILE),
         "width": settings.width,
         "height": settings.height,
         "quantity": settings.quantity,

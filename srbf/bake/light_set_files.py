@@ -1,4 +1,4 @@
-"""What a bake keeps of its light set beside the images: places, patches, and the form factors of surfels."""
+"""What a bake keeps of its scene beside the images: places, patches, form factors of surfels, and where probes are."""
 
 from __future__ import annotations
 
@@ -26,6 +26,12 @@ def write_light_set(folder: Path, settings: BakeSettings, identity: dict[str, An
     if not (patches.is_file() and replace(light_set, found=None).read(path, key).is_known):
         write_image(patches, light_set.found.patches.cells.image(), "float")
         light_set.write(path, key)
+
+
+def write_probes(folder: Path, settings: BakeSettings) -> None:
+    """Where the probes of a capture are, and how far they see."""
+    if settings.receiver.probes is not None:
+        settings.receiver.probes.write(folder)
 
 
 def trace_operator(receivers: Capture, settings: BakeSettings, progress: Callable[[int, int, str], None]) -> None:

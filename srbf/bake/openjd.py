@@ -98,7 +98,7 @@ def arguments(settings: BakeSettings) -> list[str]:
         **_light_set(settings.light_set),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
-    words = [f"{receiver.kind}:{name}" if name else receiver.kind for name in (receiver.name, *receiver.also)]
+    words = [receiver.word, *(f"{receiver.kind}:{name}" for name in receiver.also)]
     flags = [f"--receiver={word}" for word in words] + [f"--{name}={value}" for name, value in named.items() if value is not None]
     flags += [f"--no-cast-shadow={name}" for name in settings.no_shadow]
     flags += [f"--light-group={name}" for name in getattr(settings.light_set, "groups", ())]

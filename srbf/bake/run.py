@@ -21,7 +21,7 @@ from srbf.bake.folder import LOG, SCRATCH, STATE
 from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
-from srbf.bake.light_set_files import trace_operator, write_light_set
+from srbf.bake.light_set_files import trace_operator, write_light_set, write_probes
 from srbf.bake.light_sets import CloudSet, NamedSet
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
@@ -250,6 +250,7 @@ class _Passes:
                 self._record(self._images.prepared["facts"]["blender"])
             self._check_lights()
             write_light_set(self._folder, self._settings, self._identity)
+            write_probes(self._folder, self._settings)
             if self._shard is None or self._shard.is_preparation:
                 assert self._images.prepared is not None
                 manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])

@@ -14,6 +14,7 @@ import numpy as np
 
 from srbf.bake.folder import STATE
 from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlaces, LightSet, NamedSet
+from srbf.bake.probes import facts_line, grid_of
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings
 from srbf.bake.worker import Worker
@@ -74,14 +75,17 @@ def _ask(bake: Bake, question: dict[str, Any], say: Callable[[str], None]) -> di
 
 
 def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[str], None] = lambda line: None) -> Bake:
-    """The bake with the size of its receiver: of a list of vertices, or of a lightmap of `texels_per_meter`; others are unchanged.
+    """The bake with the size of its receiver: of vertices, of probes, or of a lightmap of `texels_per_meter`; others are unchanged.
 
     A lightmap is square, its side D sqrt(area in the world / area of the UV layer) rounded up to a multiple of 4; InputError where that
     is above 16384, with a density to use instead.
     """
-    if bake.settings.receiver.kind == "vertices":
-        if texels_per_meter is not None:
-            raise InputError("expected `texels_per_meter` with a lightmap, found it with vertices")
+    kind = bake.settings.receiver.kind
+    if kind in ("vertices", "probes") and texels_per_meter is not None:
+        raise InputError(f"expected `texels_per_meter` with a lightmap, found it with {kind}")
+    if kind == "probes":
+        return _with_probes(bake, say)
+    if kind == "vertices":
         facts = _ask(bake, {"vertices": bake.settings.receiver.job()}, say)
         return _sized(bake, facts["width"], facts["height"])
     if texels_per_meter is None:
@@ -100,6 +104,14 @@ def with_size(bake: Bake, texels_per_meter: float | None = None, say: Callable[[
         )
     say(f"{side}x{side} texels: {texels_per_meter:g} per meter on {facts['world_area']:.4g} square meters, UVs fill {facts['uv_area']:.0%}")
     return _sized(bake, side, side)
+
+
+def _with_probes(bake: Bake, say: Callable[[str], None]) -> Bake:
+    settings = bake.settings
+    facts = _ask(bake, {"probes": {"spacing": settings.receiver.spacing, "seed": settings.seed}}, say)
+    grid = grid_of(facts, settings.seed)
+    say(facts_line(grid, facts["probes"]["moved"]))
+    return _sized(replace(bake, settings=replace(settings, receiver=replace(settings.receiver, probes=grid))), *grid.image_size)
 
 
 def with_frame(bake: Bake, longer: int, replacing: bool, say: Callable[[str], None] = lambda line: None) -> Bake:

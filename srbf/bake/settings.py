@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,10 +17,11 @@ from srbf.basis.exitant_harmonics import MAX_ORDER
 from srbf.captured_light import ROLES, LightKind, Role
 from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
+from srbf.probe_grid import ProbeGrid
 from srbf.receiver_images import Quantity, Transport
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
-Kind = Literal["lightmap", "vertices", "view"]
+Kind = Literal["lightmap", "vertices", "view", "probes"]
 Rendered = Literal["response", "direct", "indirect", "denoised", "toward"]  # images of a light that a worker renders
 Unwrap = Literal["smart", "lightmap-pack", "keep"]
 LARGEST_SIDE = 16384
@@ -28,12 +29,12 @@ LARGEST_SIDE = 16384
 
 @dataclass(frozen=True)
 class Receiver:
-    """What receives the light: a lightmap, a mesh's vertices, or a camera's view.
+    """What receives the light: a lightmap, a mesh's vertices, a camera's view, or probes in free space.
 
     Parameters
     ----------
     kind
-        `lightmap`, `vertices` or `view`.
+        `lightmap`, `vertices`, `view` or `probes`.
     name
         Of the object, or of a view's camera; None: the scene's own camera.
     uv_layer
@@ -42,6 +43,10 @@ class Receiver:
         Further objects whose texels share the lightmap.
     unwrap
         How a UV layer is made where none fits: `smart`, `lightmap-pack` or `keep`.
+    spacing
+        Of probes, m; None: by the size of the scene.
+    probes
+        Where they are, known once `srbf.bake.scene_query.with_size` has asked the scene.
 
     Examples
     --------
@@ -55,10 +60,16 @@ class Receiver:
     uv_layer: str | None = None
     also: tuple[str, ...] = ()
     unwrap: Unwrap = "smart"
+    spacing: float | None = None
+    probes: ProbeGrid | None = field(default=None, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.spacing is not None and not (np.isfinite(self.spacing) and self.spacing > 0):
+            raise InputError(f"expected a spacing of probes above 0 m, found {self.spacing:g}")
 
     @staticmethod
     def parse(text: str, uv_layer: str | None = None, unwrap: Unwrap = "smart") -> Receiver:
-        """From the command line's `lightmap:OBJECT`, `vertices:OBJECT` or `view[:CAMERA]`.
+        """From the command line's `lightmap:OBJECT`, `vertices:OBJECT`, `view[:CAMERA]` or `probes[:SPACING]`.
 
         Parameters
         ----------
@@ -75,7 +86,7 @@ class Receiver:
         Raises
         ------
         InputError
-            On other words, and on a `uv_layer` of another receiver than a lightmap.
+            On other words, on a spacing that is no length, and on a `uv_layer` of another receiver than a lightmap.
 
         Examples
         --------
@@ -84,16 +95,18 @@ class Receiver:
         'Camera.001'
         >>> Receiver.parse("lightmap:")
         Traceback (most recent call last):
-        srbf.errors.InputError: expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found 'lightmap:'
+        srbf.errors.InputError: expected a receiver lightmap:OBJECT, vertices:OBJECT, view[:CAMERA] or probes[:SPACING], found 'lightmap:'
         """
         kind, _, name = text.partition(":")
         if kind == "lightmap" and name:
             return Receiver("lightmap", name, uv_layer, unwrap=unwrap)
-        if (kind == "vertices" and name) or kind == "view":
+        if (kind == "vertices" and name) or kind in ("view", "probes"):
             if uv_layer is not None:
                 raise InputError(f"expected `uv_layer` with a lightmap receiver, found it with {'a view' if kind == 'view' else kind}")
+            if kind == "probes":
+                return Receiver("probes", spacing=_spacing(name) if text != kind else None)
             return Receiver("view" if kind == "view" else "vertices", name or None)
-        raise InputError(f"expected a receiver lightmap:OBJECT, vertices:OBJECT or view[:CAMERA], found {text!r}")
+        raise InputError(f"expected a receiver lightmap:OBJECT, vertices:OBJECT, view[:CAMERA] or probes[:SPACING], found {text!r}")
 
     @staticmethod
     def of_manifest(described: Sequence[dict[str, Any]]) -> Receiver:
@@ -109,7 +122,9 @@ class Receiver:
         return f"{self.kind} {self.name!r}" if self.name else f"the {self.kind}"
 
     def job(self) -> dict[str, Any]:
-        """As JSON for the worker."""
+        """As JSON for the worker; of probes what a question to the scene needs, see `srbf.bake.probes.write_job` for the rest."""
+        if self.kind == "probes":
+            return {"kind": self.kind, "spacing": self.spacing}
         if self.kind == "view":
             return {"kind": self.kind, "camera": self.name}
         return {
@@ -127,7 +142,23 @@ class Receiver:
             record["also"] = list(self.also)
         if self.unwrap != "smart":
             record["unwrap"] = self.unwrap
+        if self.kind == "probes":
+            record["spacing"] = self.spacing
         return record
+
+    @property
+    def word(self) -> str:
+        """What `parse` makes it of, its further objects left out."""
+        if self.kind == "probes":
+            return self.kind if self.spacing is None else f"{self.kind}:{self.spacing!r}"
+        return f"{self.kind}:{self.name}" if self.name else self.kind
+
+
+def _spacing(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"expected a spacing of probes in meters, as in probes:0.5, found {text!r}") from None
 
 
 def captures_of(receivers: Sequence[Receiver], separate: bool = False) -> list[Receiver]:
@@ -258,8 +289,12 @@ class BakeSettings:
             raise InputError(f"expected a size of at most {LARGEST_SIDE} texels per side, found {self.width}x{self.height}")
         if self.sun_angle > np.pi:
             raise InputError(f"expected a sun angle of at most pi rad, found {self.sun_angle:g}")
-        if self.transport == "indirect" and self.receiver.kind == "vertices" and self.light_set is None:
-            raise InputError("expected vertices with transport combined, found indirect: rays have no footprint to spread over at a point")
+        if self.transport == "indirect" and self.receiver.kind in ("vertices", "probes") and self.light_set is None:
+            raise InputError(
+                f"expected {self.receiver.kind} with transport combined, found indirect: rays have no footprint to spread over at a point"
+            )
+        if self.receiver.kind == "probes" and self.quantity != "irradiance":
+            raise InputError(f"expected `quantity=irradiance` with probes, found {self.quantity}: they have no surface that reflects")
         if self.light_set is not None:
             self._check_light_set(self.light_set)
         if self.gloss is not None:

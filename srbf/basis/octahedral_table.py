@@ -61,15 +61,15 @@ def octahedral_table(functions: LightFunctions, domain: Domain, sizes: tuple[int
 
 
 def lookup(
-    atlas: Float[ndarray, "rows columns 3"], size: int, columns: int, function: Int[ndarray, "*p"], directions: Float[ndarray, "*p 3"]
-) -> Float32[ndarray, "*p 3"]:
+    atlas: Float[ndarray, "rows columns C"], size: int, columns: int, function: Int[ndarray, "*p"], directions: Float[ndarray, "*p 3"]
+) -> Float32[ndarray, "*p C"]:
     """Function `function` at unit directions by four fetches and a mix, as in the shaders."""
     u, v = octahedral_encode(directions)
     x, y = (u + 1) * (0.5 * (size - 1)), (v + 1) * (0.5 * (size - 1))
     j, i = (np.clip(t.astype(np.int64), 0, size - 2) for t in (x, y))
     s, t = (x - j).astype(np.float32)[..., None], (y - i).astype(np.float32)[..., None]
     node = (function // columns * size + i) * atlas.shape[1] + function % columns * size + j
-    flat = atlas.reshape(-1, 3)
+    flat = atlas.reshape(-1, atlas.shape[2])
     top = flat[node] * (1 - s) + flat[node + 1] * s
     bottom = flat[node + atlas.shape[1]] * (1 - s) + flat[node + atlas.shape[1] + 1] * s
     return top * (1 - t) + bottom * t

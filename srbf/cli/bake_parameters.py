@@ -37,7 +37,8 @@ Receivers = Annotated[
     list[str] | None,
     typer.Option(
         metavar="RECEIVER",
-        help="lightmap:OBJECT, vertices:OBJECT or view[:CAMERA]. Repeat it for more: lightmaps share an atlas, others go to OUTPUT/NAME.",
+        help="lightmap:OBJECT, vertices:OBJECT, view[:CAMERA] or probes[:METERS], a grid in free space. Repeat it for more: lightmaps "
+        "share an atlas, others go to OUTPUT/NAME.",
         show_default=False,
         rich_help_panel=SCENE,
     ),

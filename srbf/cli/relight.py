@@ -26,6 +26,7 @@ from srbf.cli.light_arguments import (
     with_falloff,
 )
 from srbf.cli.parameters import AssetFolder, Force
+from srbf.cli.probe_arguments import read_places, write_places
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
 from srbf.errors import MissingLibraryError
@@ -36,6 +37,7 @@ from srbf.lights import Light, NamedLight
 from srbf.methods import outside_domain
 from srbf.methods.kept_visibility import by_depths
 from srbf.methods.surface_changes import with_albedo
+from srbf.relighting import probe_light
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
@@ -49,7 +51,10 @@ Shadows = Literal["ray", "pca"]
 def relight(
     asset: AssetFolder,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="PATH", help="OUT.exr, OUT.png, or with --lights a folder.", show_default=False)
+        Path,
+        typer.Option(
+            "-o", "--output", metavar="PATH", help="OUT.exr, OUT.png, with --lights a folder, with --at OUT.csv.", show_default=False
+        ),
     ],
     directional: Annotated[
         list[str] | None, typer.Option(metavar="X,Y,Z[,R,G,B]", help="Towards the light, its color. Repeats.", show_default=False)
@@ -142,6 +147,21 @@ def relight(
             show_default=False,
         ),
     ] = None,
+    harmonics: Annotated[
+        bool,
+        typer.Option(
+            "--harmonics",
+            help="Of probes: nine spherical harmonics of the light that arrives, in columns harmonic X + x and rows z Y + y.",
+        ),
+    ] = False,
+    at: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PLACES.csv",
+            help="Of probes: irradiance at places x,y,z,nx,ny,nz between them, m and unit normals, as a CSV.",
+            show_default=False,
+        ),
+    ] = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
     alpha: Annotated[
@@ -183,19 +203,23 @@ def relight(
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
     if fade is not None and (lights is None or renderer == "gl" or viewer is not None):
         raise typer.BadParameter("expected --fade with --lights, and without --viewer or --renderer gl, found another; leave it out")
+    _check_probe_flags(output, harmonics, at, lights)
     picture = lights is None and output.suffix.lower() == ".png"
-    if lights is None and output.suffix.lower() not in (".exr", ".png"):
+    if lights is None and at is None and output.suffix.lower() not in (".exr", ".png"):
         raise typer.BadParameter(f"expected an output named .exr or .png, found {output.name!r}")
     if picture and alpha == "premultiplied":
         raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     if lights is not None:
         opened = _opened(asset, painted)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
-        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows)
+        _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
     opened = _opened(asset, painted)
+    places = None if at is None else read_places(at)
+    if harmonics or places is not None:
+        probe_light.grid_of(opened)
     if falloff is None:
         placed = with_falloff(placed, domain_of_asset(opened.manifest).falloff)
     opacity = alpha_of(opened)
@@ -205,7 +229,12 @@ def relight(
         (image,) = _render(_shadowed(opened, shadows), [placed], renderer, added, seen_from)
         for line in added.notes(placed):
             note(line)
-    if picture:
+    if places is not None:
+        found = probe_light.light_at(opened, probe_light.harmonics(opened, image), *places)
+        write_places(output, *places, found)
+    elif harmonics:
+        write_image(output, _atlas(opened, image), "float")
+    elif picture:
         write_png(output, image, None if alpha == "none" else opacity, exposure)
     else:
         write_image(output, with_alpha(image, opacity, alpha), "float")
@@ -224,6 +253,7 @@ def _relight_frames(
     fade: float | None,
     seconds: float,
     shadows: Shadows | None,
+    harmonics: bool,
 ) -> None:
     """An image of each frame's lights in the folder `output`."""
     opacity = alpha_of(opened)
@@ -238,11 +268,25 @@ def _relight_frames(
         drawn = _shadowed(opened, shadows)
         images = _render(drawn, frames, renderer, added, viewer) if fade is None else _faded(drawn, frames, added, fade, seconds)
         for number, image in enumerate(images):
-            write_image(folder / f"{number:04d}.exr", with_alpha(image, opacity, alpha), "float")
+            pixels = _atlas(opened, image) if harmonics else with_alpha(image, opacity, alpha)
+            write_image(folder / f"{number:04d}.exr", pixels, "float")
             update(number + 1, len(frames))
         for line in added.notes([light for frame in frames for light in frame]):
             note(line)
     note(f"wrote {len(frames)} images into {output}")
+
+
+def _check_probe_flags(output: Path, harmonics: bool, at: Path | None, lights: Path | None) -> None:
+    if at is not None and (harmonics or lights is not None):
+        raise typer.BadParameter("expected --at without --harmonics and --lights, found both; leave one out")
+    if at is not None and output.suffix.lower() != ".csv":
+        raise typer.BadParameter(f"expected an output named .csv with --at, found {output.name!r}")
+    if harmonics and lights is None and output.suffix.lower() != ".exr":
+        raise typer.BadParameter(f"expected an output named .exr with --harmonics, which are signed, found {output.name!r}")
+
+
+def _atlas(asset: Asset, image: np.ndarray) -> np.ndarray:
+    return probe_light.grid_of(asset).image(probe_light.harmonics(asset, image))
 
 
 def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]]) -> Asset:

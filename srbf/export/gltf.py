@@ -94,6 +94,8 @@ def _document(asset: Asset, notes: list[str]) -> Glb:
     kind = asset.receiver.get("kind")
     if kind == "vertices":
         raise InputError("expected a lightmap or a view, found an asset of vertices; give the `mesh` with a UV for each, a .glb")
+    if kind == "probes":
+        raise InputError("expected a lightmap or a view, found an asset of probes, which have no surface; export another target")
     if kind == "view":
         wide, high = asset.width / max(asset.width, asset.height), asset.height / max(asset.width, asset.height)
         around = np.array([[-1, 1, 0], [-1, -1, 0], [1, -1, 0], [1, 1, 0]], np.float32)

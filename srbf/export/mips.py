@@ -76,10 +76,10 @@ def coverage_of(asset: Asset) -> Float32[ndarray, "H W"]:
 
 def levels_without_bleeding(asset: Asset) -> int:
     """The most levels, full size included, with GUTTER of their own texels between any two charts, so that bilinear samples of one chart
-    never read another; 1 where neighboring texels are not neighbors on the surface (vertices) or differ in meaning (clusters).
+    never read another; 1 where neighboring texels are not neighbors on the surface (vertices, probes) or differ in meaning (clusters).
     """
     kind = asset.receiver.get("kind")
-    if not method_of(asset).filterable or kind == "vertices":
+    if not method_of(asset).filterable or kind in ("vertices", "probes"):
         return 1
     levels = max(asset.width, asset.height).bit_length()
     gap = chart_gap(coverage_of(asset))

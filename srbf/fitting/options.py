@@ -132,7 +132,9 @@ def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool =
     if run.solve_rows is not None and not method.rows_are_independent:
         able = " or ".join(other.name for other in all_methods() if other.rows_are_independent)
         raise InputError(f"expected the method {able} to be fitted by blocks of rows, found {method.name}")
-    return method.encode(capture, replace(run, stitch=Stitch.of(capture) if stitch else None))
+    asset = method.encode(capture, replace(run, stitch=Stitch.of(capture) if stitch else None))
+    asset.probes = capture.probes()
+    return asset
 
 
 def _shared_settings() -> set[str]:

@@ -52,7 +52,7 @@ def fewer_maps(asset: Asset, manifest: dict[str, Any], count: int, encoding: Enc
     manifest["basis"] = {"kind": "gaussian", "centers": centers.tolist(), "spread": basis.spread}
     manifest["r_table"] = {"file": "r_table.exr", "size": len(table)}
     manifest["source"]["kept"]["relative_residual"] = float(np.sqrt(lost / total)) if total > 0 else 0.0
-    return Asset(manifest, stored, scale, bias, {"r_table": table}, asset.images, asset.scene)
+    return Asset(manifest, stored, scale, bias, {"r_table": table}, asset.images, asset.scene, asset.probes)
 
 
 def fewer_components(asset: Asset, manifest: dict[str, Any], count: int, encoding: Encoding) -> Asset:
@@ -70,4 +70,4 @@ def fewer_components(asset: Asset, manifest: dict[str, Any], count: int, encodin
     manifest["planes"] = layer_entries("plane", encoding, scale, bias)
     manifest["light_basis"] = {**asset.manifest["light_basis"], "spreads": asset.manifest["light_basis"]["spreads"][: count + 1]}
     tables = {"light_coefficients": asset.tables["light_coefficients"][: count + 1], "w_table": table}
-    return Asset(manifest, stored, scale, bias, tables, asset.images, asset.scene)
+    return Asset(manifest, stored, scale, bias, tables, asset.images, asset.scene, asset.probes)

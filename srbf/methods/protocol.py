@@ -79,7 +79,7 @@ class Method(ABC):
     layers: ClassVar[str]  # key of asset.json that lists the stored layers
     tables: ClassVar[dict[str, str]]  # what it looks up: key of asset.json -> file
     domains: ClassVar[tuple[str, ...]] = ("directions",)
-    receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices")
+    receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices", "probes")
     implied_by: ClassVar[tuple[str, ...]] = ()  # settings that choose the method where none is named
     rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there

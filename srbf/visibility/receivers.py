@@ -49,6 +49,8 @@ class Receivers:
         if missing := [name for name in needed if name not in images]:
             raise InputError(f"expected the {what} to hold {', '.join(missing)} for direct light, found none; bake it indirect")
         sampling = source.manifest.get("direct", {"sun_angle": 0.0})
+        if source.manifest.get("receiver", {}).get("kind") == "probes":  # points: neighbors in the image are none in space
+            sampling = {**sampling, "footprint": 0.0}
         return Receivers(source.width, source.height, source.quantity, images, read_triangles(data), sampling)
 
     @property

@@ -173,8 +173,20 @@ def sphere() -> None:
     cycles.max_bounces = cycles.diffuse_bounces = 32
 
 
+def white_world() -> None:
+    """Two small black crates, 4 m apart, under a white world of radiance 1."""
+    black_paint = material("Black", "ShaderNodeBsdfDiffuse", (0, 0, 0))
+    for name, low in (("Near", -2.0), ("Far", 1.95)):
+        mesh(name, corners_of((low,) * 3, (low + 0.05,) * 3), [face[::-1] for face in FACES.values()], black_paint)
+    world = bpy.data.worlds.new("World")
+    world.use_nodes = True
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (1, 1, 1, 1)
+    bpy.context.scene.world = world
+    bpy.context.scene.render.engine = "CYCLES"
+
+
 SCENES: dict[str, Callable[[], None]] = {
-    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere)
+    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere, white_world)
 }
 
 if __name__ == "__main__":

@@ -78,6 +78,7 @@ def prepare(folder: Path) -> None:
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (shutil.copytree if (folder / source).is_dir() else shutil.copy)(folder / source, folder / name)
     (folder / "FRAMES.json").write_text(json.dumps(FRAMES))
+    (folder / "places.csv").write_text("x,y,z,nx,ny,nz\n0.1,0.2,0.5,0,0,1\n")
     for name, lights in {"dome": 12, "SYNTHRTI/Object/Dome": 49, "SYNTHRTI/Object/Test": 4}.items():
         photograph(folder / name, lights)
 
