@@ -16,6 +16,8 @@ export interface LightValues {
   readonly functions: number;
   readonly count: number;
   readonly data: Float32Array;
+  /** Whether the three channels are the same everywhere. */
+  readonly gray: boolean;
 }
 
 export function checkLightValues({ light_values }: LightValuesManifest, fail: Fail): void {
@@ -43,7 +45,7 @@ export async function readRgbTable(files: AssetFiles, { file, scale = 1 }: Table
   }
   const data = new Float32Array(3 * count * rows);
   for (let i = 0; i < count * rows; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + (image.channels > 1 ? c : 0)];
-  return { functions: rows, count, data };
+  return { functions: rows, count, data, gray: image.channels === 1 };
 }
 
 /** Sum over lights of color times values, (F, 3); `colors` (count, 3), or (n,) of gray ones, n <= count. */

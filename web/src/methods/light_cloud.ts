@@ -2,12 +2,13 @@
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { type LightValues, readLightValues, readRgbTable, summed, type TableEntry } from "../light_values";
+import { readLightValues, readRgbTable, summed, type TableEntry } from "../light_values";
 import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
+import { placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
 import type { Fail, Method, ReadOptions, Tables } from "./method";
@@ -51,11 +52,11 @@ export const lightCloud: Method = {
       ...parts,
       places: manifest.free_places,
       projectsPunctual: true,
-      projectedWeights({ areas, distant, punctual }) {
+      surfels: rays?.surfels,
+      projectedWeights(lights) {
         const out = new Float64Array(3 * functions);
         const used = new Map<string, Float64Array>();
-        const suns = [...distant].map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
-        for (const light of [...punctual, ...areas, ...suns]) {
+        for (const light of placed(lights)) {
           const key = JSON.stringify({ ...light, color: 1 });
           const weights = known.get(key) ?? used.get(key) ?? weightsOf(light);
           used.set(key, weights);
@@ -76,12 +77,11 @@ function hasRays({ cells, scene, interpolation }: LightCloudManifest): boolean {
 
 /** Weights by shadow rays to cells of the patches. */
 class Rays {
-  private constructor(
-    private readonly cells: Cells,
-    private readonly occluders: Occluders,
-    private readonly values: LightValues,
-    private readonly transfer?: LightValues,
-  ) {}
+  private readonly occluders: Occluders;
+
+  private constructor(readonly surfels: Surfels) {
+    this.occluders = new Occluders(surfels.corners);
+  }
 
   static async read(files: AssetFiles, manifest: LightCloudManifest, functions: number): Promise<Rays> {
     const { file } = manifest.cells as { file: string };
@@ -95,13 +95,14 @@ class Rays {
     ]);
     const patches = (transfer ?? values).count;
     if (cells.patches > patches) throw new SrbfError(`expected cells of ${patches} patches in ${file}, found ${cells.patches}`);
-    return new Rays(cells, new Occluders(corners), values, transfer);
+    return new Rays({ cells, corners, tables: transfer ? [transfer, values] : [values] });
   }
 
   /** Of a white light, (F, 3). */
   weights(light: Placed): Float64Array {
-    const { cells, occluders, values, transfer } = this;
+    const { occluders } = this;
+    const { cells, tables } = this.surfels;
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    return summed(values, transfer ? summed(transfer, received) : received);
+    return tables.reduce((weights, table) => summed(table, weights), received);
   }
 }

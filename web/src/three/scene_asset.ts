@@ -47,9 +47,16 @@ export class SceneAsset {
 
   /** All lights as lights of the library, in the asset's world. */
   currentLights(): Light[] {
+    return [...this.lights, ...this.followedLights().map(([light]) => light)];
+  }
+
+  /** The followed lights that shine: in the asset's world, and as three has them. */
+  protected followedLights(): [Light, SceneLight][] {
     const worldFromScene = rowsOf(this.worldFromScene);
-    const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
-    return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
+    return [...this.followed].flatMap((own): [Light, SceneLight][] => {
+      const light = lightOf(own);
+      return light ? [[moved(light, worldFromScene), own]] : [];
+    });
   }
 
   /** The current lights' numbers for shaders. */
