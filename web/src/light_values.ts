@@ -48,9 +48,14 @@ export async function readRgbTable(files: AssetFiles, { file, scale = 1 }: Table
   return { functions: rows, count, data, gray: image.channels === 1 };
 }
 
+/** `count` gray numbers as RGB; those that are missing are 0. */
+export function rgb(gray: Float64Array, count: number): Float64Array {
+  return Float64Array.from({ length: 3 * count }, (_, i) => gray[Math.floor(i / 3)] ?? 0);
+}
+
 /** Sum over lights of color times values, (F, 3); `colors` (count, 3), or (n,) of gray ones, n <= count. */
 export function summed({ functions, count, data }: LightValues, colors: Float64Array): Float64Array {
-  if (colors.length <= count) colors = Float64Array.from({ length: 3 * count }, (_, i) => colors[Math.floor(i / 3)] ?? 0);
+  if (colors.length <= count) colors = rgb(colors, count);
   const out = new Float64Array(3 * functions);
   for (let f = 0, at = 0; f < functions; ++f) {
     let [r, g, b] = [0, 0, 0];

@@ -2,19 +2,20 @@
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { readLightValues, readRgbTable, summed, type TableEntry } from "../light_values";
+import { type LightValues, readLightValues, readRgbTable, rgb, summed, type TableEntry } from "../light_values";
 import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
+import { changeable, Surfaces, type SurfacesManifest } from "../surface_changes";
 import { placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
 import type { Fail, Method, ReadOptions, Tables } from "./method";
 
 /** Keys of asset.json that this method adds. */
-interface LightCloudManifest extends ComponentsManifest, PositionManifest {
+interface LightCloudManifest extends ComponentsManifest, PositionManifest, SurfacesManifest {
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
@@ -41,10 +42,13 @@ export const lightCloud: Method = {
       manifest.position_table && PositionTable.read(files, manifest, functions),
       hasRays(manifest) ? Rays.read(files, manifest, functions) : undefined,
     ]);
+    const { surfels, surfaces } = rays ?? {};
+    let version = 0; // of the surfaces
     let known = new Map<string, Float64Array>(); // weights of white lights: those that have not moved are not computed again
     const weightsOf = (light: Placed): Float64Array => {
       const isotropic = light.kind === "point" || light.kind === "sphere";
-      if (table && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
+      const asBaked = surfaces?.change === undefined; // the table knows no other surfaces
+      if (table && asBaked && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
       if (rays) return rays.weights(light);
       throw new SrbfError(`expected an asset of patches with cells.exr and scene.glb for a ${light.kind} light, found none: its table of positions holds inverse-square point lights`);
     };
@@ -52,10 +56,15 @@ export const lightCloud: Method = {
       ...parts,
       places: manifest.free_places,
       projectsPunctual: true,
-      surfels: rays?.surfels,
+      surfels,
+      surfaces,
       projectedWeights(lights) {
         const out = new Float64Array(3 * functions);
         const used = new Map<string, Float64Array>();
+        if (surfaces && surfaces.version !== version) {
+          version = surfaces.version;
+          known.clear();
+        }
         for (const light of placed(lights)) {
           const key = JSON.stringify({ ...light, color: 1 });
           const weights = known.get(key) ?? used.get(key) ?? weightsOf(light);
@@ -63,6 +72,7 @@ export const lightCloud: Method = {
           for (let i = 0; i < out.length; ++i) out[i] += weights[i] * light.color[i % 3];
         }
         known = used;
+        if (lights.named.length) summed(valuesOf(surfels), changeable(surfaces).emission(lights.named)).forEach((weight, i) => (out[i] += weight));
         return out;
       },
     };
@@ -70,6 +80,9 @@ export const lightCloud: Method = {
 };
 
 type Placed = PunctualLight | AreaLight | DirectionalLight;
+
+/** The table from the last weights before them to those of the light functions. */
+const valuesOf = (surfels: Surfels | undefined): LightValues => surfels?.tables.at(-1) as LightValues;
 
 function hasRays({ cells, scene, interpolation }: LightCloudManifest): boolean {
   return typeof cells?.file === "string" && typeof scene === "string" && interpolation?.kind !== "kernel"; // whose columns are captured lights, not patches
@@ -79,7 +92,10 @@ function hasRays({ cells, scene, interpolation }: LightCloudManifest): boolean {
 class Rays {
   private readonly occluders: Occluders;
 
-  private constructor(readonly surfels: Surfels) {
+  private constructor(
+    readonly surfels: Surfels,
+    readonly surfaces: Surfaces | undefined,
+  ) {
     this.occluders = new Occluders(surfels.corners);
   }
 
@@ -95,14 +111,16 @@ class Rays {
     ]);
     const patches = (transfer ?? values).count;
     if (cells.patches > patches) throw new SrbfError(`expected cells of ${patches} patches in ${file}, found ${cells.patches}`);
-    return new Rays({ cells, corners, tables: transfer ? [transfer, values] : [values] });
+    const surfaces = transfer && (await Surfaces.read(files, manifest, transfer));
+    return new Rays({ cells, corners, tables: transfer ? [transfer, values] : [values] }, surfaces);
   }
 
   /** Of a white light, (F, 3). */
   weights(light: Placed): Float64Array {
-    const { occluders } = this;
+    const { occluders, surfaces } = this;
     const { cells, tables } = this.surfels;
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
+    if (surfaces) return summed(valuesOf(this.surfels), surfaces.received(rgb(received, tables[0].count)));
     return tables.reduce((weights, table) => summed(table, weights), received);
   }
 }

@@ -155,7 +155,9 @@ export class SrbfRelightingMap extends SceneAsset {
       const shadow = own && engineShadow(own, renderer, sceneFromAsset);
       return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, gpu.middle).map((look) => ({ ...look, shadow })));
     });
-    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify(looks);
+    const named = this.lights.filter((light) => light.kind === "named");
+    gpu.setEmission(named);
+    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named, this.asset.tables.surfaces?.version]);
     if (!state || state !== this.weighed) gpu.draw(renderer, looks);
     this.weighed = state;
     return state;

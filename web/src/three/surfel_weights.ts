@@ -2,20 +2,24 @@
  * Weights of lights inside a scene, computed by the GPU: direct light on cells of the surfaces by shadow maps, a pass for each point of a light, and the
  * asset's tables as small passes after it. Nothing is read back.
  */
-import { DataTexture, DataUtils, FloatType, HalfFloatType, type IUniform, Matrix4, NearestFilter, RedFormat, RGBAFormat, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
+import { DataTexture, DataUtils, HalfFloatType, type IUniform, Matrix4, RedFormat, RGBAFormat, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 import type { LightValues } from "../light_values";
+import type { NamedLight } from "../lights";
 import type { Triple } from "../matrix";
 import { versine } from "../point_light";
 import blockSums from "../shaders/block_sums.glsl";
 import cellIrradiance from "../shaders/surfel_irradiance.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
+import { changeable } from "../surface_changes";
 import { type Look, packedCells, square } from "../surfels";
 import { type EngineShadow, shadowUniforms } from "./engine_shadows";
+import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass, undisturbed } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
+import { Repainting } from "./repainting";
 
 const TABLE_WIDTH = 4096; // texels
 const PART = 64; // columns that one texel of a pass adds up
@@ -31,6 +35,7 @@ interface Table {
   whole: FullscreenPass;
   target: WebGLRenderTarget;
   texture: DataTexture;
+  scale: number;
   added: DataTexture;
 }
 
@@ -46,19 +51,25 @@ export class SurfelWeights {
   private readonly maps: OccluderMaps;
   private readonly passes = new Map<string, FullscreenPass>();
   private readonly tables: Table[];
+  private surfaces = "";
+  private version = 0;
+  private repainting?: Repainting;
 
   /** `shadowSize`: texels per side of a face of the own shadow maps. @throws SrbfError on an asset without cells. */
-  constructor(asset: Asset, shadowSize = 256) {
+  constructor(
+    private readonly asset: Asset,
+    shadowSize = 256,
+  ) {
     const { surfels, weights } = asset.tables;
     if (!surfels) throw new SrbfError(`expected an asset of lights inside a scene, with cells.exr and scene.glb, for weights "gpu", found ${asset.manifest.method} without; take weights: "cpu"`);
     const cells = packedCells(surfels);
     this.middle = cells.middle;
     this.lift = surfels.cells.lift;
-    this.places = floats(cells.places, cells.width, cells.height);
-    this.normals = floats(cells.normals, cells.width, cells.height);
-    this.ranges = floats(cells.ranges, cells.rangesWidth, cells.rangesHeight);
-    this.sums = [target(cells.width, cells.height), target(cells.width, cells.height)];
-    this.received = target(cells.rangesWidth, cells.rangesHeight);
+    this.places = floatTexture(cells.places, cells.width, cells.height);
+    this.normals = floatTexture(cells.normals, cells.width, cells.height);
+    this.ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
+    this.sums = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
+    this.received = floatTarget(cells.rangesWidth, cells.rangesHeight);
     this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.normals }, ranges: { value: this.ranges } });
     this.maps = new OccluderMaps(surfels.corners, cells.middle, cells.reach, shadowSize);
     let numbers = this.received.texture;
@@ -81,6 +92,7 @@ export class SurfelWeights {
       throw new SrbfError('expected a GPU that draws into floating-point textures for weights "gpu", found one without EXT_color_buffer_float; take weights: "cpu"');
     }
     undisturbed(renderer, () => {
+      this.repaint(renderer);
       let [sum, next] = this.sums;
       renderer.setRenderTarget(sum);
       renderer.setClearColor(0, 0);
@@ -98,24 +110,35 @@ export class SurfelWeights {
     });
   }
 
-  /** Upload a table that has changed. */
-  setTable(index: number, values: LightValues): void {
-    const { texture, parts } = this.tables[index];
-    parts.uniforms.scale.value = fill(texture.image.data as Uint16Array, values);
-    texture.needsUpdate = true;
-  }
-
-  /** Add numbers, (rows, 3), to what the first table makes of the lights: weights of emission. */
-  setAdded(numbers: Float64Array): void {
+  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
+  setEmission(emitting: readonly NamedLight[]): void {
+    const { surfaces } = this.asset.tables;
+    const state = JSON.stringify([emitting, surfaces?.version]);
+    if (state === this.surfaces) return;
+    this.surfaces = state;
+    if (!surfaces && emitting.length === 0) return;
     const { added } = this.tables[0];
+    const numbers = changeable(surfaces).emission(emitting);
     const data = added.image.data as Float32Array;
     for (let i = 0; i < numbers.length; ++i) data[4 * Math.floor(i / 3) + (i % 3)] = numbers[i];
     added.needsUpdate = true;
   }
 
+  /** The first table with the albedo that its objects have now. */
+  private repaint(renderer: WebGLRenderer): void {
+    const { surfaces } = this.asset.tables;
+    if (!surfaces || surfaces.version === this.version) return;
+    this.version = surfaces.version;
+    const { parts, texture, scale } = this.tables[0];
+    if (surfaces.change) this.repainting ??= new Repainting(surfaces, texture, scale);
+    parts.uniforms.table.value = surfaces.change && this.repainting ? this.repainting.draw(renderer, surfaces.change) : texture;
+    parts.uniforms.scale.value = surfaces.change ? 1 : scale;
+  }
+
   dispose(): void {
     for (const one of [this.places, this.normals, this.ranges, this.received, ...this.sums, this.means, this.maps, ...this.passes.values()]) one.dispose();
-    for (const table of this.tables) for (const one of Object.values(table)) one.dispose();
+    for (const { parts, partial, whole, target, texture, added } of this.tables) for (const one of [parts, partial, whole, target, texture, added]) one.dispose();
+    this.repainting?.dispose();
   }
 
   private add(renderer: WebGLRenderer, look: ShadowedLook, former: Texture, next: WebGLRenderTarget): void {
@@ -161,15 +184,16 @@ function tableOf(values: LightValues, numbers: Texture, width: number, height: n
   const texture = new DataTexture(halves, tableWidth, tableHeight, gray ? RedFormat : RGBAFormat, HalfFloatType);
   texture.needsUpdate = true;
   const blocks = Math.ceil(count / PART);
-  const partial = target(...square(rows * blocks));
-  const added = floats(new Float32Array(4 * width * height), width, height);
+  const partial = floatTarget(...square(rows * blocks));
+  const scale = fill(halves, values);
+  const added = floatTexture(new Float32Array(4 * width * height), width, height);
   const parts = new FullscreenPass(
     tableSums,
-    { table: { value: texture }, scale: { value: fill(halves, values) }, numbers: { value: numbers }, count: { value: count }, rows: { value: rows }, blocks: { value: blocks }, width: { value: partial.width } },
+    { table: { value: texture }, scale: { value: scale }, numbers: { value: numbers }, count: { value: count }, rows: { value: rows }, blocks: { value: blocks }, width: { value: partial.width } },
     gray ? { SRBF_GRAY: 1 } : {},
   );
   const whole = new FullscreenPass(blockSums, { parts: { value: partial.texture }, added: { value: added }, blocks: { value: blocks }, width: { value: width } });
-  return { parts, partial, whole, target: target(width, height), texture, added };
+  return { parts, partial, whole, target: floatTarget(width, height), texture, scale, added };
 }
 
 /** Write a table as half floats; returns what they are multiplied by. Rounded to nearest: three.js' own conversion cuts digits off. */
@@ -184,14 +208,4 @@ function fill(halves: Uint16Array, { data, gray }: LightValues): number {
   const step = gray ? 1 : 4;
   for (let i = 0; i < data.length / 3; ++i) for (let c = 0; c < Math.min(step, 3); ++c) halves[step * i + c] = half(data[3 * i + c]);
   return scale;
-}
-
-function floats(data: Float32Array, width: number, height: number): DataTexture {
-  const made = new DataTexture(data as never, width, height, RGBAFormat, FloatType);
-  made.needsUpdate = true;
-  return made;
-}
-
-function target(width: number, height: number): WebGLRenderTarget {
-  return new WebGLRenderTarget(width, height, { format: RGBAFormat, type: FloatType, magFilter: NearestFilter, minFilter: NearestFilter, depthBuffer: false });
 }

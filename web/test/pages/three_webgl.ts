@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { relightGltf, SrbfRelightingMap } from "../../src/three";
-import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
 import { addLights, facingCamera, quad } from "./three_scene";
 
 let renderer: THREE.WebGLRenderer | undefined;
@@ -18,12 +18,13 @@ function shared(): THREE.WebGLRenderer {
 
 /** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function threeLightmap(job: Job) {
-  const options = { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true, weights: job.weights as "gpu", shadowSize: job.shadowSize as number } as const;
+  const options = { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true, weights: job.weights as "gpu", exact: job.exact === true, shadowSize: job.shadowSize as number } as const;
   const map = await SrbfRelightingMap.load(job.asset, options);
   const { width, height } = map.asset.manifest;
   const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
-  const pictures = job.lightSets.map((lights) => {
+  const pictures = job.lightSets.map((lights, i) => {
     map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    change(job, map, i);
     map.update(shared());
     return picture(width, height, read(target, width, height));
   });
