@@ -72,7 +72,7 @@ class Browser:
         assert "error" not in response, response
         return decoded(response)
 
-    def lightmaps(self, run: str, asset: str, light_sets: list[list[Light]], **job: Any) -> list[np.ndarray]:
+    def lightmaps(self, run: str, asset: str, light_sets: list[list[Any]], **job: Any) -> list[np.ndarray]:
         """The pictures of a job under one set of lights after the other, each (H, W, 3) float32."""
         response = self.response(run, asset=asset, lightSets=light_sets, **job)
         assert "error" not in response, response
@@ -88,8 +88,10 @@ def browser(pages: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
         yield Browser(process, assets)
 
 
-def as_json(light: Light) -> dict[str, Any]:
+def as_json(light: Light | dict[str, Any]) -> dict[str, Any]:
     """A light's fields and its kind; an environment's pixels row by row."""
+    if isinstance(light, dict):
+        return light
     if isinstance(light, EnvironmentLight):
         height, width = light.image.shape[:2]
         return {"kind": "environment", "width": width, "height": height, "pixels": light.image.ravel().tolist(), "color": light.color}

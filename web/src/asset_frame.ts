@@ -15,7 +15,7 @@ export interface LightsInAssetFrame {
   /** Point, spot and sphere lights. */
   readonly punctual: readonly PunctualLight[];
   readonly areas: readonly AreaLight[];
-  /** The scene's own lights. */
+  /** The scene's own lights, or objects that emit. */
   readonly named: readonly NamedLight[];
 }
 
@@ -23,7 +23,7 @@ const TAKEN = {
   directions: ["directional", "environment", "point", "spot", "sphere"],
   named: ["named"],
   cloud: ["point", "spot", "sphere", "area", "directional"],
-  surfels: ["point", "spot", "sphere", "area", "directional"],
+  surfels: ["point", "spot", "sphere", "area", "directional", "named"],
 } as const;
 
 /** `lights` are in the asset's world. @throws SrbfError on kinds that the asset cannot be relit by. */

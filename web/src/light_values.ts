@@ -16,6 +16,8 @@ export interface LightValues {
   readonly functions: number;
   readonly count: number;
   readonly data: Float32Array;
+  /** Whether the three channels are the same everywhere. */
+  readonly gray: boolean;
 }
 
 export function checkLightValues({ light_values }: LightValuesManifest, fail: Fail): void {
@@ -43,12 +45,17 @@ export async function readRgbTable(files: AssetFiles, { file, scale = 1 }: Table
   }
   const data = new Float32Array(3 * count * rows);
   for (let i = 0; i < count * rows; ++i) for (let c = 0; c < 3; ++c) data[3 * i + c] = scale * image.data[image.channels * i + (image.channels > 1 ? c : 0)];
-  return { functions: rows, count, data };
+  return { functions: rows, count, data, gray: image.channels === 1 };
+}
+
+/** `count` gray numbers as RGB; those that are missing are 0. */
+export function rgb(gray: Float64Array, count: number): Float64Array {
+  return Float64Array.from({ length: 3 * count }, (_, i) => gray[Math.floor(i / 3)] ?? 0);
 }
 
 /** Sum over lights of color times values, (F, 3); `colors` (count, 3), or (n,) of gray ones, n <= count. */
 export function summed({ functions, count, data }: LightValues, colors: Float64Array): Float64Array {
-  if (colors.length <= count) colors = Float64Array.from({ length: 3 * count }, (_, i) => colors[Math.floor(i / 3)] ?? 0);
+  if (colors.length <= count) colors = rgb(colors, count);
   const out = new Float64Array(3 * functions);
   for (let f = 0, at = 0; f < functions; ++f) {
     let [r, g, b] = [0, 0, 0];

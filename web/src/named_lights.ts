@@ -47,7 +47,12 @@ export function asDesigned(asset: Pick<Asset, "tables">): NamedLight[] {
 export function setNamedLight(asset: Pick<Asset, "tables">, lights: Light[], name: string, intensity = 1, color: Triple = [1, 1, 1]): void {
   const names = asset.tables.names ?? [];
   if (!names.includes(name)) throw unknown(names, name);
-  const light = namedLight(name, [intensity * color[0], intensity * color[1], intensity * color[2]]);
+  put(lights, namedLight(name, [intensity * color[0], intensity * color[1], intensity * color[2]]));
+}
+
+/** Add a named light to `lights`, in place of that of the same name. */
+export function put(lights: Light[], light: NamedLight): void {
+  const { name } = light;
   const at = lights.findIndex((other) => other.kind === "named" && other.name === name);
   if (at < 0) lights.push(light);
   else lights[at] = light;

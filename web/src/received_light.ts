@@ -6,7 +6,7 @@ import { cross, type Triple } from "./matrix";
 import type { Occluders } from "./occluders";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
-const SIDE = 4; // points per side of an area light
+export const SIDE = 4; // points per side of an area light
 const [NEAR, PARTS] = [8, 4]; // sides of a cell, closer than which it is measured by so many points a side
 const SOFTNESS_MIN = 1e-6; // in cosine, of a spot's edge
 
@@ -14,12 +14,15 @@ const SOFTNESS_MIN = 1e-6; // in cosine, of a spot's edge
 export class Cells {
   readonly count: number;
   readonly patches: number;
-  private readonly places: Float64Array;
-  private readonly starts: Float64Array;
-  private readonly normals: Float64Array;
-  private readonly areas: Float64Array;
-  private readonly owners: Int32Array;
-  private readonly patchAreas: Float64Array;
+  /** (N, 3), m; `starts` of shadow rays are `lift` (m) above them. */
+  readonly places: Float64Array;
+  readonly lift: number;
+  readonly starts: Float64Array;
+  readonly normals: Float64Array;
+  readonly areas: Float64Array;
+  /** Patch of every cell. */
+  readonly owners: Int32Array;
+  readonly patchAreas: Float64Array;
 
   /** `image`: row 0 (x, y, z, area), row 1 (normal, patch). @throws SrbfError on an image of another shape. */
   constructor({ width, height, channels, data }: FloatImage, where: string) {
@@ -41,7 +44,7 @@ export class Cells {
       this.areas[i] = data[4 * i + 3];
       this.owners[i] = Math.round(data[4 * (n + i) + 3]);
     }
-    const lift = n ? OFFSET * Math.max(...most.map((x, k) => x - least[k])) : 0;
+    const lift = (this.lift = n ? OFFSET * Math.max(...most.map((x, k) => x - least[k])) : 0);
     for (let i = 0; i < 3 * n; ++i) this.starts[i] = Math.fround(this.places[i] + lift * this.normals[i]);
     this.patches = this.owners.reduce((largest, owner) => Math.max(largest, owner + 1), 0);
     this.patchAreas = new Float64Array(this.patches);

@@ -2,18 +2,20 @@
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { type LightValues, readLightValues, readRgbTable, summed, type TableEntry } from "../light_values";
+import { type LightValues, readLightValues, readRgbTable, rgb, summed, type TableEntry } from "../light_values";
 import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
+import { changeable, Surfaces, type SurfacesManifest } from "../surface_changes";
+import { placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
 import type { Fail, Method, ReadOptions, Tables } from "./method";
 
 /** Keys of asset.json that this method adds. */
-interface LightCloudManifest extends ComponentsManifest, PositionManifest {
+interface LightCloudManifest extends ComponentsManifest, PositionManifest, SurfacesManifest {
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
@@ -40,10 +42,13 @@ export const lightCloud: Method = {
       manifest.position_table && PositionTable.read(files, manifest, functions),
       hasRays(manifest) ? Rays.read(files, manifest, functions) : undefined,
     ]);
+    const { surfels, surfaces } = rays ?? {};
+    let version = 0; // of the surfaces
     let known = new Map<string, Float64Array>(); // weights of white lights: those that have not moved are not computed again
     const weightsOf = (light: Placed): Float64Array => {
       const isotropic = light.kind === "point" || light.kind === "sphere";
-      if (table && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
+      const asBaked = surfaces?.change === undefined; // the table knows no other surfaces
+      if (table && asBaked && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
       if (rays) return rays.weights(light);
       throw new SrbfError(`expected an asset of patches with cells.exr and scene.glb for a ${light.kind} light, found none: its table of positions holds inverse-square point lights`);
     };
@@ -51,17 +56,23 @@ export const lightCloud: Method = {
       ...parts,
       places: manifest.free_places,
       projectsPunctual: true,
-      projectedWeights({ areas, distant, punctual }) {
+      surfels,
+      surfaces,
+      projectedWeights(lights) {
         const out = new Float64Array(3 * functions);
         const used = new Map<string, Float64Array>();
-        const suns = [...distant].map(([direction, color]) => ({ kind: "directional", direction, color }) as const);
-        for (const light of [...punctual, ...areas, ...suns]) {
+        if (surfaces && surfaces.version !== version) {
+          version = surfaces.version;
+          known.clear();
+        }
+        for (const light of placed(lights)) {
           const key = JSON.stringify({ ...light, color: 1 });
           const weights = known.get(key) ?? used.get(key) ?? weightsOf(light);
           used.set(key, weights);
           for (let i = 0; i < out.length; ++i) out[i] += weights[i] * light.color[i % 3];
         }
         known = used;
+        if (lights.named.length) summed(valuesOf(surfels), changeable(surfaces).emission(lights.named)).forEach((weight, i) => (out[i] += weight));
         return out;
       },
     };
@@ -70,18 +81,23 @@ export const lightCloud: Method = {
 
 type Placed = PunctualLight | AreaLight | DirectionalLight;
 
+/** The table from the last weights before them to those of the light functions. */
+const valuesOf = (surfels: Surfels | undefined): LightValues => surfels?.tables.at(-1) as LightValues;
+
 function hasRays({ cells, scene, interpolation }: LightCloudManifest): boolean {
   return typeof cells?.file === "string" && typeof scene === "string" && interpolation?.kind !== "kernel"; // whose columns are captured lights, not patches
 }
 
 /** Weights by shadow rays to cells of the patches. */
 class Rays {
+  private readonly occluders: Occluders;
+
   private constructor(
-    private readonly cells: Cells,
-    private readonly occluders: Occluders,
-    private readonly values: LightValues,
-    private readonly transfer?: LightValues,
-  ) {}
+    readonly surfels: Surfels,
+    readonly surfaces: Surfaces | undefined,
+  ) {
+    this.occluders = new Occluders(surfels.corners);
+  }
 
   static async read(files: AssetFiles, manifest: LightCloudManifest, functions: number): Promise<Rays> {
     const { file } = manifest.cells as { file: string };
@@ -95,13 +111,16 @@ class Rays {
     ]);
     const patches = (transfer ?? values).count;
     if (cells.patches > patches) throw new SrbfError(`expected cells of ${patches} patches in ${file}, found ${cells.patches}`);
-    return new Rays(cells, new Occluders(corners), values, transfer);
+    const surfaces = transfer && (await Surfaces.read(files, manifest, transfer));
+    return new Rays({ cells, corners, tables: transfer ? [transfer, values] : [values] }, surfaces);
   }
 
   /** Of a white light, (F, 3). */
   weights(light: Placed): Float64Array {
-    const { cells, occluders, values, transfer } = this;
+    const { occluders, surfaces } = this;
+    const { cells, tables } = this.surfels;
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    return summed(values, transfer ? summed(transfer, received) : received);
+    if (surfaces) return summed(valuesOf(this.surfels), surfaces.received(rgb(received, tables[0].count)));
+    return tables.reduce((weights, table) => summed(table, weights), received);
   }
 }

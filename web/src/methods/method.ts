@@ -4,6 +4,8 @@ import type { AssetFiles } from "../files";
 import type { ByteImage, FloatImage, HalfImage } from "../image";
 import type { Manifest } from "../manifest";
 import type { Triple } from "../matrix";
+import type { Surfaces } from "../surface_changes";
+import type { Surfels } from "../surfels";
 import type { N } from "../three/tsl/nodes";
 import type { NodeKit } from "./node_kit";
 
@@ -61,6 +63,10 @@ export interface Tables {
   readonly places?: readonly Triple[];
   /** Whether point and spot lights are part of the projected weights; otherwise the shader adds them. */
   readonly projectsPunctual?: boolean;
+  /** What a GPU needs to compute the weights of lights inside a scene itself, of assets with rays. */
+  readonly surfels?: Surfels;
+  /** Objects that emit or are repainted, of assets fitted with `--editable`. */
+  readonly surfaces?: Surfaces;
   /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */
   projectedWeights(lights: LightsInAssetFrame): Float64Array;
   /** `srbfSum` in three.js' node language: the light of all lights at `uv` (v downwards), before the clamp; `receiver` in the asset's frame, meters. */

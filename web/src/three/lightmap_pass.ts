@@ -1,7 +1,6 @@
 /** Draws the asset into a texture of its own size whenever its light changes, to be filtered like any lightmap. */
 import {
-  BufferAttribute,
-  BufferGeometry,
+  type BufferGeometry,
   Camera,
   FloatType,
   GLSL3,
@@ -19,6 +18,7 @@ import {
 } from "three";
 import type { Asset } from "../asset";
 import { shaderText } from "../shader";
+import { FULLSCREEN_VERTEX, fullscreenTriangle, undisturbed } from "./fullscreen";
 import type { Filter } from "./textures";
 import type { Uniforms } from "./uniforms";
 
@@ -38,12 +38,6 @@ export interface Added {
   /** Whether the maps' own light is left out. */
   alone: boolean;
 }
-
-const VERTEX = `precision highp float;
-in vec3 position;
-void main() {
-    gl_Position = vec4(position.xy, 0.0, 1.0);
-}`;
 
 /** `srbfRelit` of every texel, and a view's coverage as straight alpha; row 0 of the target is the asset's top row. */
 export class LightmapPass {
@@ -69,9 +63,7 @@ export class LightmapPass {
       generateMipmaps: mipmaps,
       anisotropy,
     });
-    const geometry = new BufferGeometry();
-    geometry.setAttribute("position", new BufferAttribute(new Float32Array([-1, -1, 0, 3, -1, 0, -1, 3, 0]), 3));
-    this.mesh = new Mesh(geometry, new RawShaderMaterial());
+    this.mesh = new Mesh(fullscreenTriangle(), new RawShaderMaterial());
     this.mesh.frustumCulled = false;
   }
 
@@ -81,16 +73,10 @@ export class LightmapPass {
     this.added = added;
     const room = (this.uniforms.srbfPointLights.value as Float32Array).length / 16;
     if (room !== this.room) this.compile(room);
-    const kept = { target: renderer.getRenderTarget(), autoClear: renderer.autoClear, xr: renderer.xr.enabled, shadows: renderer.shadowMap.autoUpdate };
-    renderer.autoClear = false;
-    renderer.xr.enabled = false;
-    renderer.shadowMap.autoUpdate = false;
-    renderer.setRenderTarget(this.target);
-    renderer.render(this.mesh, this.camera);
-    renderer.setRenderTarget(kept.target);
-    renderer.autoClear = kept.autoClear;
-    renderer.xr.enabled = kept.xr;
-    renderer.shadowMap.autoUpdate = kept.shadows;
+    undisturbed(renderer, () => {
+      renderer.setRenderTarget(this.target);
+      renderer.render(this.mesh, this.camera);
+    });
   }
 
   dispose(): void {
@@ -109,7 +95,7 @@ export class LightmapPass {
     this.mesh.material = new RawShaderMaterial({
       glslVersion: GLSL3,
       uniforms: { ...this.uniforms, srbfAdded: { value: this.added?.texture } },
-      vertexShader: VERTEX,
+      vertexShader: FULLSCREEN_VERTEX,
       fragmentShader: `precision highp float;
 precision highp int;
 precision highp sampler2D;

@@ -1,14 +1,20 @@
 /** An asset in a three.js scene: its textures, the lights that it follows, the materials that it lights. */
 import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
+import { inAssetFrame } from "../asset_frame";
 import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
+import type { Light } from "../lights";
 import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { type FrameValues, needPositions, uniformVectors } from "../shader";
+import { looksOf, placed } from "../surfels";
+import { engineShadow } from "./engine_shadows";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
 import { SceneAsset, sourceOf } from "./scene_asset";
+import type { SceneLight } from "./scene_lights";
+import { SurfelWeights } from "./surfel_weights";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 
@@ -18,9 +24,17 @@ export interface RelightingMapOptions extends TargetOptions {
    * maps if asked for; the only choice for clustered eigen maps.
    */
   source?: "maps" | "lightmap";
+  /**
+   * Where the weights of lights inside a scene are computed: `cpu`, by rays or the asset's table; `gpu`, by passes over the cells of its surfaces, with
+   * three's shadow maps of lights that cast shadows and the asset's own of all others.
+   */
+  weights?: "cpu" | "gpu";
+  /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`. */
+  shadowSize?: number;
 }
 
 const EXTENSIONS = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
+const NO_WEIGHTS: FrameValues = { weights: new Float32Array(0), pointLights: [] };
 const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
 
 /**
@@ -34,7 +48,9 @@ export class SrbfRelightingMap extends SceneAsset {
   private readonly pass?: LightmapPass;
   private readonly patched = new Map<Material, Patch>();
   private room = 1;
+  private readonly gpu?: SurfelWeights;
   private drawn = "";
+  private weighed = "";
   private added: Added | undefined;
 
   /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
@@ -43,6 +59,10 @@ export class SrbfRelightingMap extends SceneAsset {
     this.source = sourceOf(asset, options.source);
     this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
     this.uniforms = assetUniforms(asset, this.textures);
+    if (options.weights === "gpu") {
+      this.gpu = new SurfelWeights(asset, options.shadowSize);
+      this.uniforms.srbfWeights.value = this.gpu.weights;
+    }
     if (this.source === "lightmap") {
       this.pass = new LightmapPass(asset, this.uniforms, options);
       this.uniforms.srbfLightmap = { value: this.pass.target.texture };
@@ -106,7 +126,7 @@ export class SrbfRelightingMap extends SceneAsset {
    * @throws SrbfError on point lights where the asset has no positions, or more layers and point lights than the GPU's uniforms hold.
    */
   update(renderer?: WebGLRenderer): void {
-    const frame = this.frame();
+    const frame = this.gpu ? NO_WEIGHTS : this.frame();
     if (this.pass) needPositions(this.asset, frame.pointLights.length);
     if (renderer) {
       checkCompression(this.asset, (encoding) => renderer.extensions.has(EXTENSIONS[encoding]));
@@ -116,18 +136,36 @@ export class SrbfRelightingMap extends SceneAsset {
     (this.uniforms.srbfAssetFromScene.value as Matrix4).copy(this.assetFromScene());
     const room = pointLightRoom(frame.pointLights.length);
     if (room !== this.room) this.recompile(room);
-    if (this.pass) this.redraw(frame, renderer);
+    const state = this.gpu ? this.drawWeights(this.gpu, renderer) : JSON.stringify([[...frame.weights], frame.pointLights]);
+    if (this.pass) this.redraw(state, renderer);
   }
 
   dispose(): void {
     this.textures.dispose();
     this.pass?.dispose();
+    this.gpu?.dispose();
   }
 
-  private redraw(frame: FrameValues, renderer: WebGLRenderer | undefined): void {
+  /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
+  private drawWeights(gpu: SurfelWeights, renderer: WebGLRenderer | undefined): string {
+    if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
+    const sceneFromAsset = () => this.assetFromScene().invert();
+    const lights: [Light, SceneLight?][] = [...this.lights.map((light): [Light] => [light]), ...this.followedLights()];
+    const looks = lights.flatMap(([light, own]) => {
+      const shadow = own && engineShadow(own, renderer, sceneFromAsset);
+      return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, gpu.middle).map((look) => ({ ...look, shadow })));
+    });
+    const named = this.lights.filter((light) => light.kind === "named");
+    gpu.setEmission(named);
+    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named, this.asset.tables.surfaces?.version]);
+    if (!state || state !== this.weighed) gpu.draw(renderer, looks);
+    this.weighed = state;
+    return state;
+  }
+
+  private redraw(state: string, renderer: WebGLRenderer | undefined): void {
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
-    const state = JSON.stringify([[...frame.weights], frame.pointLights]);
-    if (state === this.drawn) return;
+    if (state && state === this.drawn) return;
     this.pass?.draw(renderer, this.added);
     this.drawn = state;
   }

@@ -2,10 +2,11 @@
 import { type Light as ThreeLight, Matrix4 } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
-import { type Light, moved } from "../lights";
-import { asDesigned, setNamedLight } from "../named_lights";
+import { type Light, moved, namedLight } from "../lights";
+import { asDesigned, put, setNamedLight } from "../named_lights";
 import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
+import { changeable } from "../surface_changes";
 import { rowsOf, threeMatrix } from "./rows";
 import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 
@@ -31,6 +32,26 @@ export class SceneAsset {
     return this;
   }
 
+  /**
+   * Let an object emit radiance diffusely, linear Rec.709, with all bounces; 0 ends it. Of `transfer` assets that were fitted with `--editable`.
+   *
+   * @throws SrbfError on an object that the asset does not have, and on other assets.
+   */
+  setEmission(name: string, radiance: Triple): this {
+    changeable(this.asset.tables.surfaces).check(name);
+    put(this.lights, namedLight(name, radiance));
+    return this;
+  }
+
+  /**
+   * Repaint an object, linear Rec.709 from 0 to 1, in all bounces off it; without a color it has its own again. Its material is yours. The asset in memory is
+   * changed, for all that share it. @throws SrbfError as `setEmission`, and on an asset of radiance.
+   */
+  setAlbedo(name: string, color?: Triple): this {
+    changeable(this.asset.tables.surfaces).setAlbedo(name, color);
+    return this;
+  }
+
   /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point, spot and area. */
   follow(...lights: ThreeLight[]): this {
     for (const light of lights) {
@@ -47,9 +68,16 @@ export class SceneAsset {
 
   /** All lights as lights of the library, in the asset's world. */
   currentLights(): Light[] {
+    return [...this.lights, ...this.followedLights().map(([light]) => light)];
+  }
+
+  /** The followed lights that shine: in the asset's world, and as three has them. */
+  protected followedLights(): [Light, SceneLight][] {
     const worldFromScene = rowsOf(this.worldFromScene);
-    const followed = [...this.followed].map(lightOf).filter((light) => light !== undefined);
-    return [...this.lights, ...followed.map((light) => moved(light, worldFromScene))];
+    return [...this.followed].flatMap((own): [Light, SceneLight][] => {
+      const light = lightOf(own);
+      return light ? [[moved(light, worldFromScene), own]] : [];
+    });
   }
 
   /** The current lights' numbers for shaders. */

@@ -60,7 +60,7 @@ function isDirectional(light: SceneLight): light is DirectionalLight {
   return (light as DirectionalLight).isDirectionalLight === true;
 }
 
-function isArea(light: SceneLight): light is RectAreaLight {
+export function isArea(light: SceneLight): light is RectAreaLight {
   return (light as RectAreaLight).isRectAreaLight === true;
 }
 

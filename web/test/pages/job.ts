@@ -43,6 +43,19 @@ export function mix(job: Job, map: Mixed): void {
   for (const [name, intensity, color] of (job.named as [string, number, Triple][]) ?? []) map.setNamedLight(name, intensity, color);
 }
 
+interface Changing {
+  setAlbedo(name: string, color?: Triple): unknown;
+  setEmission(name: string, radiance: Triple): unknown;
+}
+
+/** Change surfaces before picture `i` of a job: `changes` has [albedo or emission, object, color] of each; no color is the object's own. */
+export function change(job: Job, map: Changing, i: number): void {
+  for (const [kind, name, color] of (job.changes as ["albedo" | "emission", string, Triple | undefined][][])?.[i] ?? []) {
+    if (kind === "albedo") map.setAlbedo(name, color ?? undefined);
+    else map.setEmission(name, color as Triple);
+  }
+}
+
 export function picture(width: number, height: number, pixels: Float32Array): Picture {
   const bytes = new Uint8Array(pixels.buffer, pixels.byteOffset, pixels.byteLength);
   let text = "";

@@ -4,7 +4,7 @@ import { host, layers, load } from "./host";
 import type { Job } from "./job";
 import { playcanvasMaterial } from "./playcanvas";
 import { nodesLightmap, nodesMaterial } from "./three_nodes";
-import { threeGltf, threeLightmap, threeMaterial } from "./three_webgl";
+import { threeGltf, threeLightmap, threeMaterial, threeShadows } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "babylon-material": babylonMaterial,
@@ -17,6 +17,7 @@ const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "three-gltf": threeGltf,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,
+  "three-shadows": threeShadows,
 };
 
 declare global {

@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { relightGltf, SrbfRelightingMap } from "../../src/three";
-import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
 import { addLights, facingCamera, quad } from "./three_scene";
 
 let renderer: THREE.WebGLRenderer | undefined;
@@ -18,15 +18,57 @@ function shared(): THREE.WebGLRenderer {
 
 /** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function threeLightmap(job: Job) {
-  const map = await SrbfRelightingMap.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true });
+  const options = { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true, weights: job.weights as "gpu", exact: job.exact === true, shadowSize: job.shadowSize as number } as const;
+  const map = await SrbfRelightingMap.load(job.asset, options);
   const { width, height } = map.asset.manifest;
   const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
-  const pictures = job.lightSets.map((lights) => {
+  const pictures = job.lightSets.map((lights, i) => {
     map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    change(job, map, i);
     map.update(shared());
     return picture(width, height, read(target, width, height));
   });
   map.dispose();
+  return { pictures };
+}
+
+/**
+ * The lightmap by the shadows that three itself has drawn, one picture after the other of `job.kinds`: [type of the shadow map, light as in `follow`]. `job.blocker`:
+ * corners of the triangles that cast shadows, in the asset's world.
+ */
+export async function threeShadows(job: Job) {
+  const map = await SrbfRelightingMap.load(job.asset, { source: "lightmap", target: "float", filter: "nearest", weights: "gpu" });
+  const { width, height } = map.asset.manifest;
+  const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
+  const own = new THREE.WebGLRenderer({ antialias: false });
+  own.shadowMap.enabled = true;
+  const pixels = new Float32Array(width * height * 4);
+  const pictures = (job.kinds as [string, Record<string, unknown>][]).map(([type, follow]) => {
+    own.shadowMap.type = THREE[type as "PCFShadowMap"];
+    const scene = new THREE.Scene();
+    const geometry = new THREE.BufferGeometry();
+    const corners = (job.blocker as number[][]).flatMap(([x, y, z]) => [x, z, -y]);
+    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+    geometry.computeVertexNormals();
+    const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }));
+    mesh.castShadow = mesh.receiveShadow = true;
+    scene.add(mesh);
+    addLights({ ...job, follow: [follow] }, map, scene);
+    const light = scene.children[1] as THREE.PointLight;
+    light.castShadow = true;
+    light.shadow.mapSize.set(1024, 1024);
+    Object.assign(light.shadow.camera, { near: 0.05, far: 30, left: -4, right: 4, top: 4, bottom: -4 });
+    light.shadow.camera.updateProjectionMatrix();
+    own.render(scene, facingCamera(job)); // three draws the shadow with the picture
+    map.update(own);
+    own.readRenderTargetPixels(target, 0, 0, width, height, pixels);
+    map.unfollow(light);
+    light.dispose();
+    geometry.dispose();
+    return picture(width, height, pixels);
+  });
+  map.dispose();
+  own.dispose();
   return { pictures };
 }
 

@@ -1,0 +1,58 @@
+"""Objects that emit and are repainted on the web: the pictures of a room are those of `srbf.methods.surface_changes`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from cloud_assets import Room, room, with_table, with_transfer
+from surface_assets import with_surfaces
+from test_web_cloud import LIGHTS, POINT, received
+
+CLOSE = 2e-3  # of the largest value, as for other lights
+RED, DIM = (0.9, 0.1, 0.2), (0.05, 0.1, 0.15)
+CHANGES: list[list[tuple[str, str, tuple[float, ...] | None]]] = [
+    [("emission", "Screen", (2.0, 0.5, 1.0))],
+    [("albedo", "Wall", RED)],
+    [("albedo", "Wall", RED), ("albedo", "Screen", DIM), ("emission", "Wall", (1.0, 1.0, 3.0))],
+    [("albedo", "Wall", None), ("albedo", "Screen", None)],
+]
+
+
+def expected_of(made: Room, surfaces: Any, lights: list[dict[str, Any]], changes: list[tuple]) -> np.ndarray:
+    table = 2 * made.files["transfer.exr"][0]
+    albedo = {name: color for kind, name, color in changes if kind == "albedo" and color}
+    surfaces, added = surfaces.repainted(albedo) if albedo else (surfaces, 0)
+    shapes = np.einsum("rkc,kc->rc", table + added, np.sum([received(made, light) for light in lights], axis=0))
+    shapes += sum(surfaces.emitted(name, np.array(color)) for kind, name, color in changes if kind == "emission")
+    weights = np.einsum("fr,rc->fc", made.files["light_values.exr"][0][..., 0], shapes)
+    return np.maximum(made.response(weights), 0)
+
+
+@pytest.mark.parametrize("bounces", [None, 3])
+def test_changed_surfaces_light_the_room(browser: Any, bounces: int | None) -> None:
+    """On the CPU and the GPU, one change after the other; the asset's table of places is of before."""
+    made, surfaces = with_surfaces(with_table(with_transfer(room()))[0], bounces)
+    url = browser.place(made.write)
+    sets = [LIGHTS["point"], LIGHTS["all"], LIGHTS["spot"], LIGHTS["spot"]]
+    for weights in ("cpu", "gpu"):
+        job = {"weights": weights, "shadowSize": 512, "changes": CHANGES, "exact": True}
+        drawn = browser.lightmaps("three-lightmap", url, sets, **job)
+        for picture, lights, changes in zip(drawn, sets, CHANGES, strict=True):
+            expected = expected_of(made, surfaces, lights, changes)
+            assert expected.max() > 0.1
+            np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=f"{weights} {changes}")
+
+
+def test_what_cannot_change_is_named(browser: Any) -> None:
+    made = with_transfer(room())
+    plain = {"lightSets": [[POINT]], "changes": [[("emission", "Wall", (1, 1, 1))]]}
+    said = browser.response("three-lightmap", asset=browser.place(made.write), **plain)["error"]
+    assert "expected an asset whose surfaces can change" in said
+    url = browser.place(with_surfaces(made, None)[0].write)
+    for change, expected in {
+        ("emission", "Door", (1, 1, 1)): 'expected an object of Wall, Screen, found "Door"',
+        ("albedo", "Wall", (1, 2, 1)): "expected an albedo of three numbers from 0 to 1, found 1, 2, 1",
+    }.items():
+        assert expected in browser.response("three-lightmap", asset=url, lightSets=[[POINT]], changes=[[change]])["error"]

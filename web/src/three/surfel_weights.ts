@@ -1,0 +1,211 @@
+/**
+ * Weights of lights inside a scene, computed by the GPU: direct light on cells of the surfaces by shadow maps, a pass for each point of a light, and the
+ * asset's tables as small passes after it. Nothing is read back.
+ */
+import { DataTexture, DataUtils, HalfFloatType, type IUniform, Matrix4, RedFormat, RGBAFormat, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import type { Asset } from "../asset";
+import { SrbfError } from "../errors";
+import type { LightValues } from "../light_values";
+import type { NamedLight } from "../lights";
+import type { Triple } from "../matrix";
+import { versine } from "../point_light";
+import blockSums from "../shaders/block_sums.glsl";
+import cellIrradiance from "../shaders/surfel_irradiance.glsl";
+import surfelMeans from "../shaders/surfel_means.glsl";
+import tableSums from "../shaders/table_sums.glsl";
+import { changeable } from "../surface_changes";
+import { type Look, packedCells, square } from "../surfels";
+import { type EngineShadow, shadowUniforms } from "./engine_shadows";
+import { floatTarget, floatTexture } from "./float_textures";
+import { FullscreenPass, undisturbed } from "./fullscreen";
+import { OccluderMaps } from "./occluder_maps";
+import { Repainting } from "./repainting";
+
+const TABLE_WIDTH = 4096; // texels
+const PART = 64; // columns that one texel of a pass adds up
+
+/** A point of a light, and the engine's shadow of it; without, the asset's own triangles cast one. */
+export interface ShadowedLook extends Look {
+  readonly shadow?: EngineShadow;
+}
+
+interface Table {
+  parts: FullscreenPass;
+  partial: WebGLRenderTarget;
+  whole: FullscreenPass;
+  target: WebGLRenderTarget;
+  texture: DataTexture;
+  scale: number;
+  added: DataTexture;
+}
+
+export class SurfelWeights {
+  readonly middle: Triple;
+  private readonly places: DataTexture;
+  private readonly normals: DataTexture;
+  private readonly ranges: DataTexture;
+  private readonly lift: number;
+  private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
+  private readonly received: WebGLRenderTarget;
+  private readonly means: FullscreenPass;
+  private readonly maps: OccluderMaps;
+  private readonly passes = new Map<string, FullscreenPass>();
+  private readonly tables: Table[];
+  private surfaces = "";
+  private version = 0;
+  private repainting?: Repainting;
+
+  /** `shadowSize`: texels per side of a face of the own shadow maps. @throws SrbfError on an asset without cells. */
+  constructor(
+    private readonly asset: Asset,
+    shadowSize = 256,
+  ) {
+    const { surfels, weights } = asset.tables;
+    if (!surfels) throw new SrbfError(`expected an asset of lights inside a scene, with cells.exr and scene.glb, for weights "gpu", found ${asset.manifest.method} without; take weights: "cpu"`);
+    const cells = packedCells(surfels);
+    this.middle = cells.middle;
+    this.lift = surfels.cells.lift;
+    this.places = floatTexture(cells.places, cells.width, cells.height);
+    this.normals = floatTexture(cells.normals, cells.width, cells.height);
+    this.ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
+    this.sums = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
+    this.received = floatTarget(cells.rangesWidth, cells.rangesHeight);
+    this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.normals }, ranges: { value: this.ranges } });
+    this.maps = new OccluderMaps(surfels.corners, cells.middle, cells.reach, shadowSize);
+    let numbers = this.received.texture;
+    this.tables = surfels.tables.map((values, i) => {
+      const [width, height] = i === surfels.tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
+      const table = tableOf(values, numbers, width, height);
+      numbers = table.target.texture;
+      return table;
+    });
+  }
+
+  /** The weights, as the shaders of the asset take them. */
+  get weights(): Texture {
+    return this.tables[this.tables.length - 1].target.texture;
+  }
+
+  /** Draw the weights under `looks`. */
+  draw(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): void {
+    if (!renderer.extensions.has("EXT_color_buffer_float")) {
+      throw new SrbfError('expected a GPU that draws into floating-point textures for weights "gpu", found one without EXT_color_buffer_float; take weights: "cpu"');
+    }
+    undisturbed(renderer, () => {
+      this.repaint(renderer);
+      let [sum, next] = this.sums;
+      renderer.setRenderTarget(sum);
+      renderer.setClearColor(0, 0);
+      renderer.clear(true, false, false);
+      for (const look of looks) {
+        this.add(renderer, look, sum.texture, next);
+        [sum, next] = [next, sum];
+      }
+      this.means.uniforms.irradiance.value = sum.texture;
+      this.means.draw(renderer, this.received);
+      for (const { parts, partial, whole, target: wholes } of this.tables) {
+        parts.draw(renderer, partial);
+        whole.draw(renderer, wholes);
+      }
+    });
+  }
+
+  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
+  setEmission(emitting: readonly NamedLight[]): void {
+    const { surfaces } = this.asset.tables;
+    const state = JSON.stringify([emitting, surfaces?.version]);
+    if (state === this.surfaces) return;
+    this.surfaces = state;
+    if (!surfaces && emitting.length === 0) return;
+    const { added } = this.tables[0];
+    const numbers = changeable(surfaces).emission(emitting);
+    const data = added.image.data as Float32Array;
+    for (let i = 0; i < numbers.length; ++i) data[4 * Math.floor(i / 3) + (i % 3)] = numbers[i];
+    added.needsUpdate = true;
+  }
+
+  /** The first table with the albedo that its objects have now. */
+  private repaint(renderer: WebGLRenderer): void {
+    const { surfaces } = this.asset.tables;
+    if (!surfaces || surfaces.version === this.version) return;
+    this.version = surfaces.version;
+    const { parts, texture, scale } = this.tables[0];
+    if (surfaces.change) this.repainting ??= new Repainting(surfaces, texture, scale);
+    parts.uniforms.table.value = surfaces.change && this.repainting ? this.repainting.draw(renderer, surfaces.change) : texture;
+    parts.uniforms.scale.value = surfaces.change ? 1 : scale;
+  }
+
+  dispose(): void {
+    for (const one of [this.places, this.normals, this.ranges, this.received, ...this.sums, this.means, this.maps, ...this.passes.values()]) one.dispose();
+    for (const { parts, partial, whole, target, texture, added } of this.tables) for (const one of [parts, partial, whole, target, texture, added]) one.dispose();
+    this.repainting?.dispose();
+  }
+
+  private add(renderer: WebGLRenderer, look: ShadowedLook, former: Texture, next: WebGLRenderTarget): void {
+    const shadow = look.shadow ? shadowUniforms(renderer, look.shadow, this.middle) : undefined;
+    const defines = { ...(look.distant ? { SRBF_DISTANT: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
+    const key = JSON.stringify(defines);
+    let pass = this.passes.get(key);
+    if (!pass) {
+      pass = new FullscreenPass(cellIrradiance, this.irradianceUniforms(), defines);
+      this.passes.set(key, pass);
+    }
+    const own = shadow ? {} : this.maps.draw(renderer, look.place, look.distant);
+    const values: Record<string, unknown> = {
+      former,
+      light: look.place,
+      color: look.color,
+      axis: look.axis,
+      a0: look.a0,
+      radius: look.radius,
+      falloff: look.falloff === "inverse-square" ? 1 : 0,
+      versineInner: look.cone ? versine(look.cone[0]) : 3,
+      versineOuter: look.cone ? versine(look.cone[1]) : 4,
+      lambertian: look.lambertian ? 1 : 0,
+      ...own,
+      ...shadow?.values,
+    };
+    for (const [name, value] of Object.entries(values)) pass.uniforms[name].value = value;
+    pass.draw(renderer, next);
+  }
+
+  private irradianceUniforms(): Record<string, IUniform> {
+    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up"];
+    const shadows = ["sceneFromCell", "shadowMatrix", "shadowBias", "shadowNormalBias", "shadowIntensity", "shadowDepths", "shadowMap"];
+    const uniforms: Record<string, IUniform> = Object.fromEntries([...names, ...shadows].map((name) => [name, { value: null }]));
+    return { ...uniforms, places: { value: this.places }, normals: { value: this.normals }, lift: { value: this.lift }, sceneFromCell: { value: new Matrix4() } };
+  }
+}
+
+function tableOf(values: LightValues, numbers: Texture, width: number, height: number): Table {
+  const { functions: rows, count, gray } = values;
+  const [tableWidth, tableHeight] = [Math.min(TABLE_WIDTH, rows * count), Math.ceil((rows * count) / TABLE_WIDTH)];
+  const halves = new Uint16Array((gray ? 1 : 4) * tableWidth * tableHeight);
+  const texture = new DataTexture(halves, tableWidth, tableHeight, gray ? RedFormat : RGBAFormat, HalfFloatType);
+  texture.needsUpdate = true;
+  const blocks = Math.ceil(count / PART);
+  const partial = floatTarget(...square(rows * blocks));
+  const scale = fill(halves, values);
+  const added = floatTexture(new Float32Array(4 * width * height), width, height);
+  const parts = new FullscreenPass(
+    tableSums,
+    { table: { value: texture }, scale: { value: scale }, numbers: { value: numbers }, count: { value: count }, rows: { value: rows }, blocks: { value: blocks }, width: { value: partial.width } },
+    gray ? { SRBF_GRAY: 1 } : {},
+  );
+  const whole = new FullscreenPass(blockSums, { parts: { value: partial.texture }, added: { value: added }, blocks: { value: blocks }, width: { value: width } });
+  return { parts, partial, whole, target: floatTarget(width, height), texture, scale, added };
+}
+
+/** Write a table as half floats; returns what they are multiplied by. Rounded to nearest: three.js' own conversion cuts digits off. */
+function fill(halves: Uint16Array, { data, gray }: LightValues): number {
+  const largest = data.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+  const scale = 2 ** Math.ceil(Math.log2(Math.max(largest, 1e-30))) / 4096;
+  const digits = 2 ** 42 + 1; // leaves 11 of a double's 53
+  const half = (x: number) => {
+    const spread = (x / scale) * digits;
+    return DataUtils.toHalfFloat(spread - (spread - x / scale));
+  };
+  const step = gray ? 1 : 4;
+  for (let i = 0; i < data.length / 3; ++i) for (let c = 0; c < Math.min(step, 3); ++c) halves[step * i + c] = half(data[3 * i + c]);
+  return scale;
+}
