@@ -142,7 +142,7 @@ class Transfer(LightsInsideMaps):
             )
         count = SURFELS if self.surfels == "auto" else int(self.surfels)
         inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed).cells)
-        if self.editable:  # what emits is told by object
+        if self.editable:  # an object emits by itself
             inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
         received = ReceivedLight(operator.cells, inside.occluders)
         lit = training_light(operator, received, inside.free, self.seed)

@@ -68,6 +68,8 @@ ELSEWHERE = {
 # Why nothing here runs it to its end. Flags of our own scripts, names of npm's scripts and the files named are checked all the same.
 NOT_RUN = {
     "python benchmarks/bake.py": "four bakes and twelve fits of each scene, half a minute at their smallest",
+    "python benchmarks/pca_visibility.py CAPTURE": "wants a capture of surfels with a scene to trace: a minute at its smallest",
+    "python benchmarks/probes.py *": "renders spheres twice under each light: minutes",
     "python benchmarks/quality.py": "its own scene of 300 lights takes minutes",
     "python benchmarks/quality.py REALRTI": "fits again for each light left out: minutes for one small item",
     "python scripts/test_godot.py": "wants the chroot with Godot that scripts/godot-chroot makes, as root",
