@@ -37,7 +37,7 @@ def test_changed_surfaces_light_the_room(browser: Any, bounces: int | None) -> N
     url = browser.place(made.write)
     sets = [LIGHTS["point"], LIGHTS["all"], LIGHTS["spot"], LIGHTS["spot"]]
     for weights in ("cpu", "gpu"):
-        job = {"weights": weights, "shadowSize": 512, "changes": CHANGES, "exact": True}
+        job = {"weights": weights, "changes": CHANGES, "exact": True}
         drawn = browser.lightmaps("three-lightmap", url, sets, **job)
         for picture, lights, changes in zip(drawn, sets, CHANGES, strict=True):
             expected = expected_of(made, surfaces, lights, changes)

@@ -41,7 +41,7 @@ def test_passes_give_the_picture_of_rays(browser: Any, made: Room, method: str) 
     """Every kind of light and all at once, with shadows of the asset's own triangles."""
     own = made if method == "transfer" else room()
     sets = [*LIGHTS.values()] if method == "transfer" else [LIGHTS["all"]]
-    drawn = browser.lightmaps("three-lightmap", browser.place(own.write), [*sets, []], weights="gpu", shadowSize=512)
+    drawn = browser.lightmaps("three-lightmap", browser.place(own.write), [*sets, []], weights="gpu")
     for picture, lights in zip(drawn, sets, strict=False):
         assert difference(picture, picture_of(own, np.sum([received(own, light) for light in lights], axis=0))) < CLOSE, lights
     assert not drawn[-1].any()

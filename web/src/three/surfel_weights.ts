@@ -58,7 +58,7 @@ export class SurfelWeights {
   /** `shadowSize`: texels per side of a face of the own shadow maps. @throws SrbfError on an asset without cells. */
   constructor(
     private readonly asset: Asset,
-    shadowSize = 256,
+    shadowSize = 512,
   ) {
     const { surfels, weights } = asset.tables;
     if (!surfels) throw new SrbfError(`expected an asset of lights inside a scene, with cells.exr and scene.glb, for weights "gpu", found ${asset.manifest.method} without; take weights: "cpu"`);
