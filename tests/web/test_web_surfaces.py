@@ -37,12 +37,24 @@ def test_changed_surfaces_light_the_room(browser: Any, bounces: int | None) -> N
     url = browser.place(made.write)
     sets = [LIGHTS["point"], LIGHTS["all"], LIGHTS["spot"], LIGHTS["spot"]]
     for weights in ("cpu", "gpu"):
-        job = {"weights": weights, "shadowSize": 512, "changes": CHANGES, "exact": True}
+        job = {"weights": weights, "changes": CHANGES, "exact": True}
         drawn = browser.lightmaps("three-lightmap", url, sets, **job)
         for picture, lights, changes in zip(drawn, sets, CHANGES, strict=True):
             expected = expected_of(made, surfaces, lights, changes)
             assert expected.max() > 0.1
             np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=f"{weights} {changes}")
+
+
+@pytest.mark.parametrize("backend", ["webgl", "webgpu"])
+def test_objects_emit_in_node_materials(browser: Any, backend: str) -> None:
+    """By passes of nodes, which refuse to repaint."""
+    made, surfaces = with_surfaces(with_transfer(room()), None)
+    job = {"asset": browser.place(made.write), "weights": "gpu", "backend": backend}
+    (picture,) = browser.lightmaps("nodes-lightmap", light_sets=[LIGHTS["spot"]], changes=CHANGES[:1], **job)
+    expected = expected_of(made, surfaces, LIGHTS["spot"], CHANGES[0])
+    np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max())
+    said = browser.response("nodes-lightmap", lightSets=[LIGHTS["spot"]], changes=CHANGES[1:2], **job)["error"]
+    assert "found objects that are repainted" in said
 
 
 def test_what_cannot_change_is_named(browser: Any) -> None:

@@ -36,12 +36,18 @@ def difference(shown: np.ndarray, expected: np.ndarray) -> float:
     return float(np.abs(shown - expected).max() / expected.max())
 
 
-@pytest.mark.parametrize("method", ["transfer", "light-cloud"])
-def test_passes_give_the_picture_of_rays(browser: Any, made: Room, method: str) -> None:
+@pytest.mark.parametrize(
+    ("method", "run"),
+    [
+        *[("transfer", {"run": "three-lightmap"}), ("light-cloud", {"run": "three-lightmap"})],
+        *[("transfer", {"run": "nodes-lightmap", "backend": backend}) for backend in ("webgl", "webgpu")],
+    ],
+)
+def test_passes_give_the_picture_of_rays(browser: Any, made: Room, method: str, run: dict[str, str]) -> None:
     """Every kind of light and all at once, with shadows of the asset's own triangles."""
     own = made if method == "transfer" else room()
     sets = [*LIGHTS.values()] if method == "transfer" else [LIGHTS["all"]]
-    drawn = browser.lightmaps("three-lightmap", browser.place(own.write), [*sets, []], weights="gpu", shadowSize=512)
+    drawn = browser.lightmaps(asset=browser.place(own.write), light_sets=[*sets, []], weights="gpu", **run)
     for picture, lights in zip(drawn, sets, strict=False):
         assert difference(picture, picture_of(own, np.sum([received(own, light) for light in lights], axis=0))) < CLOSE, lights
     assert not drawn[-1].any()

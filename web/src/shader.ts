@@ -11,6 +11,9 @@ export interface FrameValues {
   readonly pointLights: readonly PointLightUniforms[];
 }
 
+/** A frame whose weights are on the GPU already. */
+export const NO_WEIGHTS: FrameValues = { weights: new Float32Array(0), pointLights: [] };
+
 /** The frame's numbers under `lights`, which are in the asset's world. */
 export function frameValues(asset: Asset, lights: readonly Light[]): FrameValues {
   const all = inAssetFrame(asset, lights);

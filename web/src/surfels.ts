@@ -13,7 +13,7 @@ export interface Surfels {
   readonly tables: readonly LightValues[];
 }
 
-/** Cells in the order of their patches, as textures of `width` texels per row hold them. */
+/** Cells in the order of their patches, as textures with `width` texels in each row hold them. */
 export interface PackedCells {
   readonly width: number;
   readonly height: number;

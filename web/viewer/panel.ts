@@ -6,6 +6,7 @@ import type { AddedKind } from "./asset_lights";
 import type { Bounds } from "./receivers";
 import { Mixer } from "./mixer";
 import { type Changed, COMPARES, firstPath, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
+import { surfaceControls } from "./surface_controls";
 
 export interface Actions {
   changed: Changed;
@@ -36,6 +37,9 @@ export interface PanelFacts {
   /** Whether its lights are the scene's own, by name. */
   named: boolean;
   hasFrames: boolean;
+  /** Objects that can emit, and whether they can be repainted. */
+  objects: readonly string[];
+  paintable: boolean;
 }
 
 const KINDS = { directional: "Directional", point: "Point", spot: "Spot", sphere: "Sphere", area: "Area", environment: "Environment" } as const satisfies Record<AddedKind, string>;
@@ -71,6 +75,8 @@ export class Panel {
     this.gui = new GUI({ container: this.controls, title: "", autoPlace: false });
     this.lights();
     if (!this.facts.named) this.light();
+    const { objects, paintable } = this.facts;
+    if (objects.length) surfaceControls(this.gui, this.state, objects, paintable, this.actions.changed);
     this.picture();
     if (this.facts.hasCapture) this.compare();
     this.path();

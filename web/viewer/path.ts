@@ -45,8 +45,15 @@ export class Playback {
     return true;
   }
 
+  /** One round of the path, as frames. */
+  frames(perSecond: number): LightState[][] {
+    const { lights, selected, seconds } = this.state;
+    const count = Math.max(1, Math.round(seconds * perSecond));
+    return Array.from({ length: count }, (_, i) => lights.map((light, j) => (j === selected ? this.moved(light, i / count) : light)));
+  }
+
   /** `light` after `turns` rounds of the path. */
-  moved(light: LightState, turns: number): LightState {
+  private moved(light: LightState, turns: number): LightState {
     const { center, radius } = this.bounds;
     return along(light, this.state.path === "none" ? "turn" : this.state.path, turns, center, radius);
   }

@@ -1,6 +1,7 @@
 /** The page's state, and its URL: `#` followed by the state as JSON. */
 import { SrbfError, type Triple } from "../src";
 import { checkLight, directionalState, isDesigned, type LightState, round, rounded } from "./light_state";
+import { checkSurfaces, type SurfaceState } from "./surface_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
 export const SHOWS = ["picture", "false color", "negative", "map"] as const;
@@ -15,6 +16,9 @@ export interface State {
   lights: LightState[];
   /** Index of the light that the controls edit. */
   selected: number;
+  /** Objects that emit or are repainted, and the one that the controls edit. */
+  surfaces: SurfaceState[];
+  surface: string;
   /** Stops. */
   exposure: number;
   tone: (typeof TONES)[number];
@@ -56,6 +60,8 @@ export function firstState(
     asset: 0,
     lights: own,
     selected: 0,
+    surfaces: [],
+    surface: "",
     exposure: quantity === "radiance" || view === "scene" ? 1.65 : 0,
     tone: "linear",
     show: "picture",
@@ -129,6 +135,8 @@ export function decodeState(hash: string, plain: State): State {
     if (!Array.isArray(given.lights) || given.lights.length > most) throw new SrbfError("expected a list of lights in the page's address; the page uses its defaults");
     state.lights = fitting(given.lights.map(checkLight), plain.lights);
   }
+  if (given.surfaces !== undefined) state.surfaces = checkSurfaces(given.surfaces);
+  one("surface", (value: unknown) => typeof value === "string");
   one("selected", number(-1, state.lights.length - 1));
   state.selected = Math.min(state.selected, state.lights.length - 1);
   return state;

@@ -23,7 +23,7 @@ export class Subject {
     this.asset = loaded.asset;
     this.coverage = loaded.coverage;
     const floats = renderer.extensions.has("OES_texture_float_linear") && renderer.extensions.has("EXT_color_buffer_float");
-    this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear" });
+    this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear", weights: floats && loaded.asset.tables.surfels ? "gpu" : "cpu" });
     this.alpha = this.relighting.textures.alpha ?? alphaTexture({ kind: "float", width: 1, height: 1, channels: 1, data: new Float32Array([1]) });
     if (!loaded.direct) return;
     try {

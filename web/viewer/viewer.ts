@@ -24,6 +24,7 @@ import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, encodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects } from "./subject";
+import { emitting, emittingStates, paint, surfaceFacts } from "./surface_state";
 import { Surroundings } from "./surroundings";
 
 const FRAMES_PER_SECOND = 24;
@@ -99,7 +100,7 @@ export class Viewer {
       chooseAsset: () => this.chooseAsset(),
       chooseEnvironment: () => pickFile(".exr,.hdr,.png", (file) => void this.environment(file)),
       savePng: () => this.savePicture(),
-      saveFrames: () => saveFrames("FRAMES.json", [this.state.lights]),
+      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]]),
       loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
       savePath: () => this.savePath(),
       resetCamera: () => {
@@ -147,6 +148,7 @@ export class Viewer {
       bounds: this.receivers.bounds,
       named: this.named,
       hasFrames: this.keyframes !== undefined,
+      ...surfaceFacts(this.subject.asset),
     };
   }
 
@@ -277,6 +279,7 @@ export class Viewer {
   private relight(): void {
     const comparing = this.comparing();
     this.shining = this.lights();
+    paint(this.subject.asset, comparing ? [] : this.state.surfaces);
     const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
     if (this.state.show === "negative" && !comparing) {
       this.subject.relight(negated(this.shining), terms, this.renderer);
@@ -306,7 +309,7 @@ export class Viewer {
       this.comparison.off();
       this.directions.marked = -1;
       if (this.state.compare !== "off") say(`comparing needs a ${this.inCloud ? "point" : "directional"} light: add one`, "hint");
-      return this.state.lights.map((light) => lightOf(light, this.environments)).filter((light) => light !== undefined);
+      return [...this.state.lights.flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
     this.directions.marked = this.comparison.compared;
@@ -525,10 +528,7 @@ export class Viewer {
   }
 
   private savePath(): void {
-    const { lights, path, selected, seconds } = this.state;
-    if (path === "frames" && this.keyframes) return saveFrames("FRAMES.json", this.keyframes.frames);
-    const count = Math.max(1, Math.round(seconds * FRAMES_PER_SECOND));
-    const frame = (i: number) => lights.map((light, j) => (j === selected ? this.playback.moved(light, i / count) : light));
-    saveFrames("FRAMES.json", Array.from({ length: count }, (_, i) => frame(i)));
+    const frames = this.state.path === "frames" && this.keyframes ? this.keyframes.frames : this.playback.frames(FRAMES_PER_SECOND);
+    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]));
   }
 }

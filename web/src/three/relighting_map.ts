@@ -7,7 +7,7 @@ import { SrbfError } from "../errors";
 import type { Light } from "../lights";
 import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
-import { type FrameValues, needPositions, uniformVectors } from "../shader";
+import { needPositions, NO_WEIGHTS, uniformVectors } from "../shader";
 import { looksOf, placed } from "../surfels";
 import { engineShadow } from "./engine_shadows";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
@@ -34,7 +34,6 @@ export interface RelightingMapOptions extends TargetOptions {
 }
 
 const EXTENSIONS = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
-const NO_WEIGHTS: FrameValues = { weights: new Float32Array(0), pointLights: [] };
 const VECTORS_KEPT_FREE = 48; // vec4 of three's own uniforms in a lit material
 
 /**

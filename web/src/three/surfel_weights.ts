@@ -2,7 +2,7 @@
  * Weights of lights inside a scene, computed by the GPU: direct light on cells of the surfaces by shadow maps, a pass for each point of a light, and the
  * asset's tables as small passes after it. Nothing is read back.
  */
-import { DataTexture, DataUtils, HalfFloatType, type IUniform, Matrix4, RedFormat, RGBAFormat, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import { type DataTexture, type IUniform, Matrix4, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 import type { LightValues } from "../light_values";
@@ -14,15 +14,13 @@ import cellIrradiance from "../shaders/surfel_irradiance.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
 import { changeable } from "../surface_changes";
-import { type Look, packedCells, square } from "../surfels";
+import { type Look, packedCells, square, type Surfels } from "../surfels";
 import { type EngineShadow, shadowUniforms } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass, undisturbed } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
 import { Repainting } from "./repainting";
-
-const TABLE_WIDTH = 4096; // texels
-const PART = 64; // columns that one texel of a pass adds up
+import { addedNumbers, PART, tableTexture } from "./table_textures";
 
 /** A point of a light, and the engine's shadow of it; without, the asset's own triangles cast one. */
 export interface ShadowedLook extends Look {
@@ -37,6 +35,12 @@ interface Table {
   texture: DataTexture;
   scale: number;
   added: DataTexture;
+}
+
+/** @throws SrbfError on an asset whose lights the GPU cannot follow. */
+export function surfelsOf({ tables, manifest }: Asset): Surfels {
+  if (tables.surfels) return tables.surfels;
+  throw new SrbfError(`expected an asset of lights inside a scene, with cells.exr and scene.glb, for weights "gpu", found ${manifest.method} without; take weights: "cpu"`);
 }
 
 export class SurfelWeights {
@@ -58,10 +62,10 @@ export class SurfelWeights {
   /** `shadowSize`: texels per side of a face of the own shadow maps. @throws SrbfError on an asset without cells. */
   constructor(
     private readonly asset: Asset,
-    shadowSize = 256,
+    shadowSize = 512,
   ) {
-    const { surfels, weights } = asset.tables;
-    if (!surfels) throw new SrbfError(`expected an asset of lights inside a scene, with cells.exr and scene.glb, for weights "gpu", found ${asset.manifest.method} without; take weights: "cpu"`);
+    const surfels = surfelsOf(asset);
+    const { weights } = asset.tables;
     const cells = packedCells(surfels);
     this.middle = cells.middle;
     this.lift = surfels.cells.lift;
@@ -118,10 +122,7 @@ export class SurfelWeights {
     this.surfaces = state;
     if (!surfaces && emitting.length === 0) return;
     const { added } = this.tables[0];
-    const numbers = changeable(surfaces).emission(emitting);
-    const data = added.image.data as Float32Array;
-    for (let i = 0; i < numbers.length; ++i) data[4 * Math.floor(i / 3) + (i % 3)] = numbers[i];
-    added.needsUpdate = true;
+    addedNumbers(added, changeable(surfaces).emission(emitting));
   }
 
   /** The first table with the albedo that its objects have now. */
@@ -179,13 +180,9 @@ export class SurfelWeights {
 
 function tableOf(values: LightValues, numbers: Texture, width: number, height: number): Table {
   const { functions: rows, count, gray } = values;
-  const [tableWidth, tableHeight] = [Math.min(TABLE_WIDTH, rows * count), Math.ceil((rows * count) / TABLE_WIDTH)];
-  const halves = new Uint16Array((gray ? 1 : 4) * tableWidth * tableHeight);
-  const texture = new DataTexture(halves, tableWidth, tableHeight, gray ? RedFormat : RGBAFormat, HalfFloatType);
-  texture.needsUpdate = true;
+  const { texture, scale } = tableTexture(values);
   const blocks = Math.ceil(count / PART);
   const partial = floatTarget(...square(rows * blocks));
-  const scale = fill(halves, values);
   const added = floatTexture(new Float32Array(4 * width * height), width, height);
   const parts = new FullscreenPass(
     tableSums,
@@ -194,18 +191,4 @@ function tableOf(values: LightValues, numbers: Texture, width: number, height: n
   );
   const whole = new FullscreenPass(blockSums, { parts: { value: partial.texture }, added: { value: added }, blocks: { value: blocks }, width: { value: width } });
   return { parts, partial, whole, target: floatTarget(width, height), texture, scale, added };
-}
-
-/** Write a table as half floats; returns what they are multiplied by. Rounded to nearest: three.js' own conversion cuts digits off. */
-function fill(halves: Uint16Array, { data, gray }: LightValues): number {
-  const largest = data.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
-  const scale = 2 ** Math.ceil(Math.log2(Math.max(largest, 1e-30))) / 4096;
-  const digits = 2 ** 42 + 1; // leaves 11 of a double's 53
-  const half = (x: number) => {
-    const spread = (x / scale) * digits;
-    return DataUtils.toHalfFloat(spread - (spread - x / scale));
-  };
-  const step = gray ? 1 : 4;
-  for (let i = 0; i < data.length / 3; ++i) for (let c = 0; c < Math.min(step, 3); ++c) halves[step * i + c] = half(data[3 * i + c]);
-  return scale;
 }

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMaterial, RectAreaLightNode, RenderTarget, WebGPURenderer } from "three/webgpu";
 import { RectAreaLightTexturesLib } from "three/addons/lights/RectAreaLightTexturesLib.js";
 import { SrbfRelightingNodes } from "../../src/three/tsl";
-import { type Job, lightOfJson, picture, upsideDown } from "./job";
+import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
 import { addLights, facingCamera, quad } from "./three_scene";
 
 const MATERIALS = { MeshStandardMaterial: MeshStandardNodeMaterial, MeshLambertMaterial: MeshLambertNodeMaterial, MeshBasicMaterial: MeshBasicNodeMaterial };
@@ -27,11 +27,12 @@ async function rendererOf(job: Job): Promise<WebGPURenderer> {
 /** The lightmaps that the asset draws into its own target under one set of lights after the other. */
 export async function nodesLightmap(job: Job) {
   const renderer = await rendererOf(job);
-  const map = await SrbfRelightingNodes.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest" });
+  const map = await SrbfRelightingNodes.load(job.asset, { source: "lightmap", target: job.target ?? "float", filter: "nearest", weights: job.weights as "gpu", exact: job.exact === true, shadowSize: job.shadowSize as number });
   const { width, height } = map.asset.manifest;
   const pictures = [];
-  for (const lights of job.lightSets) {
+  for (const [i, lights] of job.lightSets.entries()) {
     map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    change(job, map, i);
     map.update(renderer);
     pictures.push(picture(width, height, await read(renderer, map.target as RenderTarget, width, height)));
   }

@@ -1,5 +1,5 @@
 /** An asset's numbers as nodes: textures, constant arrays, and the arrays that change with the lights. */
-import { Matrix4, Vector4 } from "three";
+import { Matrix4, type Texture, Vector4 } from "three";
 import * as tsl from "three/tsl";
 import type { Asset } from "../../asset";
 import { SrbfError } from "../../errors";
@@ -26,6 +26,7 @@ export class NodeInputs {
     readonly textures: SrbfTextures,
     private readonly filter: Filter,
     private readonly maxPointLights: number,
+    private readonly weights: Texture | undefined = textures.weights,
   ) {
     this.arrays = Object.fromEntries(Object.entries(constantVectors(asset)).map(([name, numbers]) => [name, uniformArray(vectors(numbers), "vec4")]));
     const { kind, width } = asset.tables.weights;
@@ -50,7 +51,7 @@ export class NodeInputs {
       layers: this.asset.layers.count,
       decoded: (uv, i) => this.layer(uv, i).mul(this.arrays.srbfScale.element(i)).add(this.arrays.srbfBias.element(i)),
       vectors: (name) => this.arrays[name],
-      texture: (name) => (name === "srbfWeights" ? this.textures.weights : this.textures.tables[name]),
+      texture: (name) => (name === "srbfWeights" ? this.weights : this.textures.tables[name]),
       texelAt: (uv) => pack.texelAt(uv, this.asset.manifest.width, this.asset.manifest.height),
       each,
       addPointLights: (sum, receiver, response) => this.addPointLights(sum, receiver, response),
@@ -91,7 +92,7 @@ export class NodeInputs {
   }
 }
 
-function each(count: number | N, name: string, body: (i: N) => void): void {
+export function each(count: number | N, name: string, body: (i: N) => void): void {
   const end = typeof count === "number" ? int(count) : count;
   (Loop as N)({ start: int(0), end, type: "int", condition: "<", name }, (variables: N) => body(variables[name]));
 }

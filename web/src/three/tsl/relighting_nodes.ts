@@ -3,10 +3,12 @@ import { FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, Neare
 import { attribute, Fn, positionWorld, screenCoordinate, texture, textureLoad, vec2, vec4 } from "three/tsl";
 import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
+import { inAssetFrame } from "../../asset_frame";
 import { checkCompression } from "../../compression";
 import { SrbfError } from "../../errors";
 import { receiversFrom } from "../../manifest";
-import { needPositions } from "../../shader";
+import { needPositions, NO_WEIGHTS } from "../../shader";
+import { looksOf, placed } from "../../surfels";
 import type { TargetOptions } from "../lightmap_pass";
 import type { MaterialOptions } from "../material";
 import { SceneAsset, sourceOf } from "../scene_asset";
@@ -15,12 +17,16 @@ import { NodeInputs } from "./inputs";
 import { applyLight } from "./material";
 import { type N, texelAt } from "./nodes";
 import { relit } from "./relit";
+import { SurfelNodes } from "./surfel_nodes";
 
 export interface RelightingNodesOptions extends TargetOptions {
   /** As in `SrbfRelightingMap`. */
   source?: "maps" | "lightmap";
   /** Room for point and spot lights; their number may change without recompiling. */
   maxPointLights?: number;
+  /** As in `SrbfRelightingMap`, but `gpu` takes shadows of the asset's own triangles alone. */
+  weights?: "cpu" | "gpu";
+  shadowSize?: number;
 }
 
 /** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once per frame. */
@@ -31,7 +37,9 @@ export class SrbfRelightingNodes extends SceneAsset {
   readonly target?: RenderTarget;
   private readonly inputs: NodeInputs;
   private readonly quad?: QuadMesh;
+  private readonly gpu?: SurfelNodes;
   private drawn = "";
+  private weighed = "";
 
   /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingNodesOptions = {}) {
@@ -39,7 +47,8 @@ export class SrbfRelightingNodes extends SceneAsset {
     this.source = sourceOf(asset, options.source);
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
-    this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16);
+    if (options.weights === "gpu") this.gpu = new SurfelNodes(asset, options.shadowSize);
+    this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16, this.gpu?.weights);
     if (this.source === "lightmap") {
       this.target = lightmapTarget(asset, options);
       this.quad = new QuadMesh(this.passMaterial());
@@ -79,14 +88,14 @@ export class SrbfRelightingNodes extends SceneAsset {
    * @throws SrbfError on point lights where the asset has no positions, and on more than `maxPointLights` of them.
    */
   update(renderer?: Renderer): void {
-    const frame = this.frame();
+    const frame = this.gpu ? NO_WEIGHTS : this.frame();
     if (renderer) checkCompression(this.asset, (encoding) => reads(renderer, encoding));
     if (this.target) needPositions(this.asset, frame.pointLights.length);
     this.inputs.set(frame);
     this.inputs.assetFromScene.value.copy(this.assetFromScene());
+    const state = this.gpu ? this.drawWeights(this.gpu, renderer) : JSON.stringify([[...frame.weights], frame.pointLights]);
     if (!this.target || !this.quad) return;
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
-    const state = JSON.stringify([[...frame.weights], frame.pointLights]);
     if (state === this.drawn) return;
     const kept = renderer.getRenderTarget();
     renderer.setRenderTarget(this.target);
@@ -98,7 +107,21 @@ export class SrbfRelightingNodes extends SceneAsset {
   dispose(): void {
     this.textures.dispose();
     this.target?.dispose();
+    this.gpu?.dispose();
     (this.quad?.material as NodeMaterial | undefined)?.dispose();
+  }
+
+  /** Draw the weights of the current lights, if they have changed; returns what they depend on. */
+  private drawWeights(gpu: SurfelNodes, renderer: Renderer | undefined): string {
+    if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
+    if (this.asset.tables.surfaces?.change) throw new SrbfError('expected the albedo of the bake for weights "gpu" of nodes, found objects that are repainted; take weights: "cpu"');
+    const all = inAssetFrame(this.asset, this.currentLights());
+    gpu.setEmission(all.named);
+    const looks = placed(all).flatMap((light) => looksOf(light, gpu.middle));
+    const state = JSON.stringify([looks, all.named]);
+    if (state !== this.weighed) gpu.draw(renderer, looks);
+    this.weighed = state;
+    return state;
   }
 
   private passMaterial(): NodeMaterial {

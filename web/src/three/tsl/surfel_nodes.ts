@@ -1,0 +1,203 @@
+/** `SurfelWeights` for WebGPURenderer, on WebGPU and on its WebGL2 backend: shadows are those of the asset's own triangles. */
+import { Color, type DataTexture, FloatType, NearestFilter, NoBlending, RenderTarget, type Texture } from "three";
+import * as tsl from "three/tsl";
+import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
+import type { Asset } from "../../asset";
+import type { LightValues } from "../../light_values";
+import type { NamedLight } from "../../lights";
+import type { Triple } from "../../matrix";
+import { versine as versineOf } from "../../point_light";
+import { changeable } from "../../surface_changes";
+import { type Look, packedCells, square } from "../../surfels";
+import { floatTexture } from "../float_textures";
+import { surfelsOf } from "../surfel_weights";
+import { addedNumbers, PART, tableTexture } from "../table_textures";
+import { each } from "./inputs";
+import type { N } from "./nodes";
+import { OccluderNodes } from "./occluder_nodes";
+import { type CellTextures, irradianceNode, lookUniforms } from "./surfel_irradiance";
+
+const { float, Fn, int, ivec2, min, screenCoordinate, textureLoad, vec3, vec4 } = tsl as Record<string, N>;
+
+interface Pass {
+  quad: QuadMesh;
+  target: RenderTarget;
+}
+
+export class SurfelNodes {
+  readonly middle: Triple;
+  private readonly maps: OccluderNodes;
+  private readonly uniforms = lookUniforms();
+  private readonly sums: [RenderTarget, RenderTarget];
+  /** [from the first of the sums, from the second] of lights at a place, and of distant ones. */
+  private readonly looks: { near: [Pass, Pass]; far: [Pass, Pass] };
+  private readonly means: [Pass, Pass];
+  private readonly tables: Pass[];
+  private readonly textures: DataTexture[];
+  private readonly added: DataTexture[] = [];
+  private emission = "[]";
+
+  /** @throws SrbfError on an asset without cells. */
+  constructor(
+    private readonly asset: Asset,
+    shadowSize = 512,
+  ) {
+    const surfels = surfelsOf(asset);
+    const cells = packedCells(surfels);
+    this.middle = cells.middle;
+    this.maps = new OccluderNodes(surfels.corners, cells.middle, cells.reach, shadowSize);
+    const places = floatTexture(cells.places, cells.width, cells.height);
+    const normals = floatTexture(cells.normals, cells.width, cells.height);
+    const ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
+    this.textures = [places, normals, ranges];
+    this.sums = [target(cells.width, cells.height), target(cells.width, cells.height)];
+    const look = (from: 0 | 1, distant: boolean): Pass => {
+      const seen: CellTextures = { places, normals, maps: distant ? [this.maps.far.texture] : this.maps.faces.map(({ texture }) => texture), size: (distant ? 4 : 1) * shadowSize, lift: surfels.cells.lift };
+      return pass(irradianceNode(this.uniforms, seen, this.sums[from].texture, distant), this.sums[1 - from]);
+    };
+    this.looks = { near: [look(0, false), look(1, false)], far: [look(0, true), look(1, true)] };
+    const received = target(cells.rangesWidth, cells.rangesHeight);
+    const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, normals, ranges, cells.width), received);
+    this.means = [mean(0), mean(1)];
+    this.tables = this.tablePasses(surfels.tables, received);
+  }
+
+  /** The weights, as the nodes of the asset take them. */
+  get weights(): Texture {
+    return this.tables[this.tables.length - 1].target.texture;
+  }
+
+  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
+  setEmission(emitting: readonly NamedLight[]): void {
+    const state = JSON.stringify(emitting);
+    if (state === this.emission) return;
+    this.emission = state;
+    addedNumbers(this.added[0], changeable(this.asset.tables.surfaces).emission(emitting));
+  }
+
+  draw(renderer: Renderer, looks: readonly Look[]): void {
+    const kept = { target: renderer.getRenderTarget(), color: renderer.getClearColor(new Color() as never) as unknown as Color, alpha: renderer.getClearAlpha() };
+    renderer.setClearColor(new Color(0, 0, 0), 0);
+    renderer.setRenderTarget(this.sums[0]);
+    renderer.clear();
+    let from: 0 | 1 = 0;
+    for (const look of looks) {
+      this.set(renderer, look);
+      render(renderer, this.looks[look.distant ? "far" : "near"][from]);
+      from = from === 0 ? 1 : 0;
+    }
+    render(renderer, this.means[from]);
+    for (const one of this.tables) render(renderer, one);
+    renderer.setRenderTarget(kept.target);
+    renderer.setClearColor(kept.color, kept.alpha);
+  }
+
+  dispose(): void {
+    const passes = [...this.looks.near, ...this.looks.far, ...this.means, ...this.tables];
+    for (const { quad, target: drawn } of passes) {
+      (quad.material as NodeMaterial).dispose();
+      drawn.dispose();
+    }
+    for (const one of [...this.textures, ...this.added, this.maps]) one.dispose();
+  }
+
+  private set(renderer: Renderer, look: Look): void {
+    const axes = look.distant ? this.maps.drawFar(renderer, look.place) : undefined;
+    if (!look.distant) this.maps.drawNear(renderer, look.place);
+    const vectors = { light: look.place, color: look.color, axis: look.axis, ...axes };
+    for (const [name, value] of Object.entries(vectors)) this.uniforms[name].value.set(...value);
+    const numbers = {
+      a0: look.a0,
+      radius: look.radius,
+      inverseSquare: look.falloff === "inverse-square" ? 1 : 0,
+      versineInner: look.cone ? versineOf(look.cone[0]) : 3,
+      versineOuter: look.cone ? versineOf(look.cone[1]) : 4,
+      lambertian: look.lambertian ? 1 : 0,
+      reach: look.distant ? this.maps.reach : 1,
+    };
+    for (const [name, value] of Object.entries(numbers)) this.uniforms[name].value = value;
+  }
+
+  private tablePasses(tables: readonly LightValues[], received: RenderTarget): Pass[] {
+    const { weights } = this.asset.tables;
+    let numbers = received;
+    return tables.flatMap((values, i) => {
+      const [width, height] = i === tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
+      const { texture, scale } = tableTexture(values);
+      const added = floatTexture(new Float32Array(4 * width * height), width, height);
+      this.textures.push(texture);
+      this.added.push(added);
+      const blocks = Math.ceil(values.count / PART);
+      const parts = target(...square(values.functions * blocks));
+      const whole = target(width, height);
+      const passes = [pass(partNode(values, texture, scale, numbers, blocks, parts.width), parts), pass(wholeNode(parts, added, blocks, width), whole)];
+      numbers = whole;
+      return passes;
+    });
+  }
+}
+
+const here = (): N => ivec2(screenCoordinate);
+const folded = (index: N, width: number): N => ivec2(index.mod(width), index.div(width));
+
+/** `surfel_means.glsl`. */
+function meanNode(irradiance: Texture, normals: Texture, ranges: Texture, width: number): N {
+  return Fn(() => {
+    const range = textureLoad(ranges, here()).toVar();
+    const first = int(range.x.add(0.5)).toVar();
+    const total = vec3(0).toVar();
+    each(int(range.y.add(0.5)), "i", (i) => {
+      const at = folded(first.add(i), width).toVar();
+      total.addAssign(textureLoad(normals, at).w.mul(textureLoad(irradiance, at).rgb));
+    });
+    return vec4(total, 1);
+  })();
+}
+
+/** `table_sums.glsl`. */
+function partNode({ functions, count, gray }: LightValues, table: DataTexture, scale: number, numbers: RenderTarget, blocks: number, width: number): N {
+  return Fn(() => {
+    const at = here().toVar();
+    const index = at.y.mul(width).add(at.x).toVar();
+    const row = index.div(blocks).toVar();
+    const size = Math.ceil(count / blocks);
+    const first = index.mod(blocks).mul(size).toVar();
+    const most = tsl.select(row.lessThan(functions), min(int(size), int(count).sub(first)), int(0)) as N;
+    const total = vec3(0).toVar();
+    each(most.toVar(), "i", (i) => {
+      const column = first.add(i).toVar();
+      const entry = textureLoad(table, folded(row.mul(count).add(column), (table.image as { width: number }).width));
+      total.addAssign((gray ? vec3(entry.r) : entry.rgb).mul(textureLoad(numbers.texture, folded(column, numbers.width)).rgb));
+    });
+    return vec4(total.mul(float(scale)), 1);
+  })();
+}
+
+/** `block_sums.glsl`. */
+function wholeNode(parts: RenderTarget, added: Texture, blocks: number, width: number): N {
+  return Fn(() => {
+    const at = here().toVar();
+    const first = at.y.mul(width).add(at.x).mul(blocks).toVar();
+    const total = textureLoad(added, at).rgb.toVar();
+    each(blocks, "i", (i) => total.addAssign(textureLoad(parts.texture, folded(first.add(i), parts.width)).rgb));
+    return vec4(total, 1);
+  })();
+}
+
+function pass(fragment: N, drawn: RenderTarget): Pass {
+  const material = new NodeMaterial();
+  material.fragmentNode = fragment;
+  material.depthTest = false;
+  material.depthWrite = false;
+  material.blending = NoBlending;
+  return { quad: new QuadMesh(material), target: drawn };
+}
+
+function render(renderer: Renderer, { quad, target: drawn }: Pass): void {
+  renderer.setRenderTarget(drawn);
+  quad.render(renderer);
+}
+
+function target(width: number, height: number): RenderTarget {
+  return new RenderTarget(width, height, { type: FloatType, magFilter: NearestFilter, minFilter: NearestFilter, depthBuffer: false });
+}
