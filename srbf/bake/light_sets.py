@@ -260,6 +260,7 @@ def _surfel_keys(found: FoundPlaces) -> dict[str, Any]:
 FINGERPRINT_PATCHES = 1024  # which see the lights of a cloud differently
 
 LightSet = NamedSet | CloudSet
+Operator = Literal["rays", "cycles"]
 
 
 def parse_light_set(
@@ -270,8 +271,17 @@ def parse_light_set(
     spacing: float | None,
     light_bounds: str | None,
     surfels_per_m2: float | None = None,
+    operator: Operator = "rays",
 ) -> LightSet:
-    """From the command line's flags; InputError on words and combinations that mean nothing."""
+    """From the command line's flags; InputError on words and combinations that mean nothing.
+
+    The operator of surfels by Cycles: what each of the patches that surfels make sends to the receivers, rendered.
+    """
+    if operator == "cycles":
+        if word != "surfels" or surfels_per_m2 is not None:
+            found = word if surfels_per_m2 is None else "`surfels_per_m2`"
+            raise InputError(f"expected `operator=cycles` with `light_set=surfels` and a count of `patches`, found it with {found}")
+        word = "patches"
     if surfels_per_m2 is not None and word != "surfels":
         raise InputError(f"expected `surfels_per_m2` with `light_set=surfels`, found it with {word}")
     if word == "named":

@@ -47,6 +47,7 @@ def bake(
     light_group: flag.LightGroups = None,
     patches: flag.PatchCount = None,
     surfels_per_m2: flag.SurfelDensity = None,
+    operator: flag.OperatorOf = "rays",
     grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
@@ -82,7 +83,7 @@ def bake(
         points = PointGrid.parse(str(light_set), light_bounds) if by_grid else None
         inside = None
         if light_set is not None and not by_grid:
-            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2)
+            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2, operator)
     if not (named or collection):
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
     for name, value in (
@@ -91,6 +92,7 @@ def bake(
         ("--patches", patches),
         ("--grid", grid),
         ("--surfels-per-m2", surfels_per_m2),
+        ("--operator cycles", operator == "cycles"),
     ):
         if value and (light_set is None or (by_grid and name != "--light-bounds")):
             raise typer.BadParameter(f"expected --light-set named, cloud, patches or surfels with {name}, found {light_set or 'none'}")

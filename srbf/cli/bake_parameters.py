@@ -116,6 +116,14 @@ SurfelDensity = Annotated[
         rich_help_panel=LIGHTS,
     ),
 ]
+OperatorOf = Annotated[
+    Literal["rays", "cycles"],
+    typer.Option(
+        "--operator",
+        help="surfels: what traces the light that they send: rays, or Cycles, one patch of surfels at a time (--light-set patches).",
+        rich_help_panel=LIGHTS,
+    ),
+]
 GridSpacing = Annotated[
     float | None,
     typer.Option(

@@ -16,6 +16,7 @@ LIGHTMAP = Receiver("lightmap", "Floor")
 
 def test_flags_mean_a_set() -> None:
     assert parse_light_set("surfels", (), 400, None, None, None, 25.0) == CloudSet("surfels", 8000, 0.2)
+    assert parse_light_set("surfels", (), 400, 64, None, None, None, "cycles") == CloudSet("patches", 64)
     assert parse_light_set("named", ["Hall"], 400, None, None, None) == NamedSet(("Hall",))
     assert parse_light_set("cloud", (), 512, None, 0.5, "0,0,0,2,2,2") == CloudSet("cloud", 512, 0.5, BOX)
     assert parse_light_set("patches", (), 512, None, None, None) == CloudSet("patches", 512)
@@ -31,6 +32,8 @@ def test_flags_mean_a_set() -> None:
         (("patches", (), 400, None, None, None, 8.0), "`surfels_per_m2` with `light_set=surfels`"),
         (("surfels", (), 400, 5, None, None), "`light_set=surfels` without `patches`"),
         (("patches", (), 400, None, 0.5, None), "`grid` with `light_set=cloud`"),
+        (("surfels", (), 400, None, None, None, 8.0, "cycles"), "a count of `patches`, found it with `surfels_per_m2`"),
+        (("cloud", (), 400, None, None, None, None, "cycles"), "`operator=cycles` with `light_set=surfels`"),
         (("cloud", (), 400, None, None, "0,0,0,-1,1,1"), "each first value the smaller"),
     ],
 )
