@@ -36,7 +36,7 @@ export class SceneAsset {
   }
 
   /**
-   * Let an object emit radiance diffusely, linear Rec.709, with all bounces; 0 ends it. Of `transfer` assets that were fitted with `--editable`.
+   * Let an object emit radiance diffusely, linear Rec.709, with all bounces; 0 ends it. Of assets of transfer that were fitted with `--editable`.
    *
    * @throws SrbfError on an object that the asset does not have, and on other assets.
    */
