@@ -53,7 +53,10 @@ def test_passes_give_the_picture_of_rays(browser: Any, made: Room, method: str, 
     assert not drawn[-1].any()
 
 
-def test_cells_take_the_shadows_that_three_has_drawn(browser: Any, made: Room, url: str) -> None:
+@pytest.mark.parametrize(
+    "run", [{"run": "three-shadows"}, *[{"run": "nodes-shadows", "backend": backend} for backend in ("webgl", "webgpu")]]
+)
+def test_cells_take_the_shadows_that_three_has_drawn(browser: Any, made: Room, url: str, run: dict[str, str]) -> None:
     """Of an object that the asset does not have, by all kinds of shadow maps."""
     seen = replace(made, corners=BLOCKER)
     toward = np.array([-1.5, 0.3, 2.4]) / np.linalg.norm([-1.5, 0.3, 2.4])
@@ -65,7 +68,7 @@ def test_cells_take_the_shadows_that_three_has_drawn(browser: Any, made: Room, u
         *[("BasicShadowMap", SUN, sun), ("PCFShadowMap", SUN, sun)],
     ]
     job = {"half": (2.0, 1.5, 0.0), "blocker": BLOCKER.reshape(-1, 3).tolist()}
-    drawn = browser.lightmaps("three-shadows", url, [], kinds=[(kind, light) for kind, light, _ in cases], **job)
+    drawn = browser.lightmaps(asset=url, light_sets=[], **run, kinds=[(kind, light) for kind, light, _ in cases], **job)
     for picture, (kind, light, expected) in zip(drawn, cases, strict=True):
         assert difference(picture, picture_of(seen, expected)) < FILTERED, (kind, light["type"])
     assert difference(drawn[0], picture_of(made, received(made, of_point))) > 10 * FILTERED, "the asset's own shadow is another"

@@ -1,7 +1,13 @@
 /** three.js' own shadow maps, for the direct light on cells of the surfaces. */
 import { type DirectionalLight, type Matrix4, type PerspectiveCamera, type PointLight, type SpotLight, Vector2, VSMShadowMap, type WebGLRenderer } from "three";
 import type { Triple } from "../matrix";
+import type { Look } from "../surfels";
 import { isArea, type SceneLight } from "./scene_lights";
+
+/** A renderer of either kind. */
+export interface Shadowing {
+  shadowMap: { enabled: boolean };
+}
 
 /** A light of three's with a shadow, and where the asset lies in its world. */
 export interface EngineShadow {
@@ -9,8 +15,13 @@ export interface EngineShadow {
   readonly sceneFromAsset: Matrix4;
 }
 
+/** A point of a light, and the engine's shadow of it; without, the asset's own triangles cast one. */
+export interface ShadowedLook extends Look {
+  readonly shadow?: EngineShadow;
+}
+
 /** The shadow that three has drawn of a light, if it casts one; drawn with the last frame, so the first has none. */
-export function engineShadow(light: SceneLight, renderer: WebGLRenderer, sceneFromAsset: () => Matrix4): EngineShadow | undefined {
+export function engineShadow(light: SceneLight, renderer: Shadowing, sceneFromAsset: () => Matrix4): EngineShadow | undefined {
   if (isArea(light) || !light.castShadow || !renderer.shadowMap.enabled || !light.shadow.map) return undefined;
   return { light, sceneFromAsset: sceneFromAsset() };
 }
@@ -33,7 +44,12 @@ export function shadowUniforms(renderer: WebGLRenderer, { light, sceneFromAsset 
       shadowNormalBias: shadow.normalBias,
       shadowIntensity: shadow.intensity,
       shadowDepths: new Vector2(near, far),
-      sceneFromCell: sceneFromAsset.clone().multiply(sceneFromAsset.clone().makeTranslation(...middle)),
+      sceneFromCell: sceneFromCell(sceneFromAsset, middle),
     },
   };
+}
+
+/** To three's world from places less `middle`. */
+export function sceneFromCell(sceneFromAsset: Matrix4, middle: Triple): Matrix4 {
+  return sceneFromAsset.clone().multiply(sceneFromAsset.clone().makeTranslation(...middle));
 }

@@ -2,8 +2,8 @@
 import { BufferAttribute, BufferGeometry, Camera, DoubleSide, GLSL3, Mesh, NearestFilter, NoBlending, RawShaderMaterial, RedFormat, FloatType, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { unit } from "../lights";
 import { cross, type Triple } from "../matrix";
-import fragmentShader from "../shaders/occluder_nearness.frag";
-import vertexShader from "../shaders/occluder_nearness.vert";
+import fragmentShader from "../shaders/occluder_nearness.glsl";
+import vertexShader from "../shaders/occluder_corner.glsl";
 
 const NEAREST = 5e-3; // meters: what is nearer to a light casts no shadow
 

@@ -1,19 +1,14 @@
 /** An asset in a three.js scene: its textures, the lights that it follows, the materials that it lights. */
 import type { Material, Matrix4, Texture, WebGLRenderer } from "three";
 import { type Asset, loadAsset, type LoadOptions } from "../asset";
-import { inAssetFrame } from "../asset_frame";
 import { checkCompression } from "../compression";
 import { SrbfError } from "../errors";
-import type { Light } from "../lights";
 import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { needPositions, NO_WEIGHTS, uniformVectors } from "../shader";
-import { looksOf, placed } from "../surfels";
-import { engineShadow } from "./engine_shadows";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
 import { SceneAsset, sourceOf } from "./scene_asset";
-import type { SceneLight } from "./scene_lights";
 import { SurfelWeights } from "./surfel_weights";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
@@ -148,13 +143,8 @@ export class SrbfRelightingMap extends SceneAsset {
   /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
   private drawWeights(gpu: SurfelWeights, renderer: WebGLRenderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
-    const sceneFromAsset = () => this.assetFromScene().invert();
-    const lights: [Light, SceneLight?][] = [...this.lights.map((light): [Light] => [light]), ...this.followedLights()];
-    const looks = lights.flatMap(([light, own]) => {
-      const shadow = own && engineShadow(own, renderer, sceneFromAsset);
-      return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, gpu.middle).map((look) => ({ ...look, shadow })));
-    });
-    const named = this.lights.filter((light) => light.kind === "named");
+    const looks = this.looks(renderer, gpu.middle);
+    const named = this.emitting();
     gpu.setEmission(named);
     const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named, this.asset.tables.surfaces?.version]);
     if (!state || state !== this.weighed) gpu.draw(renderer, looks);

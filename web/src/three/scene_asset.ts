@@ -1,12 +1,15 @@
 /** What both renderers' classes share: an asset with lights in a three.js scene. */
 import { type Light as ThreeLight, Matrix4 } from "three";
 import type { Asset } from "../asset";
+import { inAssetFrame } from "../asset_frame";
 import { SrbfError } from "../errors";
-import { type Light, moved, namedLight } from "../lights";
+import { type Light, moved, type NamedLight, namedLight } from "../lights";
 import { asDesigned, put, setNamedLight } from "../named_lights";
 import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
 import { changeable } from "../surface_changes";
+import { looksOf, placed } from "../surfels";
+import { engineShadow, type ShadowedLook, type Shadowing } from "./engine_shadows";
 import { rowsOf, threeMatrix } from "./rows";
 import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 
@@ -33,7 +36,7 @@ export class SceneAsset {
   }
 
   /**
-   * Let an object emit radiance diffusely, linear Rec.709, with all bounces; 0 ends it. Of `transfer` assets that were fitted with `--editable`.
+   * Let an object emit radiance diffusely, linear Rec.709, with all bounces; 0 ends it. Of assets of transfer that were fitted with `--editable`.
    *
    * @throws SrbfError on an object that the asset does not have, and on other assets.
    */
@@ -78,6 +81,21 @@ export class SceneAsset {
       const light = lightOf(own);
       return light ? [[moved(light, worldFromScene), own]] : [];
     });
+  }
+
+  /** The points of the current lights, less `middle`, with the shadows that three has drawn of those that it has. */
+  protected looks(renderer: Shadowing, middle: Triple): ShadowedLook[] {
+    const sceneFromAsset = () => this.assetFromScene().invert();
+    const lights: [Light, SceneLight?][] = [...this.lights.map((light): [Light] => [light]), ...this.followedLights()];
+    return lights.flatMap(([light, own]) => {
+      const shadow = own && engineShadow(own, renderer, sceneFromAsset);
+      return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, middle).map((look) => ({ ...look, shadow })));
+    });
+  }
+
+  /** The objects that emit. */
+  protected emitting(): NamedLight[] {
+    return this.lights.filter((light) => light.kind === "named");
   }
 
   /** The current lights' numbers for shaders. */

@@ -14,18 +14,13 @@ import cellIrradiance from "../shaders/surfel_irradiance.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
 import { changeable } from "../surface_changes";
-import { type Look, packedCells, square, type Surfels } from "../surfels";
-import { type EngineShadow, shadowUniforms } from "./engine_shadows";
+import { packedCells, square, type Surfels } from "../surfels";
+import { type ShadowedLook, shadowUniforms } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass, undisturbed } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
 import { Repainting } from "./repainting";
 import { addedNumbers, PART, tableTexture } from "./table_textures";
-
-/** A point of a light, and the engine's shadow of it; without, the asset's own triangles cast one. */
-export interface ShadowedLook extends Look {
-  readonly shadow?: EngineShadow;
-}
 
 interface Table {
   parts: FullscreenPass;

@@ -3,7 +3,7 @@ import { babylonMaterial } from "./babylon";
 import { host, layers, load } from "./host";
 import type { Job } from "./job";
 import { playcanvasMaterial } from "./playcanvas";
-import { nodesLightmap, nodesMaterial } from "./three_nodes";
+import { nodesLightmap, nodesMaterial, nodesShadows } from "./three_nodes";
 import { threeGltf, threeLightmap, threeMaterial, threeShadows } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
@@ -14,6 +14,7 @@ const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "playcanvas-material": playcanvasMaterial,
   "nodes-lightmap": nodesLightmap,
   "nodes-material": nodesMaterial,
+  "nodes-shadows": nodesShadows,
   "three-gltf": threeGltf,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,

@@ -4,7 +4,7 @@ import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMateria
 import { RectAreaLightTexturesLib } from "three/addons/lights/RectAreaLightTexturesLib.js";
 import { SrbfRelightingNodes } from "../../src/three/tsl";
 import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
-import { addLights, facingCamera, quad } from "./three_scene";
+import { addLights, facingCamera, quad, shadowScene } from "./three_scene";
 
 const MATERIALS = { MeshStandardMaterial: MeshStandardNodeMaterial, MeshLambertMaterial: MeshLambertNodeMaterial, MeshBasicMaterial: MeshBasicNodeMaterial };
 RectAreaLightNode.setLTC(RectAreaLightTexturesLib.init()); // as three.js asks of pages with area lights
@@ -37,6 +37,30 @@ export async function nodesLightmap(job: Job) {
     pictures.push(picture(width, height, await read(renderer, map.target as RenderTarget, width, height)));
   }
   map.dispose();
+  return { pictures };
+}
+
+/** `threeShadows` of the WebGL page, by nodes. */
+export async function nodesShadows(job: Job) {
+  const pictures = [];
+  const renderer = await rendererOf(job);
+  renderer.shadowMap.enabled = true;
+  const seen = new RenderTarget(16, 16);
+  for (const [type, follow] of job.kinds as [string, Record<string, unknown>][]) {
+    renderer.shadowMap.type = THREE[type as "PCFShadowMap"];
+    const map = await SrbfRelightingNodes.load(job.asset, { source: "lightmap", target: "float", filter: "nearest", weights: "gpu" });
+    const { width, height } = map.asset.manifest;
+    const { scene, light } = shadowScene(job, map, follow, new MeshLambertNodeMaterial({ side: THREE.DoubleSide }));
+    renderer.setRenderTarget(seen);
+    renderer.render(scene, facingCamera(job)); // three draws the shadow with the picture
+    renderer.setRenderTarget(null);
+    if (!light.shadow.map) throw new Error("expected a shadow that three has drawn, found none");
+    map.update(renderer);
+    pictures.push(picture(width, height, await read(renderer, map.target as RenderTarget, width, height)));
+    map.dispose();
+  }
+  renderer.shadowMap.enabled = false;
+  seen.dispose();
   return { pictures };
 }
 

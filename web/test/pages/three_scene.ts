@@ -47,3 +47,22 @@ export function addLights(job: Job, map: Followed, scene: THREE.Scene): void {
     map.follow(light);
   }
 }
+
+/** A scene of `job.blocker`, corners of triangles in the asset's world, and a light whose shadow three draws; `map` follows it. */
+export function shadowScene(job: Job, map: Followed, follow: Record<string, unknown>, material: THREE.Material = new THREE.MeshLambertMaterial({ side: THREE.DoubleSide })) {
+  const scene = new THREE.Scene();
+  const geometry = new THREE.BufferGeometry();
+  const corners = (job.blocker as number[][]).flatMap(([x, y, z]) => [x, z, -y]);
+  geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
+  geometry.computeVertexNormals();
+  const mesh = new THREE.Mesh(geometry, material);
+  mesh.castShadow = mesh.receiveShadow = true;
+  scene.add(mesh);
+  addLights({ ...job, follow: [follow] }, map, scene);
+  const light = scene.children[1] as THREE.PointLight;
+  light.castShadow = true;
+  light.shadow.mapSize.set(1024, 1024);
+  Object.assign(light.shadow.camera, { near: 0.05, far: 30, left: -4, right: 4, top: 4, bottom: -4 });
+  light.shadow.camera.updateProjectionMatrix();
+  return { scene, light, geometry };
+}

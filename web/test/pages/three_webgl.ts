@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { relightGltf, SrbfRelightingMap } from "../../src/three";
 import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
-import { addLights, facingCamera, quad } from "./three_scene";
+import { addLights, facingCamera, quad, shadowScene } from "./three_scene";
 
 let renderer: THREE.WebGLRenderer | undefined;
 
@@ -45,20 +45,7 @@ export async function threeShadows(job: Job) {
   const pixels = new Float32Array(width * height * 4);
   const pictures = (job.kinds as [string, Record<string, unknown>][]).map(([type, follow]) => {
     own.shadowMap.type = THREE[type as "PCFShadowMap"];
-    const scene = new THREE.Scene();
-    const geometry = new THREE.BufferGeometry();
-    const corners = (job.blocker as number[][]).flatMap(([x, y, z]) => [x, z, -y]);
-    geometry.setAttribute("position", new THREE.Float32BufferAttribute(corners, 3));
-    geometry.computeVertexNormals();
-    const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ side: THREE.DoubleSide }));
-    mesh.castShadow = mesh.receiveShadow = true;
-    scene.add(mesh);
-    addLights({ ...job, follow: [follow] }, map, scene);
-    const light = scene.children[1] as THREE.PointLight;
-    light.castShadow = true;
-    light.shadow.mapSize.set(1024, 1024);
-    Object.assign(light.shadow.camera, { near: 0.05, far: 30, left: -4, right: 4, top: 4, bottom: -4 });
-    light.shadow.camera.updateProjectionMatrix();
+    const { scene, light, geometry } = shadowScene(job, map, follow);
     own.render(scene, facingCamera(job)); // three draws the shadow with the picture
     map.update(own);
     own.readRenderTargetPixels(target, 0, 0, width, height, pixels);

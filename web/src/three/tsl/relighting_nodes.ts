@@ -3,12 +3,10 @@ import { FloatType, HalfFloatType, LinearFilter, LinearMipmapLinearFilter, Neare
 import { attribute, Fn, positionWorld, screenCoordinate, texture, textureLoad, vec2, vec4 } from "three/tsl";
 import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import { type Asset, loadAsset, type LoadOptions } from "../../asset";
-import { inAssetFrame } from "../../asset_frame";
 import { checkCompression } from "../../compression";
 import { SrbfError } from "../../errors";
 import { receiversFrom } from "../../manifest";
 import { needPositions, NO_WEIGHTS } from "../../shader";
-import { looksOf, placed } from "../../surfels";
 import type { TargetOptions } from "../lightmap_pass";
 import type { MaterialOptions } from "../material";
 import { SceneAsset, sourceOf } from "../scene_asset";
@@ -24,7 +22,7 @@ export interface RelightingNodesOptions extends TargetOptions {
   source?: "maps" | "lightmap";
   /** Room for point and spot lights; their number may change without recompiling. */
   maxPointLights?: number;
-  /** As in `SrbfRelightingMap`, but `gpu` takes shadows of the asset's own triangles alone. */
+  /** As in `SrbfRelightingMap`. */
   weights?: "cpu" | "gpu";
   shadowSize?: number;
 }
@@ -96,7 +94,7 @@ export class SrbfRelightingNodes extends SceneAsset {
     const state = this.gpu ? this.drawWeights(this.gpu, renderer) : JSON.stringify([[...frame.weights], frame.pointLights]);
     if (!this.target || !this.quad) return;
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
-    if (state === this.drawn) return;
+    if (state && state === this.drawn) return;
     const kept = renderer.getRenderTarget();
     renderer.setRenderTarget(this.target);
     this.quad.render(renderer);
@@ -111,15 +109,15 @@ export class SrbfRelightingNodes extends SceneAsset {
     (this.quad?.material as NodeMaterial | undefined)?.dispose();
   }
 
-  /** Draw the weights of the current lights, if they have changed; returns what they depend on. */
+  /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
   private drawWeights(gpu: SurfelNodes, renderer: Renderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
     if (this.asset.tables.surfaces?.change) throw new SrbfError('expected the albedo of the bake for weights "gpu" of nodes, found objects that are repainted; take weights: "cpu"');
-    const all = inAssetFrame(this.asset, this.currentLights());
-    gpu.setEmission(all.named);
-    const looks = placed(all).flatMap((light) => looksOf(light, gpu.middle));
-    const state = JSON.stringify([looks, all.named]);
-    if (state !== this.weighed) gpu.draw(renderer, looks);
+    const looks = this.looks(renderer, gpu.middle);
+    const named = this.emitting();
+    gpu.setEmission(named);
+    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named]);
+    if (!state || state !== this.weighed) gpu.draw(renderer, looks);
     this.weighed = state;
     return state;
   }

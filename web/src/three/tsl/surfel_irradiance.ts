@@ -33,14 +33,20 @@ export function lookUniforms() {
 export interface CellTextures {
   places: Texture;
   normals: Texture;
-  /** Six faces about a place, or one map of a direction, `size` texels per side. */
-  maps: readonly Texture[];
-  size: number;
   lift: number;
 }
 
+/** Six faces about a place, or one map of a direction, `size` texels per side. */
+export interface OwnMaps {
+  maps: readonly Texture[];
+  size: number;
+}
+
+/** A node of how much of a light a lifted cell sees. */
+export type Visibility = (place: N, normal: N) => N;
+
 /** RGBA of the pass: what `former` holds, and the look's irradiance. */
-export function irradianceNode(u: Record<string, N>, cells: CellTextures, former: Texture, distant: boolean): N {
+export function irradianceNode(u: Record<string, N>, cells: CellTextures, former: Texture, distant: boolean, visibility: Visibility): N {
   return Fn(() => {
     const at = ivec2(screenCoordinate).toVar();
     const cell = textureLoad(cells.places, at).toVar();
@@ -48,7 +54,7 @@ export function irradianceNode(u: Record<string, N>, cells: CellTextures, former
     const amount = (distant ? max(dot(normal, u.light), 0) : fromPlace(u, cell, normal)).toVar();
     If(amount.greaterThan(0), () => {
       const place = cell.xyz.add(normal.mul(cells.lift)).toVar();
-      amount.mulAssign(distant ? seenFromFar(u, cells, place, normal) : seenFromPlace(u, cells, place, normal));
+      amount.mulAssign(visibility(place, normal));
     });
     return vec4(textureLoad(former, at).rgb.add(u.color.mul(amount)), 1);
   })();
@@ -96,7 +102,7 @@ function texelOf(place: N, size: number): { texel: N; middle: N } {
 }
 
 /** The nearest surface at the texel that a lifted cell falls on, against the cell's plane at the texel's middle. */
-function seenFromPlace(u: Record<string, N>, { maps, size }: CellTextures, place: N, normal: N): N {
+export const seenFromPlace = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place, normal) => {
   const away = place.sub(u.light).toVar();
   const most = abs(away).toVar();
   const k = select(most.x.greaterThanEqual(most.y).and(most.x.greaterThanEqual(most.z)), int(0), select(most.y.greaterThanEqual(most.z), int(1), int(2))).toVar();
@@ -115,13 +121,13 @@ function seenFromPlace(u: Record<string, N>, { maps, size }: CellTextures, place
     });
   });
   return select(nearness.greaterThan(limited.mul(1 + SLACK)), float(0), float(1));
-}
+};
 
-function seenFromFar(u: Record<string, N>, { maps, size }: CellTextures, place: N, normal: N): N {
+export const seenFromFar = (u: Record<string, N>, { maps, size }: OwnMaps): Visibility => (place, normal) => {
   const { texel, middle } = texelOf(vec2(dot(place, u.across), dot(place, u.up)).div(u.reach), size);
   const slope = vec2(dot(normal, u.across), dot(normal, u.up));
   const plane = dot(normal, place).sub(dot(slope, middle.mul(u.reach))).div(dot(normal, u.light));
   const own = dot(place, u.light).toVar();
   const limited = clamp(plane, own.sub(TILT), own.add(TILT));
   return select(textureLoad(maps[0], texel).r.greaterThan(limited.add(u.reach.mul(2))), float(0), float(1));
-}
+};

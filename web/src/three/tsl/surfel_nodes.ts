@@ -1,5 +1,5 @@
-/** `SurfelWeights` for WebGPURenderer, on WebGPU and on its WebGL2 backend: shadows are those of the asset's own triangles. */
-import { Color, type DataTexture, FloatType, NearestFilter, NoBlending, RenderTarget, type Texture } from "three";
+/** `SurfelWeights` for WebGPURenderer, on WebGPU and on its WebGL2 backend. */
+import { Color, type DataTexture, type DepthTexture, FloatType, NearestFilter, NoBlending, RenderTarget, type Texture } from "three";
 import * as tsl from "three/tsl";
 import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
 import type { Asset } from "../../asset";
@@ -8,20 +8,27 @@ import type { NamedLight } from "../../lights";
 import type { Triple } from "../../matrix";
 import { versine as versineOf } from "../../point_light";
 import { changeable } from "../../surface_changes";
-import { type Look, packedCells, square } from "../../surfels";
+import { packedCells, square } from "../../surfels";
+import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
 import { surfelsOf } from "../surfel_weights";
 import { addedNumbers, PART, tableTexture } from "../table_textures";
+import { depthsOf, seenInMap, setShadow, shadowUniforms } from "./engine_shadow_nodes";
 import { each } from "./inputs";
 import type { N } from "./nodes";
 import { OccluderNodes } from "./occluder_nodes";
-import { type CellTextures, irradianceNode, lookUniforms } from "./surfel_irradiance";
+import { type CellTextures, irradianceNode, lookUniforms, seenFromFar, seenFromPlace, type Visibility } from "./surfel_irradiance";
 
 const { float, Fn, int, ivec2, min, screenCoordinate, textureLoad, vec3, vec4 } = tsl as Record<string, N>;
 
 interface Pass {
   quad: QuadMesh;
   target: RenderTarget;
+}
+
+interface Shadowed {
+  passes: [Pass, Pass];
+  uniforms: Record<string, N>;
 }
 
 export class SurfelNodes {
@@ -31,6 +38,9 @@ export class SurfelNodes {
   private readonly sums: [RenderTarget, RenderTarget];
   /** [from the first of the sums, from the second] of lights at a place, and of distant ones. */
   private readonly looks: { near: [Pass, Pass]; far: [Pass, Pass] };
+  /** Those by shadows that three has drawn. */
+  private engine = new Map<DepthTexture, Shadowed>();
+  private readonly cells: CellTextures;
   private readonly means: [Pass, Pass];
   private readonly tables: Pass[];
   private readonly textures: DataTexture[];
@@ -51,11 +61,10 @@ export class SurfelNodes {
     const ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
     this.textures = [places, normals, ranges];
     this.sums = [target(cells.width, cells.height), target(cells.width, cells.height)];
-    const look = (from: 0 | 1, distant: boolean): Pass => {
-      const seen: CellTextures = { places, normals, maps: distant ? [this.maps.far.texture] : this.maps.faces.map(({ texture }) => texture), size: (distant ? 4 : 1) * shadowSize, lift: surfels.cells.lift };
-      return pass(irradianceNode(this.uniforms, seen, this.sums[from].texture, distant), this.sums[1 - from]);
-    };
-    this.looks = { near: [look(0, false), look(1, false)], far: [look(0, true), look(1, true)] };
+    this.cells = { places, normals, lift: surfels.cells.lift };
+    const near = seenFromPlace(this.uniforms, { maps: this.maps.faces.map(({ texture }) => texture), size: shadowSize });
+    const far = seenFromFar(this.uniforms, { maps: [this.maps.far.texture], size: 4 * shadowSize });
+    this.looks = { near: this.passesOf(false, near), far: this.passesOf(true, far) };
     const received = target(cells.rangesWidth, cells.rangesHeight);
     const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, normals, ranges, cells.width), received);
     this.means = [mean(0), mean(1)];
@@ -75,17 +84,21 @@ export class SurfelNodes {
     addedNumbers(this.added[0], changeable(this.asset.tables.surfaces).emission(emitting));
   }
 
-  draw(renderer: Renderer, looks: readonly Look[]): void {
+  draw(renderer: Renderer, looks: readonly ShadowedLook[]): void {
     const kept = { target: renderer.getRenderTarget(), color: renderer.getClearColor(new Color() as never) as unknown as Color, alpha: renderer.getClearAlpha() };
     renderer.setClearColor(new Color(0, 0, 0), 0);
     renderer.setRenderTarget(this.sums[0]);
     renderer.clear();
     let from: 0 | 1 = 0;
+    const used = new Map<DepthTexture, Shadowed>();
     for (const look of looks) {
+      const shadowed = look.shadow && this.shadowed(renderer, look, look.shadow, used);
       this.set(renderer, look);
-      render(renderer, this.looks[look.distant ? "far" : "near"][from]);
+      render(renderer, (shadowed?.passes ?? this.looks[look.distant ? "far" : "near"])[from]);
       from = from === 0 ? 1 : 0;
     }
+    for (const [depths, { passes }] of this.engine) if (!used.has(depths)) disposeOf(passes);
+    this.engine = used;
     render(renderer, this.means[from]);
     for (const one of this.tables) render(renderer, one);
     renderer.setRenderTarget(kept.target);
@@ -94,16 +107,32 @@ export class SurfelNodes {
 
   dispose(): void {
     const passes = [...this.looks.near, ...this.looks.far, ...this.means, ...this.tables];
-    for (const { quad, target: drawn } of passes) {
-      (quad.material as NodeMaterial).dispose();
-      drawn.dispose();
-    }
+    disposeOf([...passes, ...[...this.engine.values()].flatMap((one) => one.passes)]);
+    for (const { target: drawn } of passes) drawn.dispose();
     for (const one of [...this.textures, ...this.added, this.maps]) one.dispose();
   }
 
-  private set(renderer: Renderer, look: Look): void {
-    const axes = look.distant ? this.maps.drawFar(renderer, look.place) : undefined;
-    if (!look.distant) this.maps.drawNear(renderer, look.place);
+  private passesOf(distant: boolean, visibility: Visibility): [Pass, Pass] {
+    const from = (i: 0 | 1) => pass(irradianceNode(this.uniforms, this.cells, this.sums[i].texture, distant, visibility), this.sums[1 - i]);
+    return [from(0), from(1)];
+  }
+
+  /** The passes of a light by its own shadow, as three has drawn it. */
+  private shadowed(renderer: Renderer, { distant }: ShadowedLook, shadow: EngineShadow, used: Map<DepthTexture, Shadowed>): Shadowed {
+    const depths = depthsOf(shadow);
+    let found = this.engine.get(depths);
+    if (!found) {
+      const uniforms = shadowUniforms();
+      found = { uniforms, passes: this.passesOf(distant, seenInMap(uniforms, shadow, depths, renderer)) };
+    }
+    setShadow(found.uniforms, shadow, this.middle);
+    used.set(depths, found);
+    return found;
+  }
+
+  private set(renderer: Renderer, look: ShadowedLook): void {
+    const axes = look.distant && !look.shadow ? this.maps.drawFar(renderer, look.place) : undefined;
+    if (!look.distant && !look.shadow) this.maps.drawNear(renderer, look.place);
     const vectors = { light: look.place, color: look.color, axis: look.axis, ...axes };
     for (const [name, value] of Object.entries(vectors)) this.uniforms[name].value.set(...value);
     const numbers = {
@@ -135,6 +164,10 @@ export class SurfelNodes {
       return passes;
     });
   }
+}
+
+function disposeOf(passes: readonly Pass[]): void {
+  for (const { quad } of passes) (quad.material as NodeMaterial).dispose();
 }
 
 const here = (): N => ivec2(screenCoordinate);

@@ -1,0 +1,101 @@
+"""`python benchmarks/web_surfels.py ASSET…`: the lightmap that three.js draws of lights inside, against numpy's rays.
+
+Weights by passes of the GPU (shadow maps of 128, 256, 512 and 1024 texels per side of a face), by rays on the CPU, and by the table of
+places (rays for spots and areas): relative RMSE of the indirect light over all texels, at random free places. The page is that of the
+browser's tests: `npm run build:pages -- --outDir ../build/web/pages` in web/. Chromium is found on PATH, and runs SwiftShader.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf.asset import Asset
+from srbf.lights import AreaLight, Light, PointLight, SpotLight
+from srbf.methods import linear_response
+
+ROOT = Path(__file__).resolve().parents[1]
+KINDS = {PointLight: "point", SpotLight: "spot", AreaLight: "area"}
+CASES: dict[str, dict[str, Any]] = {
+    **{f"passes, {size}": {"weights": "gpu", "shadowSize": size} for size in (128, 256, 512, 1024)},
+    "rays on the CPU": {"weights": "cpu", "exact": True},
+    "table of places": {"weights": "cpu", "exact": False},
+}
+
+
+def light_sets(asset: Asset, count: int, seed: int) -> dict[str, list[list[Light]]]:
+    """Of every kind `count`, one light each; and four points together."""
+    rng = np.random.default_rng(seed)
+    free = np.array(asset.manifest["free_places"])
+    sets: dict[str, list[list[Light]]] = {"point": [], "spot": [], "area": [], "four points": []}
+    for _ in range(count):
+        places = [(float(x), float(y), float(z)) for x, y, z in free[rng.choice(len(free), 4, replace=False)]]
+        x, y, z = (float(value) for value in rng.normal(size=3))
+        points: list[Light] = [PointLight(place, falloff="inverse-square") for place in places]
+        sets["point"].append(points[:1])
+        sets["spot"].append([SpotLight(places[0], falloff="inverse-square", direction=(x, y, z), inner=0.4, outer=0.6)])
+        sets["area"].append([AreaLight(places[0], u=(0.6, 0.0, 0.0), v=(0.0, 0.3, 0.0))])
+        sets["four points"].append(points)
+    return sets
+
+
+def drawn(page: subprocess.Popen[str], url: str, sets: list[list[Light]], options: dict[str, Any]) -> list[np.ndarray] | None:
+    """The lightmaps, (H, W, 3) each; None where the asset cannot be relit so."""
+    lights = [[{"kind": KINDS[type(light)], **asdict(light)} for light in one] for one in sets]
+    assert page.stdin is not None
+    assert page.stdout is not None
+    page.stdin.write(json.dumps({"run": "three-lightmap", "asset": url, "lights": [], "lightSets": lights, **options}) + "\n")
+    page.stdin.flush()
+    said = json.loads(page.stdout.readline())
+    if "error" in said:
+        return None
+    images = [np.frombuffer(base64.b64decode(one["pixels"]), np.float32) for one in said["pictures"]]
+    return [image.reshape(one["height"], one["width"], 4)[..., :3] for image, one in zip(images, said["pictures"], strict=True)]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("assets", type=Path, nargs="+")
+    parser.add_argument("--lights", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=3)
+    arguments = parser.parse_args()
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    node, chromium = shutil.which("node", path=path), shutil.which("chromium") or shutil.which("google-chrome")
+    assert node, "expected node, found none; pip install 'srbf[test]'"
+    assert chromium, "expected Chromium on PATH, found none"
+    with tempfile.TemporaryDirectory() as folder:
+        command = [node, str(ROOT / "web/test/driver.mjs"), chromium, str(ROOT / "build/web/pages"), folder]
+        page = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert page.stdout is not None
+        page.stdout.readline()
+        for place in arguments.assets:
+            asset = Asset.open(place)
+            (Path(folder) / place.name).symlink_to(place.resolve())
+            for kind, sets in light_sets(asset, arguments.lights, arguments.seed).items():
+                expected = [np.maximum(linear_response(asset, lights), 0) for lights in sets]
+                for name, options in CASES.items():
+                    found = drawn(page, f"/served/{place.name}", sets, options)
+                    if found is None:
+                        continue
+                    ambient = asset.images["ambient"] if "ambient" in asset.images else np.float32(0)
+                    errors = [
+                        float(np.sqrt(np.square(image - ambient - own).mean() / np.square(own).mean()))
+                        for image, own in zip(found, expected, strict=True)
+                    ]
+                    print(f"{place.name}, {kind}, {name}: median {np.median(errors):.4f}, worst {max(errors):.4f}", flush=True)
+        page.terminate()
+
+
+if __name__ == "__main__":
+    main()
