@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
@@ -29,6 +29,7 @@ def occluders_of(scene: bytes) -> EmbreeTriangles:
     return EmbreeTriangles(triangles.corners[triangles.occluders])
 
 
+@runtime_checkable
 class Shadows(Protocol):
     """What cells see of lights."""
 
