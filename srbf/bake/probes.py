@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from srbf.basis.irradiance_harmonics import FACETS, facet_normals
 from srbf.errors import InputError
@@ -24,6 +23,8 @@ def grid_of(facts: dict[str, Any], seed: int) -> ProbeGrid:
 
     InputError where their image would be too large.
     """
+    from scipy.spatial import cKDTree
+
     told, arrays = facts["probes"], facts["arrays"]
     x, y, z = (int(count) for count in told["counts"])
     if max(FACETS * x, y * z) > WIDEST:
