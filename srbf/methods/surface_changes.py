@@ -55,15 +55,24 @@ class Surfaces:
         names: tuple[str, ...],
         bounces: int | None,
     ) -> Surfaces:
-        """Of fine surfels `cells`, each in a group and of an object: sums and means over the groups."""
+        """Of fine surfels `cells`, each in a group and of an object: sums and means over the groups; of objects that have surfels."""
+        having = np.unique(objects)
         count = int(groups.max()) + 1
         area = np.maximum(np.bincount(groups, cells.areas, count), 1e-30).astype(np.float32)
         sent = grouped(np.ascontiguousarray(basis.sent.T) * cells.areas, groups, count) / area
-        owned = (objects == np.arange(len(names))[:, None]) * cells.areas
+        owned = (objects == having[:, None]) * cells.areas
         albedo = grouped(np.ascontiguousarray(cells.albedo.T) * cells.areas, groups, count) / area
         shares = grouped(owned.astype(np.float32), groups, count) / area
         feedback = basis.feedback.astype(np.float32)
-        return Surfaces(grouped(basis.gather, groups, count), sent, feedback, shares, np.ascontiguousarray(albedo.T), names, bounces)
+        return Surfaces(
+            grouped(basis.gather, groups, count),
+            sent,
+            feedback,
+            shares,
+            np.ascontiguousarray(albedo.T),
+            tuple(names[i] for i in having),
+            bounces,
+        )
 
     @staticmethod
     def of(asset: Asset) -> Surfaces:

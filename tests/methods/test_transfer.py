@@ -16,7 +16,7 @@ from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.lights import AreaLight, DirectionalLight, NamedLight, PointLight, SpotLight
 from srbf.methods import linear_response
-from srbf.methods.surface_changes import with_albedo
+from srbf.methods.surface_changes import Surfaces, with_albedo
 from srbf.methods.transfer import Transfer
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.cloud_lights import CloudLights
@@ -160,6 +160,14 @@ def test_what_cannot_change_is_said(editable: Asset, asset: Asset) -> None:
             wrong()
     with pytest.raises(InputError, match="expected an object of the asset .Walls, Red wall., found 'Sofa'"):
         with_albedo(editable, {"Sofa": (0.5, 0.5, 0.5)})
+
+
+def test_groups_are_of_one_object_and_objects_without_surfels_are_not_offered(editable: Asset, capture: Capture) -> None:
+    assert np.isin(Surfaces.of(editable).shares, (0, 1)).all()
+    told = capture.manifest["surfels"]
+    more = replace(capture, manifest={**capture.manifest, "surfels": {**told, "objects": [*told["objects"], "Black"]}})
+    fitted = Transfer(clusters=2, components=2, rank=4, editable=True).encode(more)
+    assert "Black" not in Surfaces.of(fitted).names
 
 
 def test_a_scene_without_bounces_has_nothing_to_fit(capture: Capture) -> None:
