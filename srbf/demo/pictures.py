@@ -62,7 +62,7 @@ def in_camera(
             light = PointLight(triple(np.array(place)), falloff="inverse-square")
             bounced = bilinear(linear_response(asset, [light]), texels) * albedo / np.float32(np.pi)
             own = added.response([light])
-            picture = np.maximum(np.where(receivers[..., None], bounced, 0) + (0 if own is None else own), 0)
+            picture = np.maximum(np.where(receivers[..., None], bounced, 0) + (0 if own is None else own), 0).astype(np.float32)
             error = _relative(picture[receivers], reference[receivers])
             results.append(Compared(place, error))
             gain = LEVEL / max(float(np.quantile(reference, WHITE)), 1e-30)

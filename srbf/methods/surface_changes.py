@@ -79,21 +79,32 @@ class Surfaces:
         """InputError where the asset has none."""
         if KEY not in asset.manifest:
             raise InputError(f"expected an asset whose surfaces can change, found a {asset.method} one without; fit with `editable`")
-        told = asset.manifest[KEY]
-        tables = [asset.tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in FILES]
-        gather, sent, feedback, shares, albedo = tables
+        return Surfaces.of_tables(asset.manifest, asset.tables)
+
+    @staticmethod
+    def of_tables(manifest: dict[str, Any], tables: Mapping[str, ndarray]) -> Surfaces:
+        """From the manifest and the tables of an asset that has them."""
+        told = manifest[KEY]
+        values = [tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in FILES]
+        gather, sent, feedback, shares, albedo = values
         return Surfaces(gather[..., 0], sent[..., 0], feedback, shares[..., 0], albedo[0], tuple(told["objects"]), told.get("bounces"))
 
     def add_to(self, asset: Asset) -> None:
         """Its tables and keys."""
+        tables, keys = self.stored()
+        asset.tables |= tables
+        asset.manifest |= keys
+
+    def stored(self) -> tuple[dict[str, ndarray], dict[str, Any]]:
+        """(tables, keys of the manifest) as an asset has them."""
         tables = (self.gather[..., None], self.sent[..., None], self.feedback, self.shares[..., None], self.albedo[None])
-        scales = {}
+        stored, scales, keys = {}, {}, {}
         for (name, file), table in zip(FILES.items(), tables, strict=True):
             scales[name] = float(2.0 ** np.ceil(np.log2(max(float(np.abs(table).max(initial=0)), 1e-30))))
-            asset.tables[name] = (table / np.float32(scales[name])).astype(np.float16)
-            asset.manifest[name] = {"file": file}
+            stored[name] = (table / np.float32(scales[name])).astype(np.float16)
+            keys[name] = {"file": file}
         entry: dict[str, Any] = {"objects": list(self.names), "scales": scales}
-        asset.manifest[KEY] = entry if self.bounces is None else {**entry, "bounces": self.bounces}
+        return stored, {**keys, KEY: entry if self.bounces is None else {**entry, "bounces": self.bounces}}
 
     @staticmethod
     def read(reader: AssetReader) -> dict[str, ndarray]:

@@ -89,7 +89,7 @@ def test_a_receiver_comes_back_from_its_manifest() -> None:
 @pytest.mark.parametrize(
     ("word", "layer", "words"),
     [
-        ("surfel:A", None, "lightmap:OBJECT, vertices:OBJECT or view"),
+        ("surfel:A", None, r"lightmap:OBJECT, vertices:OBJECT, view\[:CAMERA\] or probes"),
         ("vertices:", None, "vertices:OBJECT"),
         ("vertices:A", "UV", "expected `uv_layer` with a lightmap receiver, found it with vertices"),
     ],

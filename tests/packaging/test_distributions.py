@@ -20,7 +20,19 @@ pytestmark = pytest.mark.packaging
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 BLENDER = tomllib.loads((ROOT / "blender_bake" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 PAGE = {f"srbf/viewer/page/{name}" for name in ("index.html", "viewer.js", "viewer.css", "LICENSES.txt")}
-SCENES = {"caustics", "coin", "colored_room", "house", "lattice", "staging", "still_life"}
+SCENES = {
+    "caustics",
+    "coin",
+    "colored_room",
+    "house",
+    "interior",
+    "lattice",
+    "lightmap_charts",
+    "loft",
+    "loft_furniture",
+    "staging",
+    "still_life",
+}
 MEDIA = {".webp", ".png", ".exr", ".jpg", ".mp4"}
 SDIST_BYTES = 2_000_000  # 1.0 MB when written; 7.8 MB with the pictures of the documentation
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 from cloud_assets import PATCHES, Room
@@ -19,11 +18,9 @@ def with_surfaces(made: Room, bounces: int | None) -> tuple[Room, Surfaces]:
     albedo = rng.uniform(0.1, 0.9, (PATCHES, 3)).astype(np.float32)
     shares = rng.uniform(0, 0.5, (2, PATCHES)).astype(np.float32)
     feedback = np.stack([(gather * albedo[:, c]) @ sent.T for c in range(3)], axis=2)
-    changing = SimpleNamespace(tables={}, manifest={})
-    Surfaces(gather, sent, feedback, shares, albedo, ("Wall", "Screen"), bounces).add_to(changing)  # type: ignore[arg-type]
-    files = {name: (table.astype(np.float32), "half") for name, table in changing.tables.items()}
-    stored = {changing.manifest[name]["file"]: image for name, image in files.items()}
+    tables, keys = Surfaces(gather, sent, feedback, shares, albedo, ("Wall", "Screen"), bounces).stored()
+    files = {name: (table.astype(np.float32), "half") for name, table in tables.items()}
+    stored = {keys[name]["file"]: image for name, image in files.items()}
     stored["surface_albedo.exr"] = (stored["surface_albedo.exr"][0].reshape(1, PATCHES, 3), "half")
-    changed = replace(made, manifest={**made.manifest, **changing.manifest}, files={**made.files, **stored})
-    changing.method = "transfer"
-    return changed, Surfaces.of(changing)  # type: ignore[arg-type]
+    changed = replace(made, manifest={**made.manifest, **keys}, files={**made.files, **stored})
+    return changed, Surfaces.of_tables(keys, tables)
