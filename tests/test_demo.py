@@ -64,7 +64,7 @@ def test_directions_mean_nothing_inside(tmp_path: Path) -> None:
 def test_a_loft_from_script_to_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("embreex")
     loft = INSIDE["loft"]
-    small = replace(loft, places=loft.places[:1], draft=Amount(48, 150, 1, 4, (40, 30)))
+    small = replace(loft, places=loft.places[:1], draft=Amount(48, 600, 1, 4, (40, 30)))
     monkeypatch.setattr(inside, "INSIDE", {"loft": small})
     monkeypatch.setattr(inside, "write_report", lambda *_args, **_named: tmp_path / "index.html")  # has tests of its own
     for name in ("PLACED", "NEAR", "SPOTS"):
