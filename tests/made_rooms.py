@@ -17,7 +17,7 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import label_cells, surfel_groups
+from srbf.visibility.patches import label_cells, ungrouped
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.surface_cells import Cells, Fragments, lit
 from srbf.visibility.surfels import surfels_of
@@ -203,8 +203,8 @@ def room_of_points(folder: Path, room: Room, count: int, tested: int = 12) -> Ca
     return write_room(folder, room, lights, images, labels)
 
 
-def room_of_surfels(folder: Path, room: Room, count: int, groups: int = 64, tested: int = 12) -> Capture:
-    """A transfer operator traced in a room, about `count` surfels of it in `groups`, and point lights held out."""
+def room_of_surfels(folder: Path, room: Room, count: int, tested: int = 12) -> Capture:
+    """A transfer operator traced in a room, about `count` surfels of it, and point lights held out."""
     transport = room.transport()
     lights: list[dict[str, Any]] = []
     images = []
@@ -217,10 +217,9 @@ def room_of_surfels(folder: Path, room: Room, count: int, groups: int = 64, test
     albedo = np.where(red[:, None], room.albedo[room.places[:, 0] < 1e-6][0], room.albedo[room.places[:, 0] > 1e-6][0])
     occluders = EmbreeTriangles(room.corners)
     surfels = surfels_of(Fragments(corners, albedo.astype(np.float32)), red.astype(np.int64), occluders, room.free, None, count)
-    grouped = surfel_groups(surfels.cells, occluders, room.free, groups)
     told = {"count": surfels.count, "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": ["Walls", "Red wall"]}
-    capture = write_room(folder, room, lights, images, room.patches(groups), surfels=told)
-    write_image(folder / "patches.exr", grouped.cells.image(), "float")
+    capture = write_room(folder, room, lights, images, room.patches(64), surfels=told)
+    write_image(folder / "patches.exr", ungrouped(surfels.cells).cells.image(), "float")
     TransferOperator.traced(surfels, Receivers.of(capture), is_lightmap=False).write(folder, "made")
     return Capture.open(folder)
 

@@ -34,7 +34,6 @@ MOST_NAMES = 4096
 MOST_LIGHTS = 20_000  # of a cloud, or patches
 SURFELS = 5000  # of the transfer operator, about, unless a density is given
 MOST_SURFELS = 8000
-RUN_TIME_SURFELS = 2000  # groups of surfels that a light is measured by
 
 
 @dataclass(frozen=True)
@@ -218,8 +217,8 @@ class CloudSet:
 
     @property
     def patch_count(self) -> int:
-        """How many patches are asked for."""
-        return {"patches": self.count, "cloud": FINGERPRINT_PATCHES, "surfels": RUN_TIME_SURFELS}[self.kind]
+        """How many patches are asked for; surfels are in none."""
+        return FINGERPRINT_PATCHES if self.kind == "cloud" else self.count
 
     def record(self) -> dict[str, Any]:
         """JSON for the manifest, with a checksum of what was found of the scene."""

@@ -450,9 +450,8 @@ class _Passes:
             self._record(event["blender"])
             self._images.require_receiver(event)
         elif kind == "scene":
-            write_light_set(
-                self._folder, self._settings, self._identity
-            )  # before the bake counts as begun: resumed, it has the same lights
+            # before the bake counts as begun: resumed, it has the same lights
+            write_light_set(self._folder, self._settings, self._identity)
             self._record(event["blender"])
             self._facts = event
         elif kind == "file":

@@ -22,7 +22,7 @@ from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import patches_of, surfel_groups
+from srbf.visibility.patches import patches_of, ungrouped
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.surfels import surfels_of
 
@@ -200,7 +200,7 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
         opaque = arrays["transparent"] < 0.5
         surfaces = Fragments(arrays["corners"][opaque], arrays["albedo"][opaque])
         surfels = surfels_of(surfaces, arrays["object"][opaque].astype(np.int64), occluders, free, light_set.spacing, light_set.count)
-        patches = surfel_groups(surfels.cells, occluders, free, light_set.patch_count, seed)
+        patches = ungrouped(surfels.cells)
     else:
         patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)
     if patches.count == 0:

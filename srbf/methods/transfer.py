@@ -141,7 +141,7 @@ class Transfer(LightsInsideMaps):
                 f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
             )
         count = SURFELS if self.surfels == "auto" else int(self.surfels)
-        inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed).cells)
+        inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed))
         if self.editable:  # an object emits by itself
             inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
         received = ReceivedLight(operator.cells, inside.occluders)

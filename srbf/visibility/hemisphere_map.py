@@ -61,7 +61,7 @@ def local_vectors(vectors: Float[ndarray, "n 3"], axes: Axes) -> Float64[ndarray
 
 
 def four_around(place: Float[ndarray, "n 2"], side: int) -> tuple[Int[ndarray, "n 4"], Float64[ndarray, "n 4"]]:
-    """(the texels whose middles are around each place, their bilinear weights); at the border a texel counts twice."""
+    """(the texels whose middles are around each place, their bilinear weights); at the border two of them are the same texel."""
     at = place * side - 0.5
     low = np.floor(at)
     part = at - low

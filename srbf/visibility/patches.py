@@ -54,13 +54,16 @@ def patches_of(surfaces: Fragments, occluders: EmbreeTriangles, free: Float64[nd
     return Patches(cells.with_patches(labels), sides, labels[owner])
 
 
-def surfel_groups(cells: Cells, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"], count: int, seed: int = 0) -> Patches:
-    """Cells in at most `count` groups by which a light is measured, as patches are made; nothing emits."""
+def ungrouped(cells: Cells) -> Patches:
+    """Every cell a patch of its own; nothing emits."""
     nothing = Fragments(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
-    if not len(cells.places):
-        return Patches(cells, nothing, np.zeros(0, np.int64))
+    return Patches(cells.with_patches(np.arange(len(cells.places))), nothing, np.zeros(0, np.int64))
+
+
+def surfel_groups(cells: Cells, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"], count: int, seed: int = 0) -> Cells:
+    """Cells in at most `count` patches by which a light is measured, as `patches_of` groups them."""
     seen = lit(cells.places.astype(np.float64), cells.normals.astype(np.float64), occluders, free)
-    return Patches(cells.with_patches(label_cells(cells, seen, count, seed)), nothing, np.zeros(0, np.int64))
+    return cells.with_patches(label_cells(cells, seen, count, seed))
 
 
 def cell_count(patches: int) -> int:

@@ -7,15 +7,11 @@ import inspect
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-import depth_twins  # noqa: F401  registers its twins
-import many_lights_twins  # noqa: F401
 import numpy as np
-import pca_visibility_twins  # noqa: F401
-import point_shadow_twins  # noqa: F401
 import pytest
-import rounded_twins  # noqa: F401
 from twins import EPS, POINT, SPOT, SUM, TWINS, UNIT, Evaluate, K, M, N, point_light_expression, twin, units, vec4
 
 from srbf.asset import Asset
@@ -31,6 +27,10 @@ from srbf.methods.coefficient_maps import first_function
 from srbf.methods.relighting_map import receiver_weights
 from srbf.sphere import normalize, octahedral_encode
 from srbf.visibility import shadow
+
+for module in sorted(Path(__file__).parent.glob("*_twins.py")):  # which register theirs
+    if module.stem != Path(__file__).stem:
+        importlib.import_module(module.stem)
 
 ROOT = shader_root()
 FUNCTIONS = sorted(p.relative_to(ROOT).as_posix() for p in ROOT.rglob("*.glsl") if p.parent.name != "stages")

@@ -29,12 +29,12 @@ pytest.importorskip("sklearn")
 
 BOX = Room.box((3, 2, 2), 0.25, 0.6)
 APART = Room.box((4, 3, 2.5), 0.25, 0.6, (2.0, 3.0, 3.0))  # a wall without a door
-SETTINGS = Transfer(clusters=8, components=12, rank=96)
+SETTINGS = Transfer(clusters=8, components=12, rank=96, surfels=400)
 
 
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory) -> Capture:
-    return room_of_surfels(tmp_path_factory.mktemp("surfels") / "capture", BOX, 800, 400)
+    return room_of_surfels(tmp_path_factory.mktemp("surfels") / "capture", BOX, 800)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_lights_of_all_kinds_add_up_and_scale(asset: Asset) -> None:
 
 @pytest.mark.slow
 def test_two_rooms_without_a_door_exchange_no_light(tmp_path: Path) -> None:
-    apart = Transfer(clusters=16, rank=96).encode(room_of_surfels(tmp_path / "capture", APART, 1200, 400))
+    apart = Transfer(clusters=16, rank=96, surfels=400).encode(room_of_surfels(tmp_path / "capture", APART, 1200))
     far = (APART.places[:, 0] > 2) | ((np.abs(APART.places[:, 0] - 2) < 1e-6) & (APART.normals[:, 0] > 0))
     lit = linear_response(apart, [light((1.0, 1.5, 1.2))]).reshape(-1, 3)[: len(APART.places)]
     assert np.abs(lit[far]).mean() < 0.005 * lit[~far].mean()

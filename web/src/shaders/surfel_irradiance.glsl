@@ -56,7 +56,7 @@ out vec4 irradiance;
 
 const float NEAR = 8.0;  // sides of a cell, closer than which it is measured by PARTS x PARTS points
 const int PARTS = 4;
-const float TILT = 0.25; // of the nearness of a cell: how much its plane may rise within a texel of a map
+const float TILT = 0.25; // of the nearness of a cell: how much the depth of its plane may vary within one texel of a shadow map
 const float SLACK = 1e-4;
 
 float falling(vec3 lightVector, vec3 normal, float least) {

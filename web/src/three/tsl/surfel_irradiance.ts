@@ -8,7 +8,7 @@ const { abs, clamp, dot, float, Fn, If, int, ivec2, length, max, mix, select, sq
 
 const NEAR = 8; // sides of a cell, closer than which it is measured by PARTS x PARTS points
 const PARTS = 4;
-const TILT = 0.25; // of the nearness of a cell: how much its plane may rise within a texel of a map
+const TILT = 0.25; // of the nearness of a cell: how much the depth of its plane may vary within one texel of a shadow map
 const SLACK = 1e-4;
 
 /** Uniforms of a look, and of its shadow map. */
