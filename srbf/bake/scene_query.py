@@ -199,7 +199,10 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
     if light_set.kind == "surfels":
         opaque = arrays["transparent"] < 0.5
         surfaces = Fragments(arrays["corners"][opaque], arrays["albedo"][opaque])
-        surfels = surfels_of(surfaces, arrays["object"][opaque].astype(np.int64), occluders, free, light_set.spacing, light_set.count)
+        front = arrays["emission"][opaque]
+        emission = np.stack([front, np.where(arrays["one_sided"][opaque, None] > 0.5, 0, front)])
+        objects = arrays["object"][opaque].astype(np.int64)
+        surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, light_set.count, emission)
         patches = ungrouped(surfels.cells)
     else:
         patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)

@@ -22,10 +22,11 @@ from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HE
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, setting
-from srbf.methods.surface_changes import FILES, Surfaces
+from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, emitted_by_objects
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
 from srbf.visibility.received import ReceivedLight
+from srbf.visibility.surface_cells import DARK
 from srbf.visibility.transfer_basis import MOST_RANK, TransferBasis, grouped, training_light, transfer_basis
 from srbf.visibility.transfer_operator import TransferOperator
 
@@ -86,7 +87,7 @@ class Transfer(LightsInsideMaps):
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
     takes_objects: ClassVar[bool] = True
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES}
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES, **EMISSION_FILE}
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
@@ -141,14 +142,19 @@ class Transfer(LightsInsideMaps):
                 f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
             )
         count = SURFELS if self.surfels == "auto" else int(self.surfels)
-        inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed))
+        measured = (
+            np.full(len(operator.objects), True) if self.editable else operator.cells.albedo.max(axis=1) >= DARK
+        )  # what light bounces off
+        cells = operator.cells.at(measured)
+        inside = replace(inside, cells=surfel_groups(cells, inside.occluders, inside.free, count, self.seed))
         if self.editable:  # an object emits by itself
             inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
         received = ReceivedLight(operator.cells, inside.occluders)
         lit = training_light(operator, received, inside.free, self.seed)
         most = max(1, min(MOST_RANK, MOST_BYTES // (12 * capture.width * capture.height)))
         asked = None if self.rank == "auto" else int(self.rank)
-        basis = transfer_basis(operator, lit, asked, self.seed, capture.manifest["surfels"].get("bounces"), most)
+        emitted = emitted_by_objects(operator) if self.editable else None
+        basis = transfer_basis(operator, lit, asked, self.seed, capture.manifest["surfels"].get("bounces"), most, emitted)
         rank = basis.shapes.shape[1]
         asset = encode_table(
             self, _of_shapes(capture, basis), replace(run, on_image=QUIET.on_image), np.eye(rank), self.clusters, self.seed
@@ -157,13 +163,13 @@ class Transfer(LightsInsideMaps):
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
         count = inside.cells.patch_count
-        own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
+        own = np.stack([grouped(basis.transfer[:, measured, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
         if self.editable:
             told = capture.manifest["surfels"]
             names = tuple(told.get("objects", ()))
-            Surfaces.of_basis(basis, operator.cells, inside.cells.patches, operator.objects, names, told.get("bounces")).add_to(asset)
+            Surfaces.of_basis(basis, operator, inside.cells.patches, names, told.get("bounces")).add_to(asset)
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)

@@ -8,6 +8,7 @@ matrix product with its direct irradiance e on the surfels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy import ndarray
@@ -19,6 +20,9 @@ from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
 
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
 PLACED, NEAR, SPOTS = 700, 250, 250  # lights that the shapes are made for
 NEAR_RANGE = (0.03, 0.12)  # m from a surface
 CONE = (0.25, 0.7)  # rad, half-angles
@@ -27,6 +31,7 @@ POWER_STEPS = 1
 RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
 MOST_RANK = 768
 NORM_TEXELS = 2048
+EMITTED = 4  # lights of equal norm that an object which emits counts as
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
 
 
@@ -70,10 +75,12 @@ def transfer_basis(
     seed: int = 0,
     most_bounces: int | None = None,
     most_rank: int = MOST_RANK,
+    emitted: Float32[ndarray, "S M 3"] | None = None,
 ) -> TransferBasis:
     """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out RANK_ERROR, or `most_rank`.
 
-    `most_bounces`: reflections that light has at most; None: all of them. The pictures are never formed: their axes come from random
+    `most_bounces`: reflections that light has at most; None: all of them. `emitted`: radiosity of M objects by themselves, each of which
+    counts as EMITTED lights. The pictures are never formed: their axes come from random
     mixtures of them [Halko2011]. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
@@ -84,10 +91,13 @@ def transfer_basis(
     lit = np.flatnonzero(np.diff(form_factors.indptr))
     some = form_factors[lit[:: max(1, len(lit) // NORM_TEXELS)]]
     radiosity = []
-    for one in bounces:
-        own = one.radiosity(irradiance)
-        norm = np.sqrt(((some @ own) ** 2).sum(axis=0))
-        radiosity.append(own / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)))
+    for channel, one in enumerate(bounces):
+        own = _of_unit_norm(one.radiosity(irradiance), some)
+        if emitted is not None:
+            first = np.ascontiguousarray(emitted[:, :, channel])
+            shining = first + one.radiosity(np.asarray(exchange @ first, np.float32))
+            own = np.concatenate([own, np.float32(np.sqrt(EMITTED)) * _of_unit_norm(shining, some)], axis=1)
+        radiosity.append(own)
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
     if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
         raise InputError(
@@ -112,6 +122,12 @@ def transfer_basis(
     sent = exchange @ mixture
     feedback = np.stack([gather.astype(np.float64) @ (cells.albedo[:, c, None] * sent) for c in range(3)], axis=2)
     return TransferBasis(axes * scale, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
+
+
+def _of_unit_norm(radiosity: Float32[ndarray, "S n"], receivers: csr_array) -> Float32[ndarray, "S n"]:
+    """Lights whose pictures have unit norm; those that next to nothing arrives of stay dark."""
+    norm = np.sqrt(((receivers @ radiosity) ** 2).sum(axis=0))
+    return radiosity / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)).astype(np.float32)
 
 
 def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray) -> int:
