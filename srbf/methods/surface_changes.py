@@ -18,7 +18,7 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.errors import InputError
 from srbf.solve.radiosity import MOST_REFLECTED, SERIES
-from srbf.visibility.transfer_basis import TransferBasis, grouped
+from srbf.visibility.transfer_basis import Emitted, TransferBasis, grouped
 from srbf.visibility.transfer_operator import TransferOperator
 
 KEY = "surfaces"
@@ -30,6 +30,7 @@ FILES = {
     "surface_albedo": "surface_albedo.exr",
 }
 EMISSION = "surface_emission"  # which older assets lack
+SHINING, MAY_SHINE = 16.0, 4.0  # lights that an object counts as among those that shapes are made for
 EMISSION_FILE = {EMISSION: "surface_emission.exr"}
 
 
@@ -64,8 +65,8 @@ class Surfaces:
         albedo = grouped(np.ascontiguousarray(cells.albedo.T) * cells.areas, groups, count) / area
         shares = grouped(owned.astype(np.float32), groups, count) / area
         feedback = basis.feedback.astype(np.float32)
-        emitted = emitted_by_objects(operator)
-        emission = np.stack([basis.gather @ np.ascontiguousarray(emitted[:, :, c]) for c in range(3)], axis=2)
+        radiosity = emitted_by_objects(operator).radiosity
+        emission = np.stack([basis.gather @ np.ascontiguousarray(radiosity[:, :, c]) for c in range(3)], axis=2)
         return Surfaces(
             grouped(basis.gather, groups, count),
             sent,
@@ -201,10 +202,11 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     return changed
 
 
-def emitted_by_objects(operator: TransferOperator) -> Float32[ndarray, "S O 3"]:
-    """Radiosity of the surfels of each object that has any, in order of number, if it emits a mean radiance of 1 by itself.
+def emitted_by_objects(operator: TransferOperator) -> Emitted:
+    """What each object that has surfels, in order of number, emits by itself: a mean radiance of 1.
 
-    The mean is over its surfels that emit, of each color; an object that emits nothing, or nothing of a color, emits evenly.
+    The mean is over its surfels that emit, of each color; an object that emits nothing, or nothing of a color, emits evenly. Those that
+    emit in the scene count as more lights.
     """
     having, owner = np.unique(operator.objects, return_inverse=True)
     owner, areas = owner.ravel(), operator.cells.areas.astype(np.float64)
@@ -218,7 +220,7 @@ def emitted_by_objects(operator: TransferOperator) -> Float32[ndarray, "S O 3"]:
         lit = mean[owner] > 0
         pattern = np.where(lit, operator.emission[:, c] / np.maximum(mean[owner], 1e-30), shines)
         result[np.arange(len(owner)), owner, c] = np.pi * pattern
-    return result
+    return Emitted(result, np.where(some, SHINING, MAY_SHINE))
 
 
 def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:

@@ -103,7 +103,7 @@ def surfels_of(
     kept = np.flatnonzero(both.areas > 0)
     seen = np.zeros(len(both.corners), bool)
     seen[kept[exposed(both.at(kept), occluders, free)]] = True
-    kept = kept[(reached(both, seen) | _lights_others(both, object_of, shines))[kept]]
+    kept = kept[reached(both, seen | _lights_others(both, object_of, shines))[kept]]
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
         nothing = Cells.of_image(np.zeros((2, 0, 4), np.float32))

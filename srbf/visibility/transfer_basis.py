@@ -31,7 +31,6 @@ POWER_STEPS = 1
 RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
 MOST_RANK = 768
 NORM_TEXELS = 2048
-EMITTED = 4  # lights of equal norm that an object which emits counts as
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
 
 
@@ -48,6 +47,14 @@ class TransferBasis:
     gather: Float32[ndarray, "r S"]
     sent: Float32[ndarray, "S r"]
     feedback: Float64[ndarray, "r r 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Emitted:
+    """Radiosity of the surfels under each of M objects that emit by themselves, and how many lights each counts as."""
+
+    radiosity: Float32[ndarray, "S M 3"]
+    counts: Float64[ndarray, " M"]
 
 
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
@@ -68,35 +75,44 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
     return np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
 
 
+Exchange = tuple[Float32[ndarray, "S S"], list[Bounces]]
+
+
+def exchange_of(operator: TransferOperator, most_bounces: int | None = None) -> Exchange:
+    """(reciprocal form factors between the surfels, bounces of each color); `most_bounces`: reflections at most, None: all of them."""
+    exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas)
+    return exchange, [Bounces(exchange, operator.cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
+
+
 def transfer_basis(
     operator: TransferOperator,
     irradiance: Float32[ndarray, "S V"],
+    exchanged: Exchange,
     rank: int | None = None,
     seed: int = 0,
-    most_bounces: int | None = None,
     most_rank: int = MOST_RANK,
-    emitted: Float32[ndarray, "S M 3"] | None = None,
+    emitted: Emitted | None = None,
+    left_out: float = RANK_ERROR,
 ) -> TransferBasis:
-    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out RANK_ERROR, or `most_rank`.
+    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out `left_out`, or `most_rank`.
 
-    `most_bounces`: reflections that light has at most; None: all of them. `emitted`: radiosity of M objects by themselves, each of which
-    counts as EMITTED lights. The pictures are never formed: their axes come from random
+    `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many
+    lights. The pictures are never formed: their axes come from random
     mixtures of them [Halko2011]. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
     form_factors = operator.receivers
     cells = operator.cells
-    exchange = reciprocal(operator.exchange.toarray(), cells.areas)
-    bounces = [Bounces(exchange, cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
+    exchange, bounces = exchanged
     lit = np.flatnonzero(np.diff(form_factors.indptr))
     some = form_factors[lit[:: max(1, len(lit) // NORM_TEXELS)]]
     radiosity = []
     for channel, one in enumerate(bounces):
         own = _of_unit_norm(one.radiosity(irradiance), some)
         if emitted is not None:
-            first = np.ascontiguousarray(emitted[:, :, channel])
-            shining = first + one.radiosity(np.asarray(exchange @ first, np.float32))
-            own = np.concatenate([own, np.float32(np.sqrt(EMITTED)) * _of_unit_norm(shining, some)], axis=1)
+            first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
+            shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), some)
+            own = np.concatenate([own, np.sqrt(emitted.counts).astype(np.float32) * shining], axis=1)
         radiosity.append(own)
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
     if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
@@ -111,7 +127,8 @@ def transfer_basis(
         found = np.linalg.qr(form_factors @ (lights @ (lights.T @ (form_factors.T @ found))))[0]
     left, values, _ = np.linalg.svd((form_factors.T @ found).T @ lights, full_matrices=False)
     axes = found @ left
-    count = most if rank is not None else _enough(axes[:, :most], form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES))))
+    mixtures = form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES)))
+    count = most if rank is not None else _enough(axes[:, :most], mixtures, left_out)
     values = np.maximum(values[:count], 1e-7 * max(float(values[0]), 1e-30))
     axes = axes[:, :count]
     share = np.float32(max(1, len(lit)) / max(1, lights.shape[1]))
@@ -130,11 +147,11 @@ def _of_unit_norm(radiosity: Float32[ndarray, "S n"], receivers: csr_array) -> F
     return radiosity / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)).astype(np.float32)
 
 
-def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray) -> int:
-    """How many of the axes leave RANK_ERROR of the pictures, by norm."""
+def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray, left_out: float) -> int:
+    """How many of the axes leave no more than that share of the pictures, by norm."""
     energy = float((pictures.astype(np.float64) ** 2).sum())
     kept = np.cumsum(((axes.T @ pictures).astype(np.float64) ** 2).sum(axis=1))
-    return min(len(kept), int(np.searchsorted(kept, (1 - RANK_ERROR**2) * energy)) + 1)
+    return min(len(kept), int(np.searchsorted(kept, (1 - left_out**2) * energy)) + 1)
 
 
 def grouped(values: Float32[ndarray, "r S"], groups: Int[ndarray, " S"], count: int) -> Float32[ndarray, "r G"]:

@@ -22,7 +22,7 @@ from srbf.methods.transfer import Transfer
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.received import ReceivedLight
-from srbf.visibility.transfer_basis import grouped, training_light, transfer_basis
+from srbf.visibility.transfer_basis import exchange_of, grouped, training_light, transfer_basis
 from srbf.visibility.transfer_operator import OPERATOR_FILE, TransferOperator, is_traced
 
 pytest.importorskip("embreex")
@@ -101,7 +101,7 @@ def test_full_rank_is_the_operator(capture: Capture) -> None:
     operator, inside = TransferOperator.read(capture.folder), CloudLights.of(capture)
     received = ReceivedLight(operator.cells, inside.occluders)
     lights = training_light(operator, received, inside.free)[:, :40]
-    basis = transfer_basis(operator, lights, 120)
+    basis = transfer_basis(operator, lights, exchange_of(operator), 120)
     exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas)
     for c in range(3):
         exact = operator.receivers @ Bounces(exchange, operator.cells.albedo[:, c].astype(np.float64)).radiosity(lights)
@@ -113,7 +113,7 @@ def test_shapes_on_surfels_are_those_on_receivers(capture: Capture) -> None:
     """With feedback and gather, as changed albedo needs them: one bounce more each round."""
     operator, inside = TransferOperator.read(capture.folder), CloudLights.of(capture)
     lights = training_light(operator, ReceivedLight(operator.cells, inside.occluders), inside.free)
-    basis = transfer_basis(operator, lights, 160)
+    basis = transfer_basis(operator, lights, exchange_of(operator), 160)
     for c in range(3):
         direct = operator.cells.albedo[:, c : c + 1] * lights[:, :8]
         weights = np.linalg.solve(np.eye(len(basis.gather)) - basis.feedback[:, :, c], basis.gather @ direct)
@@ -192,7 +192,7 @@ def test_an_object_emits_in_the_pattern_of_the_scene(capture: Capture) -> None:
     red, areas = operator.objects == 1, operator.cells.areas
     pattern = np.where((red & (operator.cells.places[:, 2] < 1))[:, None], np.array([4.0, 1.0, 0.0]), 0).astype(np.float32)
     pattern[:, 0] *= operator.cells.places[:, 1]
-    found = emitted_by_objects(replace(operator, emission=pattern))
+    found = emitted_by_objects(replace(operator, emission=pattern)).radiosity
     walls, half = found[:, 0], pattern.any(axis=1)
     np.testing.assert_allclose(walls, np.pi * np.broadcast_to(~red[:, None], walls.shape), rtol=1e-6)
     means = areas @ found[:, 1] / areas[half].sum()

@@ -96,9 +96,11 @@ def test_the_back_of_what_emits_lights_the_wall_behind() -> None:
     emission = np.broadcast_to((objects == 1)[None, :, None], (2, len(corners), 3)).astype(np.float32)
     albedo = np.full((len(corners), 3), 0.5, np.float32)
     free = np.random.default_rng(0).uniform([0.4, 0.4, 0.3], [0.6, 0.6, 0.5], (64, 3))
-    for numbers, sides in ((objects, {-1, 1}), (0 * objects, {1})):
+    for numbers, sides in ((objects, {-1, 1}), (0 * objects, {1})):  # a picture; a closed thing of one object
         found = surfels_of(Fragments(corners, albedo), numbers, EmbreeTriangles(corners), free, None, 200, emission)
         assert set(np.sign(found.cells.normals[found.emission.any(axis=1), 2])) == sides
+        behind = (found.cells.places[:, 2] < 1e-3) & (np.abs(found.cells.places[:, :2] - 0.5) < 0.15).all(axis=1)
+        assert behind.any() == (len(sides) == 2), "and so has the wall that it lights"
 
 
 def test_no_more_surfels_than_asked() -> None:
