@@ -9,7 +9,8 @@ from typing import Any
 
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet
 from srbf.bake.settings import BakeSettings
-from srbf.capture import Capture
+from srbf.bake.surface_checks import warn_of_receivers
+from srbf.capture import COVERED, Capture
 from srbf.io.image import write_image
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.transfer_operator import TransferOperator, is_traced
@@ -34,8 +35,13 @@ def write_probes(folder: Path, settings: BakeSettings) -> None:
         settings.receiver.probes.write(folder)
 
 
-def trace_operator(receivers: Capture, settings: BakeSettings, progress: Callable[[int, int, str], None]) -> None:
-    """Form factors of surfels by rays, into the folder of `receivers`, a capture without lights; nothing where they are there already."""
+def trace_operator(
+    receivers: Capture, settings: BakeSettings, progress: Callable[[int, int, str], None], say: Callable[[str], None] = lambda line: None
+) -> None:
+    """Form factors of surfels by rays, into the folder of `receivers`, a capture without lights; nothing where they are there already.
+
+    `say` gets a line where receivers see no surface; InputError where none of them does.
+    """
     light_set = settings.light_set
     if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:
         return
@@ -49,4 +55,5 @@ def trace_operator(receivers: Capture, settings: BakeSettings, progress: Callabl
         settings.seed,
         lambda done, total: progress(done, total, "form factors"),
     )
+    warn_of_receivers(operator, receivers.coverage().ravel() >= COVERED, say)
     operator.write(receivers.folder, key)

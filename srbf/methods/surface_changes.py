@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64, Int
+from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.errors import InputError
@@ -31,6 +31,7 @@ FILES = {
 }
 EMISSION = "surface_emission"  # which older assets lack
 SHINING, MAY_SHINE = 16.0, 4.0  # lights that an object counts as among those that shapes are made for
+SHARP = 2.0
 EMISSION_FILE = {EMISSION: "surface_emission.exr"}
 
 
@@ -221,6 +222,17 @@ def emitted_by_objects(operator: TransferOperator) -> Emitted:
         pattern = np.where(lit, operator.emission[:, c] / np.maximum(mean[owner], 1e-30), shines)
         result[np.arange(len(owner)), owner, c] = np.pi * pattern
     return Emitted(result, np.where(some, SHINING, MAY_SHINE))
+
+
+def beside_what_shines(operator: TransferOperator) -> Bool[ndarray, " P"]:
+    """Receivers that are much brighter than others under an object that emits in the scene, SHARP times the rms by its own light."""
+    shines = operator.emission.any(axis=1)
+    found = np.zeros(operator.receivers.shape[0], bool)
+    for number in np.unique(operator.objects[shines]):
+        light = operator.receivers @ np.where((operator.objects == number)[:, None], operator.emission, 0).mean(axis=1)
+        lit = np.diff(operator.receivers.indptr) > 0
+        found |= light > SHARP * np.sqrt((light[lit] ** 2).mean())
+    return found
 
 
 def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:

@@ -22,7 +22,7 @@ from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HE
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, check_error, setting
-from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, emitted_by_objects
+from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, beside_what_shines, emitted_by_objects
 from srbf.methods.transfer_choice import Judges, Sizes, fit_for_error, truncated
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
@@ -166,8 +166,10 @@ class Transfer(LightsInsideMaps):
         basis = transfer_basis(operator, lit, (exchange, bounces), asked, self.seed, most, emitted, left_out)
         silent = replace(run, on_image=QUIET.on_image)
 
+        sharp = beside_what_shines(operator) if self.editable else None
+
         def encode(basis: TransferBasis, cells: Cells, components: int) -> Asset:
-            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured)
+            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured, sharp)
 
         if self.error is None:
             cells = cells_of(SURFELS if self.surfels == "auto" else int(self.surfels))
@@ -188,10 +190,18 @@ class Transfer(LightsInsideMaps):
         self.add_visibility(asset, inside)
         return asset
 
-    def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
+    def _of_basis(
+        self,
+        capture: Capture,
+        run: FitRun,
+        basis: TransferBasis,
+        cells: Cells,
+        measured: Bool[ndarray, " S"],
+        sharp: Bool[ndarray, " P"] | None,
+    ) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
         rank = basis.shapes.shape[1]
-        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed)
+        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed, sharp=sharp)
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
