@@ -23,8 +23,8 @@ WALL, DOOR = 1.0, (0.2, 2.2)  # x of the wall; y where it ends, and of the room'
 SHIFT = np.array([-1.0, -0.8, 0.0], np.float32)  # of `in_a_room`
 RANK, PATCHES = 17, 90
 LIGHTS: dict[str, Light] = {
-    "point": PointLight((-0.29, 0.03, 1.37), (1.0, 0.5, 2.0), falloff="inverse-square"),
-    "close": PointLight((-0.88, 1.33, 0.87), (0.5, 1.0, 0.7), a0=0.6),
+    "point": PointLight((-0.29, -0.12, 1.33), (1.0, 0.5, 2.0), falloff="inverse-square"),
+    "close": PointLight((-0.87, 1.25, 0.85), (0.5, 1.0, 0.7), a0=0.6),
     "spot": SpotLight(
         (-0.4, 0.3, 1.4), (2.0, 1.5, 1.0), falloff="inverse-square", direction=(0.8, -0.36, -0.48), inner=0.3, outer=0.8
     ),
