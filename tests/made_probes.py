@@ -1,4 +1,4 @@
-"""Probes in a made room, with a thin wall between some of them and nodes that have no probe of their own; and their light as shaders take it."""
+"""Probes in a made room, a thin wall between some of them, and nodes that have no probe of their own; and their light for shaders."""
 
 from __future__ import annotations
 
