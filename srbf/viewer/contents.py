@@ -95,8 +95,9 @@ def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):
+            advice = "view them apart" if assets[0].probes is asset.probes else "name the one of probes by `probes`"
             raise InputError(
-                f"expected assets of one capture, found {kind(assets[0])} in {folders[0]} and {kind(asset)} in {folder}; view them apart"
+                f"expected assets of one capture, found {kind(assets[0])} in {folders[0]} and {kind(asset)} in {folder}; {advice}"
             )
 
 
