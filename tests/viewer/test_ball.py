@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,8 +16,10 @@ from cloud_assets import PLACES, Room, room, with_table, with_transfer
 from probe_assets import probes_of_room, write_probes
 from test_page import HEIGHT, PANEL, WIDTH, shown_as
 from test_web_cloud import POINT, received
+from typer.testing import CliRunner
 
 from srbf.asset import Asset
+from srbf.cli import app
 from srbf.errors import InputError
 from srbf.probe_grid import ProbeGrid
 from srbf.relighting.probe_light import harmonics, light_at
@@ -89,6 +93,15 @@ def test_a_sphere_is_lit_dragged_and_hidden(
     assert np.abs(middle(chromium) - shown_as(np.full(3, direct), -1.0)).max() < CLOSE
     shown(chromium, terms="direct", exposure=-1.0, ball={"on": False, "position": AT, "size": SIZE})
     assert np.abs(middle(chromium) - shown_as(np.full(3, direct), -1.0)).max() > 10, "it is hidden"
+
+
+def test_the_command_takes_probes_with_it(folders: tuple[Path, Path], built: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(app, ["view", str(folders[0]), "--probes", str(folders[1]), "--save", str(page)])
+    assert done.exit_code == 0, done.output
+    held = json.loads(re.search(r'id="held">(.+?)</script>', page.read_text())[1])  # type: ignore[index]
+    told = json.loads(base64.b64decode(held["viewer.json"]))
+    assert told["probes"] == "probes/" and {"probes/asset.json", "probes/probes.exr", "probes/probe_nearness.exr"} < set(held)
 
 
 def test_what_are_no_probes_of_the_lightmap_is_named(folders: tuple[Path, Path], built: Path, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import { rounded } from "./light_state";
 import type { Changed, State } from "./state";
 
 interface View {
-  /** Distance along the axis of sight of the sphere where a place of the canvas (CSS pixels) shows it; undefined elsewhere. */
+  /** Whether a place of the canvas (CSS pixels) shows the sphere. */
   ballAt(x: number, y: number): boolean;
   /** The place under (x, y) of the plane through `through` that faces the eye. */
   onPlane(x: number, y: number, through: Triple): Triple | undefined;
