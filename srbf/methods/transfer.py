@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64, Int
+from srbf.arrays import Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
@@ -31,7 +31,8 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
 SURFELS, MOST_SURFELS = 3000, 8000
-BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
+BITS = 9  # of a weight, sign included, by the largest of its row: what has few bits packs well
+VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
 TEXELS_PER_CLUSTER = 24  # at least, of a candidate
@@ -93,7 +94,7 @@ class Transfer(LightsInsideMaps):
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
-    smooth: bool = setting(True, "Take the noise of few rays out of the components.")
+    smooth: bool = setting(False, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     visibility: str = setting("none", VISIBILITY_HELP)
     receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
@@ -156,6 +157,7 @@ class Transfer(LightsInsideMaps):
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
+        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
         count = inside.cells.patch_count
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
@@ -214,6 +216,14 @@ def _rounded(values: Float32[ndarray, "r S 3"]) -> Float32[ndarray, "r S 3"]:
     largest = np.maximum(np.abs(values).max(axis=1, keepdims=True), np.float32(1e-30))
     step = np.exp2(np.ceil(np.log2(largest / (2 ** (BITS - 1) - 1))))
     return (np.round(values / step) * step).astype(np.float32)
+
+
+def _even_steps(values: Float16[ndarray, "F r c"], clusters: int) -> Float16[ndarray, "F r c"]:
+    """Values as multiples of a power of two for each cluster."""
+    of_cluster = values.astype(np.float32).reshape(clusters, -1)
+    rms = np.sqrt((of_cluster**2).mean(axis=1, keepdims=True))
+    step = np.exp2(np.round(np.log2(VALUE_STEP * np.maximum(rms, np.float32(1e-30)))))
+    return (np.round(of_cluster / step) * step).reshape(values.shape).astype(np.float16)
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:
