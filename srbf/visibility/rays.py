@@ -16,7 +16,8 @@ from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
-from srbf.visibility.shadow import rounded_share, transmittance
+from srbf.visibility.shadow import rounded_share
+from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
 from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
 
@@ -28,8 +29,6 @@ SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of
 SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
-RAY_OFFSET = 1e-5  # m, plus this share of the distance from the origin: between a surface and the start of its shadow rays
-MAX_WALLS = 32
 NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
@@ -54,11 +53,7 @@ class RayTracer:
         self._count = max(samples, FIRST_SAMPLES)
         triangles = receivers.triangles
         self._all = EmbreeTriangles(triangles.corners)
-        self._occluders = EmbreeTriangles(triangles.corners[triangles.occluders])
-        self._filters = EmbreeTriangles(triangles.corners[triangles.filters])
-        self._transmittance = triangles.transmittance
-        self._filter_material = triangles.material[triangles.filters]
-        self._filter_normals = triangles.normals[triangles.filters]
+        self._shadow_rays = ShadowRays(triangles)
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
         self._most = max(self._count, MAX_SAMPLES)
@@ -150,35 +145,8 @@ class RayTracer:
         NgL = np.einsum("nc,nc->n", face, direction)
         origin = point + samples.lift[lit] * rounded_share(NoL[lit], NgL)[:, None]
         origin += face * (np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1)))[:, None]
-        visible[lit] *= self._passed(origin, direction, None if rays.distance is None else rays.distance[lit])
+        visible[lit] *= self._shadow_rays.passed(origin, direction, None if rays.distance is None else rays.distance[lit])
         sums.add(samples.texel, samples.share, rays.importance, visible, rays.irradiance)
-
-    def _passed(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Float32[ndarray, "n 3"]:
-        """Transmittance of each ray: 0 behind opaque surfaces, else the product over the walls on the way."""
-        free = ~self._occluders.occluded(origin, direction, distance)
-        passed = np.repeat(free.astype(np.float32)[:, None], 3, axis=1)
-        if not len(self._filter_material):
-            return passed
-        active = np.flatnonzero(free)
-        start = origin[active].copy()
-        left = None if distance is None else distance[active].copy()
-        for _ in range(MAX_WALLS):
-            hit, far, bary = self._filters.first_hit(start, direction[active])
-            meets = (hit >= 0) if left is None else (hit >= 0) & (far < left)
-            active, start, far, hit, bary = active[meets], start[meets], far[meets], hit[meets], bary[meets]
-            if not len(active):
-                break
-            passed[active] *= self._wall(hit, bary, direction[active])
-            step = far + RAY_OFFSET * (1 + np.abs(start).max(axis=1))
-            start = start + direction[active] * step[:, None]
-            left = None if left is None else left[meets] - step
-        return passed
-
-    def _wall(self, wall: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
-        """Transmittance of one wall at the angle of each ray."""
-        normal = np.einsum("nk,nkc->nc", bary, self._filter_normals[wall])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        return transmittance(self._transmittance[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
