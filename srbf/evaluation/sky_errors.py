@@ -65,7 +65,7 @@ def sky_errors(asset: Asset, capture: Capture, skies: int = SKIES, seed: int = 0
     0.03
     """
     operator = TransferOperator.read(capture.folder) if "surfels" in capture.manifest else None
-    if operator is None or operator.surfels_sky is None or not has_sky(asset):
+    if operator is None or operator.sky is None or not has_sky(asset):
         raise InputError("expected an asset and a capture of surfels that see the sky, found others; bake and fit an open scene")
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
@@ -87,8 +87,8 @@ def _relit(asset: Asset, lights: list[EnvironmentLight]) -> Float32[ndarray, "n 
 
 def _pictures(operator: TransferOperator, capture: Capture, lights: list[EnvironmentLight]) -> Float32[ndarray, "n P 3"]:
     """The bounces of each sky by the form factors themselves, in the capture's quantity."""
-    assert operator.surfels_sky is not None
-    sky, cells = operator.surfels_sky, operator.cells
+    assert operator.sky is not None
+    sky, cells = operator.sky, operator.cells
     received = np.stack([sky.irradiance(cell_radiance(light, sky.side)) for light in lights], axis=1).astype(np.float32)  # (S, n, 3)
     exchange, most = reciprocal(operator.exchange.toarray(), cells.areas), capture.manifest["surfels"].get("bounces")
     radiosity = [Bounces(exchange, cells.albedo[:, c].astype(np.float64), most).radiosity(received[:, :, c]) for c in range(3)]

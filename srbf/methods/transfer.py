@@ -162,8 +162,8 @@ class Transfer(LightsInsideMaps):
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
-        if operator.surfels_sky is not None:
-            add_sky(asset, _rounded(sky_columns(basis.transfer, operator.surfels_sky)), operator.surfels_sky)
+        if operator.sky is not None:
+            add_sky(asset, _rounded(sky_columns(basis.transfer, operator.sky)), operator.sky)
         if self.editable:
             told = capture.manifest["surfels"]
             names = tuple(told.get("objects", ()))

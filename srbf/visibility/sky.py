@@ -81,12 +81,6 @@ class SkyRows:
         sums = np.bincount(own * count + part, self.shares.mean(axis=1), (len(self.starts) - 1) * count).reshape(-1, count)
         return sums[:, sums.any(axis=0)].astype(np.float32)
 
-    def spread_over(self, rows: Int[ndarray, " n"], count: int) -> SkyRows:
-        """The same as the rows `rows`, ascending, of `count`; the others are empty."""
-        sizes = np.zeros(count + 1, np.int64)
-        sizes[rows + 1] = np.diff(self.starts)
-        return SkyRows(np.cumsum(sizes), self.cells, self.shares, self.side)
-
     @staticmethod
     def none(count: int, channels: int = 1, side: int = SIDE) -> SkyRows:
         """`count` rows without sky."""

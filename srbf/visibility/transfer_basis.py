@@ -61,7 +61,7 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         outer = float(rng.uniform(*CONE))
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
     inside = np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
-    return inside if operator.surfels_sky is None else np.concatenate([inside, operator.surfels_sky.parts()], axis=1)
+    return inside if operator.sky is None else np.concatenate([inside, operator.sky.parts()], axis=1)
 
 
 def transfer_basis(

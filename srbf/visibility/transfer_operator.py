@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -16,7 +16,7 @@ from srbf.errors import ImageError
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.form_factors import RayOrigins, factors_and_sky
+from srbf.visibility.form_factors import RayOrigins, factors_and_sky, form_factors
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.sky import Openings, SkyRows
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 SURFELS_FILE = "surfels.exr"
 OPERATOR_FILE = "operator.npz"
-SKIES = ("receivers_sky", "surfels_sky")
 POINTS = 16  # of a receiver, and of a surfel
 RAYS, FEWEST_RAYS, MOST_RAYS = 1.5e8, 768, 3072  # of all receivers; of each
 SURFEL_RAYS = 2048
@@ -41,15 +40,14 @@ class TransferOperator:
     """Form factors from P receivers (P, S) and from surfels (S, S) to S surfels, sparse, float32.
 
     Irradiance at receivers is `receivers` times the radiosity of the surfels. `objects` (S,): the number of each surfel's object.
-    `receivers_sky`, `surfels_sky`: what both see of the sky; None where no ray left the scene, or the capture is older than these.
+    `sky`: what the surfels see of it, S rows; None where no ray left the scene, or the capture is older than this.
     """
 
     cells: Cells
     objects: Int[ndarray, " S"]
     receivers: csr_array
     exchange: csr_array
-    receivers_sky: SkyRows | None = None
-    surfels_sky: SkyRows | None = None
+    sky: SkyRows | None = None
 
     @staticmethod
     def traced(
@@ -64,26 +62,20 @@ class TransferOperator:
         rays = int(np.clip(RAYS / max(1, len(chosen)), FEWEST_RAYS, MOST_RAYS))
         points = _LightmapPoints(receivers, seed) if is_lightmap else _Centers(receivers)
         total = len(chosen) + surfels.count
-        openings = Openings(receivers.triangles)
         parts = [csr_array((0, surfels.count), dtype=np.float32)]
-        skies = [SkyRows.none(0, openings.channels)]
         for start in range(0, len(chosen), RECEIVERS):
             rows = chosen[start : start + RECEIVERS]
             origins = points.origins(rows)
-            factors, sky = factors_and_sky(surfels, openings, origins, rays // origins.weights.shape[1], _hash(seed, start))
-            parts.append(factors)
-            skies.append(sky)
+            parts.append(form_factors(surfels, origins, rays // origins.weights.shape[1], _hash(seed, start)))
             progress(start + len(rows), total)
         spread = RayOrigins.even(*surfels.spread(POINTS, seed))
-        own, own_sky = factors_and_sky(surfels, openings, spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
+        own, sky = factors_and_sky(surfels, Openings(receivers.triangles), spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)
         counts[chosen + 1] = np.diff(traced.indptr)
         every = csr_array((traced.data, traced.indices, np.cumsum(counts)), shape=(texels, surfels.count))
-        sky = SkyRows.stacked(skies).spread_over(chosen, texels)
-        seen = (one if len(one.cells) else None for one in (sky, own_sky))
-        return TransferOperator(surfels.cells, surfels.objects, every, own, *seen)
+        return TransferOperator(surfels.cells, surfels.objects, every, own, sky if len(sky.cells) else None)
 
     def write(self, folder: Path, key: str) -> None:
         """surfels.exr, three rows (x, y, z, area), (normal, patch), (albedo, object), and operator.npz; `key` tells what they are of."""
@@ -95,11 +87,9 @@ class TransferOperator:
             arrays[f"{name}_starts"] = matrix.indptr.astype(np.int64)
             arrays[f"{name}_surfels"] = matrix.indices.astype(np.uint16)
             arrays[f"{name}_shares"] = matrix.data.astype(np.float16)
-        for name in SKIES:
-            sky: SkyRows | None = getattr(self, name)
-            if sky is not None:
-                arrays |= {f"{name}_starts": sky.starts, f"{name}_side": np.array(sky.side)}
-                arrays |= {f"{name}_cells": sky.cells.astype(np.uint16), f"{name}_shares": sky.shares.astype(np.float16)}
+        if self.sky is not None:
+            cells, shares = self.sky.cells.astype(np.uint16), self.sky.shares.astype(np.float16)
+            arrays |= {"sky_side": np.array(self.sky.side), "sky_starts": self.sky.starts, "sky_cells": cells, "sky_shares": shares}
         with files.atomic_path(folder / OPERATOR_FILE) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, key=np.array(key), **arrays)
 
@@ -114,7 +104,6 @@ class TransferOperator:
             raise ImageError(f"expected 3 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again with `force=True`")
         count = image.shape[1]
         found = {}
-        skies: dict[str, SkyRows] = {}
         try:
             with np.load(path) as stored:
                 for name in ("receivers", "exchange"):
@@ -122,14 +111,21 @@ class TransferOperator:
                     if surfels.max(initial=0) >= count:
                         raise ImageError(f"expected surfels below {count} in {path}, found {surfels.max()}; bake again with `force=True`")
                     found[name] = csr_array((shares.astype(np.float32), surfels.astype(np.int32), starts), shape=(len(starts) - 1, count))
-                for name in SKIES:
-                    if f"{name}_starts" in stored:
-                        starts, own, shares = (stored[f"{name}_{part}"] for part in ("starts", "cells", "shares"))
-                        skies[name] = SkyRows(starts, own.astype(np.int64), shares.astype(np.float32), int(stored[f"{name}_side"]))
+                sky = _read_sky(stored, path)
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
-        return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), found["receivers"], found["exchange"], **skies)
+        return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), found["receivers"], found["exchange"], sky)
+
+
+def _read_sky(stored: Any, path: Path) -> SkyRows | None:
+    """None where the file has none."""
+    if "sky_starts" not in stored:
+        return None
+    side, starts, cells, shares = (stored[f"sky_{part}"] for part in ("side", "starts", "cells", "shares"))
+    if cells.max(initial=0) >= side**2:
+        raise ImageError(f"expected cells of the sky below {side**2} in {path}, found {cells.max()}; bake again with `force=True`")
+    return SkyRows(starts, cells.astype(np.int64), shares.astype(np.float32), int(side))
 
 
 def is_traced(folder: Path, key: str) -> bool:
