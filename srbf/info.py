@@ -127,9 +127,9 @@ def light_facts(asset: Asset) -> dict[str, Any]:
         told = manifest["position_table"]
         size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith("position_"))
         facts["position_table"] = {"nodes": told["nodes"], "spacing": told["spacing"], "rank": told["rank"], "bytes": size}
-    if "sky_transfer" in manifest:
-        told = manifest["sky_transfer"]
-        facts["sky"] = {"cells": len(told["cells"]), "of": told["side"] ** 2, "bytes": asset.tables["sky_transfer"].nbytes}
+    if "environment_transfer" in manifest:
+        told = manifest["environment_transfer"]
+        facts["environment"] = {"cells": len(told["cells"]), "of": told["side"] ** 2, "bytes": asset.tables["environment_transfer"].nbytes}
     for kind in SETS:
         if kind in manifest:
             told = manifest[kind]

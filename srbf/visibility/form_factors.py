@@ -11,8 +11,8 @@ from numpy import ndarray
 
 from srbf.arrays import Float
 from srbf.compute.threads import each
+from srbf.visibility.environment_cells import EnvironmentRows, Openings
 from srbf.visibility.hemisphere import cosine_directions
-from srbf.visibility.sky import Openings, SkyRows
 from srbf.visibility.surface_cells import OFFSET
 from srbf.visibility.surfels import Surfels
 
@@ -47,16 +47,18 @@ def form_factors(
     return _traced(surfels, origins, rays, seed, progress, None)[0]
 
 
-def factors_and_sky(surfels: Surfels, openings: Openings, origins: RayOrigins, rays: int, seed: int = 0) -> tuple[csr_array, SkyRows]:
-    """`form_factors`, and of the rays that leave the scene the shares that come from each cell of the sky."""
-    factors, sky = _traced(surfels, origins, rays, seed, lambda done: None, openings)
-    assert sky is not None
-    return factors, sky
+def factors_and_environment(
+    surfels: Surfels, openings: Openings, origins: RayOrigins, rays: int, seed: int = 0
+) -> tuple[csr_array, EnvironmentRows]:
+    """`form_factors`, and of the rays that leave the scene the shares that come from each cell of the environment."""
+    factors, environment = _traced(surfels, origins, rays, seed, lambda done: None, openings)
+    assert environment is not None
+    return factors, environment
 
 
 def _traced(
     surfels: Surfels, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None], openings: Openings | None
-) -> tuple[csr_array, SkyRows | None]:
+) -> tuple[csr_array, EnvironmentRows | None]:
     from scipy.sparse import csr_array, vstack
 
     count, of_each = origins.weights.shape
@@ -64,7 +66,7 @@ def _traced(
     batch = max(1, RAYS // (rays * of_each))
     starts = list(range(0, count, batch))
     parts: list[csr_array] = [None] * len(starts)
-    skies: list[Any] = [None] * len(starts)
+    environments: list[Any] = [None] * len(starts)
     done = [0]
 
     def trace(number: int) -> None:
@@ -78,7 +80,7 @@ def _traced(
         shares = np.repeat(weights / (rays * np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)), rays)
         row = np.repeat(np.arange(len(weights)), rays * of_each)
         if openings is not None:
-            skies[number] = openings.rows(len(weights), row, shares, places, directions, met)
+            environments[number] = openings.rows(len(weights), row, shares, places, directions, met)
         known = surfel >= 0
         matrix = csr_array((shares[known].astype(np.float32), (row[known], surfel[known])), shape=(len(weights), surfels.count))
         matrix.sum_duplicates()
@@ -88,5 +90,5 @@ def _traced(
 
     each(trace, len(starts))
     if not parts:
-        return csr_array((0, surfels.count), dtype=np.float32), None if openings is None else SkyRows.none(0, openings.channels)
-    return vstack(parts, format="csr"), None if openings is None else SkyRows.stacked(skies)
+        return csr_array((0, surfels.count), dtype=np.float32), None if openings is None else EnvironmentRows.none(0, openings.channels)
+    return vstack(parts, format="csr"), None if openings is None else EnvironmentRows.stacked(environments)

@@ -15,13 +15,13 @@ from srbf.encode.dilation import dilate, nearest_covered
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
+from srbf.visibility.environment_rays import EnvironmentSampler
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
 from srbf.visibility.shadow import rounded_share
 from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
-from srbf.visibility.sky_light import RAYS as SKY_RAYS
-from srbf.visibility.sky_light import SkySampler
 from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
 
@@ -33,8 +33,8 @@ SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of
 SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
-SKY_POINTS = 8  # of a texel, from each of which rays go to an environment
-SKY_BATCH = 1 << 18  # such rays at a time
+ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environment
+ENVIRONMENT_BATCH = 1 << 18  # such rays at a time
 NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
@@ -110,16 +110,16 @@ class RayTracer:
         return sums.mean().astype(np.float32)
 
     def _of_environment(self, light: EnvironmentLight) -> Float32[ndarray, "P 3"]:
-        """By SKY_POINTS points of every texel."""
-        sampler = SkySampler.of(light)
+        """By ENVIRONMENT_POINTS points of every texel."""
+        sampler = EnvironmentSampler.of(light)
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, None)
-        step = max(1, SKY_BATCH // (2 * SKY_POINTS * SKY_RAYS))
+        step = max(1, ENVIRONMENT_BATCH // (2 * ENVIRONMENT_POINTS * ENVIRONMENT_RAYS))
         starts = range(0, len(self._texels), step)
         found: list[Any] = [None] * len(starts)
 
         def trace(number: int) -> None:
-            samples = self._samples(self._texels[starts[number] : starts[number] + step], range(SKY_POINTS))
-            found[number] = samples, self._under_sky(samples, sampler, np.random.default_rng(starts[number]))
+            samples = self._samples(self._texels[starts[number] : starts[number] + step], range(ENVIRONMENT_POINTS))
+            found[number] = samples, self._under_environment(samples, sampler, np.random.default_rng(starts[number]))
 
         each(trace, len(starts))
         for samples, visible in found:
@@ -127,11 +127,11 @@ class RayTracer:
             sums.add(samples.texel, samples.share, ones, visible, ones)
         return sums.mean().astype(np.float32)
 
-    def _under_sky(self, samples: Samples, sampler: SkySampler, rng: np.random.Generator) -> Float32[ndarray, "n 3"]:
+    def _under_environment(self, samples: Samples, sampler: EnvironmentSampler, rng: np.random.Generator) -> Float32[ndarray, "n 3"]:
         """The irradiance of each sample; the rays of a texel's points are one even set."""
-        normals = samples.normal.reshape(SKY_POINTS, -1, 3).transpose(1, 0, 2).astype(np.float64)
+        normals = samples.normal.reshape(ENVIRONMENT_POINTS, -1, 3).transpose(1, 0, 2).astype(np.float64)
         ways, light = (array.transpose(1, 0, 2, 3).reshape(-1, 3) for array in sampler.rays(normals, rng))
-        point = np.repeat(np.arange(len(samples.texel)), 2 * SKY_RAYS)
+        point = np.repeat(np.arange(len(samples.texel)), 2 * ENVIRONMENT_RAYS)
         lit = np.flatnonzero(light.any(axis=1) & (samples.weight[point] > 0))
         own, direction = point[lit], ways[lit].astype(np.float32)
         passed = light[lit] * self._shadow_rays.passed(self._origins(samples, own, direction), direction, None)

@@ -46,7 +46,7 @@ class TransferBasis:
 
 
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
-    """(S, V) float32: irradiance on the surfels under point lights and spots in free space, point lights close to surfaces, and the sky."""
+    """(S, V) float32: irradiance on the surfels under point lights and spots in free space, point lights close to surfaces, environments."""
     rng = np.random.default_rng(seed)
     cells = operator.cells
     placed = free[rng.permutation(len(free))[:PLACED]]
@@ -61,7 +61,7 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         outer = float(rng.uniform(*CONE))
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
     inside = np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
-    return inside if operator.sky is None else np.concatenate([inside, operator.sky.parts()], axis=1)
+    return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
 
 
 def transfer_basis(

@@ -114,14 +114,14 @@ def test_a_spot_is_a_point_times_its_cone(plane) -> None:
     np.testing.assert_allclose(found[radius < np.tan(0.3) - 0.05], point[radius < np.tan(0.3) - 0.05], rtol=1e-3)
 
 
-def test_an_even_sky_adds_pi_times_its_radiance(plane) -> None:
+def test_an_even_environment_adds_pi_times_its_radiance(plane) -> None:
     """To an open plane; beside an endless wall half of it."""
-    sky = EnvironmentLight(np.full((4, 8, 3), 0.5, np.float32), color=(2.0, 1.0, 0.0))
-    found = RayTracer(plane(size=8)).response([sky])
+    environment = EnvironmentLight(np.full((4, 8, 3), 0.5, np.float32), color=(2.0, 1.0, 0.0))
+    found = RayTracer(plane(size=8)).response([environment])
     np.testing.assert_allclose(found, np.broadcast_to([np.pi, np.pi / 2, 0], found.shape), rtol=0.04)
     np.testing.assert_allclose(found.mean(axis=(0, 1)), [np.pi, np.pi / 2, 0], rtol=0.004)
     wall = quad([1, -90, 0], [1, 90, 0], [1, 90, 90], [1, -90, 90])
-    assert RayTracer(plane(wall, size=8)).response([sky])[:, -1, 0].mean() == pytest.approx(np.pi / 2, rel=0.02)
+    assert RayTracer(plane(wall, size=8)).response([environment])[:, -1, 0].mean() == pytest.approx(np.pi / 2, rel=0.02)
 
 
 def test_a_small_bright_sun_in_a_map_is_found(plane) -> None:

@@ -1,4 +1,4 @@
-"""The sky as cells: an open plane, a closed box, a box without a lid, a tinted pane, and energy of surfels and sky together."""
+"""Environments as cells: an open plane, a closed box, a box without a lid, a colored pane, and energy of surfels and cells together."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.lights import EnvironmentLight
 from srbf.sphere import random_directions
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.form_factors import RayOrigins, factors_and_sky
-from srbf.visibility.sky import SIDE, Openings, SkyRows, cell_of, cell_radiance
+from srbf.visibility.environment_cells import SIDE, EnvironmentRows, Openings, cell_of, cell_radiance
+from srbf.visibility.form_factors import RayOrigins, factors_and_environment
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.surfels import Surfels, surfels_of
 
@@ -48,72 +48,72 @@ def openings(corners: np.ndarray, panes: np.ndarray | None = None, passed: float
     return Openings(Triangles(every, flat_normals(every), material, np.full(len(every), casts), np.stack([np.zeros_like(curve), curve])))
 
 
-def test_an_open_plane_has_pi_times_the_radiance_of_an_even_sky() -> None:
+def test_an_open_plane_has_pi_times_the_radiance_of_an_even_environment() -> None:
     plane = build_plane()
     origins = RayOrigins.even(np.zeros((3, 1, 3)), np.array([[[0, 0, 1.0]], [[0, 0.6, 0.8]], [[1.0, 0, 0]]]))
     empty = inside(box(True))
     far = Surfels(empty.cells, empty.corners + 100, empty.owners, empty.objects)
-    _, sky = factors_and_sky(far, Openings(plane.triangles), origins, RAYS)
-    shares = np.asarray(sky.matrix().sum(axis=1)).ravel()
+    _, environment = factors_and_environment(far, Openings(plane.triangles), origins, RAYS)
+    shares = np.asarray(environment.matrix().sum(axis=1)).ravel()
     np.testing.assert_allclose(shares[0], 1, atol=1e-5)
-    np.testing.assert_allclose(shares[1], 0.9, atol=2e-3, err_msg="a plane below a tilted one leaves (1 + cos) / 2 of the sky")
-    np.testing.assert_allclose(sky.irradiance(cell_radiance(UNIFORM))[0], [np.pi, np.pi / 2, 0], rtol=1e-5)
+    np.testing.assert_allclose(shares[1], 0.9, atol=2e-3, err_msg="a plane below a tilted one leaves (1 + cos) / 2 of the environment")
+    np.testing.assert_allclose(environment.irradiance(cell_radiance(UNIFORM))[0], [np.pi, np.pi / 2, 0], rtol=1e-5)
 
 
-def test_a_closed_box_sees_no_sky_and_costs_no_bytes() -> None:
+def test_a_closed_box_sees_no_environment_and_costs_no_bytes() -> None:
     corners = box(True)
     found = inside(corners)
-    factors, sky = factors_and_sky(found, openings(corners), centers(found), 1024)
-    assert not len(sky.cells) and not len(sky.shares)
+    factors, environment = factors_and_environment(found, openings(corners), centers(found), 1024)
+    assert not len(environment.cells) and not len(environment.shares)
     np.testing.assert_allclose(factors.sum(axis=1), 1, atol=1e-5)
 
 
 def test_a_box_without_a_lid() -> None:
-    """Its floor sees of the sky what it would see of the lid: the factor of two parallel squares; and nothing is lost."""
+    """Its floor sees of the environment what it would see of the lid: the factor of two parallel squares; and nothing is lost."""
     corners = box(False)
     found = inside(corners)
     points, normals = found.spread(16)
-    factors, sky = factors_and_sky(found, openings(corners), RayOrigins.even(points, normals), RAYS // 16)
+    factors, environment = factors_and_environment(found, openings(corners), RayOrigins.even(points, normals), RAYS // 16)
     floor, areas = found.cells.normals[:, 2] > 0.5, found.cells.areas
-    shares = np.asarray(sky.matrix().sum(axis=1)).ravel()
+    shares = np.asarray(environment.matrix().sum(axis=1)).ravel()
     assert shares[floor] @ areas[floor] / areas[floor].sum() == pytest.approx(PLATES, rel=0.01)
     walls = shares[~floor] @ areas[~floor] / areas[~floor].sum()
     assert walls == pytest.approx((1 - PLATES) / 4, rel=0.01)  # what the lid does not send to the floor, and reciprocity
     np.testing.assert_allclose(np.asarray(factors.sum(axis=1)).ravel() + shares, 1, atol=1e-5)
 
 
-def test_light_comes_from_where_the_sky_is_bright() -> None:
-    """A wall of a box without a lid: of a bright half of the sky only what lies in front of it arrives."""
+def test_light_comes_from_where_the_environment_is_bright() -> None:
+    """A wall of a box without a lid: of a bright half of the environment only what lies in front of it arrives."""
     corners = box(False)
     found = inside(corners)
-    _, sky = factors_and_sky(found, openings(corners), centers(found), 1024)
+    _, environment = factors_and_environment(found, openings(corners), centers(found), 1024)
     image = np.zeros((16, 32, 3), np.float32)
     image[:, 8:24] = 1  # x > 0: the middle of the map
-    lit = sky.irradiance(cell_radiance(EnvironmentLight(image)))[:, 0]
+    lit = environment.irradiance(cell_radiance(EnvironmentLight(image)))[:, 0]
     facing = found.cells.normals[:, 0]
     assert not lit[facing < -0.5].any() and (lit[facing > 0.5] > 0).mean() > 0.8
     turned = EnvironmentLight(image, rotation=np.diag([-1.0, -1.0, 1.0]))
-    lit = sky.irradiance(cell_radiance(turned))[:, 0]
+    lit = environment.irradiance(cell_radiance(turned))[:, 0]
     assert not lit[facing > 0.5].any() and (lit[facing < -0.5] > 0).mean() > 0.8
 
 
-def test_panes_tint() -> None:
+def test_panes_dim_by_color() -> None:
     corners, pane = box(False), quad([-1, -1, 1.5], [2, -1, 1.5], [2, 2, 1.5], [-1, 2, 1.5])
     found = inside(corners)
-    _, clear = factors_and_sky(found, openings(corners), centers(found), 256)
-    _, sky = factors_and_sky(found, openings(corners, pane), centers(found), 256)
-    assert clear.shares.shape[1] == 1 and sky.shares.shape[1] == 3
+    _, clear = factors_and_environment(found, openings(corners), centers(found), 256)
+    _, environment = factors_and_environment(found, openings(corners, pane), centers(found), 256)
+    assert clear.shares.shape[1] == 1 and environment.shares.shape[1] == 3
     floor = np.flatnonzero(found.cells.normals[:, 2] > 0.5)
     whole = clear.matrix().sum(axis=1)[floor]
     for channel, passed in enumerate((0.5, 1.0, 0.0)):
-        np.testing.assert_allclose(sky.matrix(channel).sum(axis=1)[floor], passed * whole, rtol=1e-5)
+        np.testing.assert_allclose(environment.matrix(channel).sum(axis=1)[floor], passed * whole, rtol=1e-5)
 
 
-def test_what_casts_no_shadow_lets_the_sky_pass() -> None:
+def test_what_casts_no_shadow_lets_the_environment_pass() -> None:
     corners = box(True)
     found = inside(corners)
-    _, sky = factors_and_sky(found, openings(corners, casts=False), centers(found), 256)
-    np.testing.assert_allclose(sky.matrix().sum(axis=1), 1, atol=1e-5)
+    _, environment = factors_and_environment(found, openings(corners, casts=False), centers(found), 256)
+    np.testing.assert_allclose(environment.matrix().sum(axis=1), 1, atol=1e-5)
 
 
 def test_cells_hold_the_whole_sphere_and_a_map_of_any_size() -> None:
@@ -123,10 +123,10 @@ def test_cells_hold_the_whole_sphere_and_a_map_of_any_size() -> None:
         np.testing.assert_allclose(cell_radiance(EnvironmentLight(np.full((*size, 3), 0.7, np.float32))), 0.7, rtol=1e-6)
 
 
-def test_parts_of_the_sky_and_rows_add_up() -> None:
+def test_parts_of_the_environment_and_rows_add_up() -> None:
     corners = box(False)
     found = inside(corners)
-    _, sky = factors_and_sky(found, openings(corners), centers(found), 256)
-    np.testing.assert_allclose(sky.parts().sum(axis=1), sky.matrix().sum(axis=1), rtol=1e-4)
-    both = SkyRows.stacked([SkyRows.none(2), sky]).matrix()
-    np.testing.assert_array_equal(both[2:].toarray(), sky.matrix().toarray())
+    _, environment = factors_and_environment(found, openings(corners), centers(found), 256)
+    np.testing.assert_allclose(environment.parts().sum(axis=1), environment.matrix().sum(axis=1), rtol=1e-4)
+    both = EnvironmentRows.stacked([EnvironmentRows.none(2), environment]).matrix()
+    np.testing.assert_array_equal(both[2:].toarray(), environment.matrix().toarray())

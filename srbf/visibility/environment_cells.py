@@ -1,4 +1,4 @@
-"""The sky as cells, squares of the octahedral map of directions: how much of a hemisphere each fills, and what a map has in it."""
+"""The environment as cells, squares of the octahedral map of directions: how much of a hemisphere each fills, and what a map has in it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 SIDE = 24  # cells per side of the map: 8 degrees each
-WIDE = 8  # per side of the map, of the parts of the sky that shapes are made for
+WIDE = 8  # per side of the map, of the parts of the environment that shapes are made for
 ROWS = 8  # in which a map is read at least, per side of a cell; twice as many columns
 
 
@@ -44,11 +44,11 @@ def cell_radiance(light: EnvironmentLight, side: int = SIDE) -> Float64[ndarray,
 
 
 @dataclass(frozen=True, eq=False)
-class SkyRows:
-    """Shares of n hemispheres, weighted by the cosine, that the cells of the sky send light through, in sparse rows.
+class EnvironmentRows:
+    """Shares of n hemispheres, weighted by the cosine, that the cells of the environment send light through, in sparse rows.
 
-    Row i has `cells` and `shares` from starts[i] to starts[i + 1]; shares (Z, 1), or (Z, 3) where panes tint. Irradiance is pi times the
-    shares times the cells' radiance: an open plane has shares of sum 1.
+    Row i has `cells` and `shares` from starts[i] to starts[i + 1]; shares (Z, 1), or (Z, 3) where panes are colored. Irradiance is pi
+    times the shares times the cells' radiance: an open plane has shares of sum 1.
     """
 
     starts: Int[ndarray, " m"]
@@ -64,7 +64,7 @@ class SkyRows:
         return csr_array((own, self.cells, self.starts), shape=(len(self.starts) - 1, self.side**2))
 
     def irradiance(self, radiance: Float64[ndarray, "N 3"]) -> Float64[ndarray, "n 3"]:
-        """Of a sky of this radiance in its cells."""
+        """Of an environment of this radiance in its cells."""
         return np.pi * np.stack([self.matrix(c) @ radiance[:, c] for c in range(3)], axis=1)
 
     @property
@@ -73,7 +73,7 @@ class SkyRows:
         return np.unique(self.cells)
 
     def parts(self) -> Float32[ndarray, "n V"]:
-        """What the cells of each part of the sky that any row sees, WIDE of them per side, send together, in gray."""
+        """What the cells of each part of the environment that any row sees, WIDE of them per side, send together, in gray."""
         row, column = np.divmod(self.cells, self.side)
         part = row * WIDE // self.side * WIDE + column * WIDE // self.side
         own = np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
@@ -82,20 +82,20 @@ class SkyRows:
         return sums[:, sums.any(axis=0)].astype(np.float32)
 
     @staticmethod
-    def none(count: int, channels: int = 1, side: int = SIDE) -> SkyRows:
-        """`count` rows without sky."""
-        return SkyRows(np.zeros(count + 1, np.int64), np.zeros(0, np.int64), np.zeros((0, channels), np.float32), side)
+    def none(count: int, channels: int = 1, side: int = SIDE) -> EnvironmentRows:
+        """`count` rows without environment."""
+        return EnvironmentRows(np.zeros(count + 1, np.int64), np.zeros(0, np.int64), np.zeros((0, channels), np.float32), side)
 
     @staticmethod
-    def stacked(parts: Sequence[SkyRows]) -> SkyRows:
+    def stacked(parts: Sequence[EnvironmentRows]) -> EnvironmentRows:
         """The rows of all, one after the other; at least one."""
         sizes = np.concatenate([np.diff(part.starts) for part in parts])
         cells, shares = (np.concatenate([getattr(part, name) for part in parts]) for name in ("cells", "shares"))
-        return SkyRows(np.concatenate([[0], np.cumsum(sizes)]), cells, shares, parts[0].side)
+        return EnvironmentRows(np.concatenate([[0], np.cumsum(sizes)]), cells, shares, parts[0].side)
 
 
 class Openings:
-    """What rays see of the sky: past all that casts shadows, through panes. MissingLibraryError without embreex."""
+    """What rays see of the environment: past all that casts shadows, through panes. MissingLibraryError without embreex."""
 
     def __init__(self, triangles: Triangles, side: int = SIDE) -> None:
         self._rays, self._side = ShadowRays(triangles), side
@@ -110,7 +110,7 @@ class Openings:
         origins: ndarray,
         directions: ndarray,
         met: Bool[ndarray, " n"],
-    ) -> SkyRows:
+    ) -> EnvironmentRows:
         """(count, N) shares, by rays of a `weight` in a `row`; `met`: those that meet a surface."""
         free = np.arange(len(met)) if self._all else np.flatnonzero(~met)
         passed = self._rays.passed(origins[free].astype(np.float32), directions[free].astype(np.float32), None)[:, : self.channels]
@@ -120,4 +120,4 @@ class Openings:
         key, entry = np.unique(row[free] * cells + cell_of(directions[free], self._side), return_inverse=True)
         shares = [np.bincount(entry.ravel(), weight[free] * passed[:, c], len(key)) for c in range(self.channels)]
         starts = np.searchsorted(key, np.arange(count + 1) * cells)
-        return SkyRows(starts, key % cells, np.stack(shares, axis=1).astype(np.float32), self._side)
+        return EnvironmentRows(starts, key % cells, np.stack(shares, axis=1).astype(np.float32), self._side)

@@ -16,7 +16,7 @@ RAYS = 32  # of a point; as many again to where the map is bright
 
 
 @dataclass(frozen=True, eq=False)
-class SkySampler:
+class EnvironmentSampler:
     """A map to draw directions from: the texels' shares of all its light, summed up row by row, and the density per steradian."""
 
     light: EnvironmentLight
@@ -24,12 +24,12 @@ class SkySampler:
     density: Float64[ndarray, " t"]
 
     @staticmethod
-    def of(light: EnvironmentLight) -> SkySampler:
+    def of(light: EnvironmentLight) -> EnvironmentSampler:
         """A black map is drawn from evenly."""
         _, solid_angle = environment_samples(light.image, "sphere", light.rotation)
         flux = np.abs(light.image).mean(axis=2, dtype=np.float64).ravel() * solid_angle.ravel()
         flux = flux if flux.any() else solid_angle.ravel()
-        return SkySampler(light, np.cumsum(flux / flux.sum()), flux / flux.sum() / solid_angle.ravel())
+        return EnvironmentSampler(light, np.cumsum(flux / flux.sum()), flux / flux.sum() / solid_angle.ravel())
 
     def rays(
         self, normals: Float64[ndarray, "n q 3"], rng: np.random.Generator, count: int = RAYS

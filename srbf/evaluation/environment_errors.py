@@ -1,4 +1,4 @@
-"""Error of bounces of the sky: an asset's table of sky cells against its capture's form factors, and against rays from surfels."""
+"""Error of bounces of environment maps: an asset's table of cells against its capture's form factors, and against rays from surfels."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from srbf.errors import InputError
 from srbf.light_geometry import environment_samples
 from srbf.lights import EnvironmentLight
 from srbf.methods import linear_response
-from srbf.methods.sky_transfer import has_sky, without_sky
+from srbf.methods.environment_table import has_environment_table, without_environment_table
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.sphere import random_directions
 from srbf.visibility.embree import has_embree
-from srbf.visibility.sky import cell_radiance
+from srbf.visibility.environment_cells import cell_radiance
 from srbf.visibility.transfer_operator import TransferOperator
 
-SKIES = 8
-BRIGHT, DIM = 1.0, 0.1  # radiance of the halves of a sky
+ENVIRONMENTS = 8
+BRIGHT, DIM = 1.0, 0.1  # radiance of the halves of an environment
 MAP = (32, 64)
 
 
-def random_skies(count: int = SKIES, seed: int = 0) -> list[EnvironmentLight]:
-    """Skies with a bright half in a random direction."""
+def random_environments(count: int = ENVIRONMENTS, seed: int = 0) -> list[EnvironmentLight]:
+    """Environments with a bright half in a random direction."""
     directions, _ = environment_samples(np.zeros((*MAP, 3), np.float32), "sphere", np.eye(3))
     axes = random_directions(count, "sphere", np.random.default_rng(seed))
     halves = [np.where(directions @ axis > 0, np.float32(BRIGHT), np.float32(DIM)) for axis in axes]
     return [EnvironmentLight(np.repeat(half[..., None], 3, axis=2)) for half in halves]
 
 
-def sky_errors(asset: Asset, capture: Capture, skies: int = SKIES, seed: int = 0) -> dict[str, Any]:
-    """Relative RMSE of the bounces of random skies, half bright and half dim.
+def environment_errors(asset: Asset, capture: Capture, environments: int = ENVIRONMENTS, seed: int = 0) -> dict[str, Any]:
+    """Relative RMSE of the bounces of random environments, half bright and half dim.
 
     Parameters
     ----------
     asset
-        Of the method transfer, with a table of the sky.
+        Of the method transfer, with a table of the environment.
     capture
-        What it was fitted to: of surfels that see the sky.
-    skies
+        What it was fitted to: of surfels that see the environment.
+    environments
         How many, at random directions.
     seed
         Of the directions.
@@ -51,32 +51,36 @@ def sky_errors(asset: Asset, capture: Capture, skies: int = SKIES, seed: int = 0
     Returns
     -------
     dict
-        `count`; `relative_rmse` over all skies and the `worst` one's, against the capture's form factors; where embreex is installed,
-        `rays`, over all skies against rays from the asset's own surfels.
+        `count`; `relative_rmse` over all and the `worst` one's, against the capture's form factors; where embreex is installed, `rays`,
+        over all against rays from the asset's own surfels.
 
     Raises
     ------
     InputError
-        Where asset or capture know no sky, or differ in size.
+        Where asset or capture know no environment, or differ in size.
 
     Examples
     --------
-    >>> sky_errors(asset, capture)["relative_rmse"]  # doctest: +SKIP
+    >>> environment_errors(asset, capture)["relative_rmse"]  # doctest: +SKIP
     0.03
     """
     operator = TransferOperator.read(capture.folder) if "surfels" in capture.manifest else None
-    if operator is None or operator.sky is None or not has_sky(asset):
-        raise InputError("expected an asset and a capture of surfels that see the sky, found others; bake and fit an open scene")
+    if operator is None or operator.environment is None or not has_environment_table(asset):
+        raise InputError("expected an asset and a capture of surfels that see the environment, found others; bake and fit an open scene")
     if (asset.width, asset.height) != (capture.width, capture.height):
         raise InputError(f"expected a capture of the asset's {asset.width}x{asset.height} texels, found {capture.width}x{capture.height}")
-    lights = random_skies(skies, seed)
+    lights = random_environments(environments, seed)
     covered = (capture.coverage() >= COVERED).ravel()
     truth = _pictures(operator, capture, lights)[:, covered]
     found = _relit(asset, lights)[:, covered]
     errors, power = ((found - truth) ** 2).sum(axis=(1, 2)), np.maximum((truth**2).sum(axis=(1, 2)), 1e-30)
-    result = {"count": skies, "relative_rmse": float(np.sqrt(errors.sum() / power.sum())), "worst": float(np.sqrt((errors / power).max()))}
+    result = {
+        "count": environments,
+        "relative_rmse": float(np.sqrt(errors.sum() / power.sum())),
+        "worst": float(np.sqrt((errors / power).max())),
+    }
     if has_embree():
-        traced = _relit(without_sky(asset), lights)[:, covered]
+        traced = _relit(without_environment_table(asset), lights)[:, covered]
         result["rays"] = float(np.sqrt(((found - traced) ** 2).sum() / max(float((traced**2).sum()), 1e-30)))
     return result
 
@@ -86,10 +90,12 @@ def _relit(asset: Asset, lights: list[EnvironmentLight]) -> Float32[ndarray, "n 
 
 
 def _pictures(operator: TransferOperator, capture: Capture, lights: list[EnvironmentLight]) -> Float32[ndarray, "n P 3"]:
-    """The bounces of each sky by the form factors themselves, in the capture's quantity."""
-    assert operator.sky is not None
-    sky, cells = operator.sky, operator.cells
-    received = np.stack([sky.irradiance(cell_radiance(light, sky.side)) for light in lights], axis=1).astype(np.float32)  # (S, n, 3)
+    """The bounces of each environment by the form factors themselves, in the capture's quantity."""
+    assert operator.environment is not None
+    environment, cells = operator.environment, operator.cells
+    received = np.stack([environment.irradiance(cell_radiance(light, environment.side)) for light in lights], axis=1).astype(
+        np.float32
+    )  # (S, n, 3)
     exchange, most = reciprocal(operator.exchange.toarray(), cells.areas), capture.manifest["surfels"].get("bounces")
     radiosity = [Bounces(exchange, cells.albedo[:, c].astype(np.float64), most).radiosity(received[:, :, c]) for c in range(3)]
     pictures = np.stack([(operator.receivers @ own).T for own in radiosity], axis=2)
