@@ -3,8 +3,8 @@
 
 The free space is |x| < 1, |y| < 1, 0 < z < 2 (m): left wall red, right wall green. Receivers, each with the UV layer "lightmap":
 `Room` (all walls, floor and ceiling), `Tall block`, `Short block`. With --hole, a window of 0.6 m in the left wall, 0.1 m thick, joins the
-room to another of 1.4 x 2 x 2 m, whose surface is the receiver `Anteroom`. With --window, one of 0.8 m in the right wall is open to the
-environment. A point light under the ceiling is for viewing. --step divides
+room to another of 1.4 x 2 x 2 m, whose surface is the receiver `Anteroom`. With --window, one of 0.8 m in the right wall is open; the
+object `Outside` is the outside of the walls. A point light under the ceiling is for viewing. --step divides
 walls into squares of that size (m), for receivers at vertices.
 
     python data/scenes/cornell_box.py OUT.blend [--hole] [--window] [--step 0.1]
@@ -31,13 +31,15 @@ def build(hole, window, step):
 
     def of(middle, normal):
         """(object, material) of a face."""
+        if window and any(not HULL[0][axis] < (middle + normal * 0.01)[axis] < HULL[1][axis] for axis in range(3)):
+            return "Outside", white
         if middle.x < -1.05 or (abs(middle.x + 1.1) < 1e-3 and normal.x < 0):
             return "Anteroom", white
         return "Room", red if middle.x < -0.999 and normal.x > 0.9 else green if normal.x < -0.9 and middle.x > 0.999 else white
 
     hull = ((HULL[0][0] - 1.5 * hole, *HULL[0][1:]), HULL[1])
     openings = [ROOM, *((HOLE, ANTEROOM) if hole else ()), *((WINDOW,) if window else ())]
-    shell = carved(hull, openings, step=step)
+    shell = carved(hull, openings, step=step, outside=window)
     objects = {}
     for (name, material), part in split(shell, of).items():
         objects.setdefault(name, {})[material] = part

@@ -46,7 +46,7 @@ class TransferBasis:
 
 
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
-    """(S, V) float32: irradiance on the surfels under point lights and spots in free space, point lights close to surfaces, environments."""
+    """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments."""
     rng = np.random.default_rng(seed)
     cells = operator.cells
     placed = free[rng.permutation(len(free))[:PLACED]]
