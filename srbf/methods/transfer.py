@@ -17,7 +17,15 @@ from srbf.captured_light import NOWHERE, CapturedLight
 from srbf.compute.full_precision import by_channel
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.lights import Light, NamedLight
+from srbf.lights import EnvironmentLight, Light, NamedLight
+from srbf.methods.environment_table import FILES as TABLE_FILES
+from srbf.methods.environment_table import (
+    add_environment_table,
+    environment_columns,
+    environment_weights,
+    has_environment_table,
+    read_environment_table,
+)
 from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
@@ -87,7 +95,7 @@ class Transfer(LightsInsideMaps):
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
     takes_objects: ClassVar[bool] = True
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES}
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES, **TABLE_FILES}
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
@@ -162,6 +170,8 @@ class Transfer(LightsInsideMaps):
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        if operator.environment is not None:
+            add_environment_table(asset, _rounded(environment_columns(basis.transfer, operator.environment)), operator.environment)
         if self.editable:
             told = capture.manifest["surfels"]
             names = tuple(told.get("objects", ()))
@@ -183,19 +193,30 @@ class Transfer(LightsInsideMaps):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["surfel_transfer"]
         table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
-        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16), **Surfaces.read(reader)}
+        return {
+            **super().read_tables(reader),
+            "surfel_transfer": table.astype(np.float16),
+            **Surfaces.read(reader),
+            **read_environment_table(reader),
+        }
+
+    @classmethod
+    def needs_rays(cls, asset: Asset, light: Light) -> bool:
+        """An environment map does not, where the asset knows the environment, nor does an object that emits."""
+        return not (isinstance(light, NamedLight) or (isinstance(light, EnvironmentLight) and has_environment_table(asset)))
 
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """A named light is an object whose surfaces emit radiance of its color."""
-        on_patches = light_on_patches(asset)
         received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
         emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
         for light in lights:
             if isinstance(light, NamedLight):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
+            elif isinstance(light, EnvironmentLight) and has_environment_table(asset):
+                emitted += environment_weights(asset, light)
             else:
-                received += on_patches(light)
+                received += light_on_patches(asset)(light)
         table = by_channel(asset.tables["surfel_transfer"])
         columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
