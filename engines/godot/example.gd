@@ -61,7 +61,7 @@ func _unhandled_input(event: InputEvent) -> void:
 			KEY_TAB:
 				_show_picture(not _picture.visible)
 			KEY_S:
-				$Sun.visible = not $Sun.visible and not _asset.is_weighted()
+				$Sun.visible = not $Sun.visible and (_asset.surfels != null or not _asset.is_weighted())
 			KEY_PLUS, KEY_EQUAL, KEY_KP_ADD:
 				$Relight.exposure += 0.5
 			KEY_MINUS, KEY_KP_SUBTRACT:
@@ -108,11 +108,15 @@ func _light_a_room() -> void:
 	$PointLight.light_energy = 0.04 * _size * _size
 	$PointLight.shadow_enabled = true
 	$PointLight.position = _middle
+	$Sun.shadow_enabled = true
+	$Surface.cast_shadow = GeometryInstance3D.SHADOW_CASTING_SETTING_DOUBLE_SIDED
 
 
 func _show_model() -> void:
 	_model = load(MODEL).instantiate()
 	add_child(_model)
+	for mesh: MeshInstance3D in _model.find_children("*", "MeshInstance3D", true, false):
+		mesh.cast_shadow = GeometryInstance3D.SHADOW_CASTING_SETTING_DOUBLE_SIDED  # walls are thin
 	var surfaces: Array[Node] = [_picture]
 	surfaces.append_array(_model.find_children("*", "MeshInstance3D", true, false))
 	$Relight.surfaces = surfaces
