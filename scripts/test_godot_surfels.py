@@ -13,8 +13,9 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -40,7 +41,8 @@ def compare(title: str, asset: Asset, lights: dict[str, list[Lit]], parts: int, 
     """Print a line per renderer and set of lights; returns the number of differences."""
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
     write(asset, folder)
-    shutil.copy(ROOT / "tests" / "export" / "godot_surfels.gd", folder)
+    for script in ("godot_surfels.gd", "godot_scene.gd"):
+        shutil.copy(ROOT / "tests" / "export" / script, folder)
     jobs = [{"lights": [lit.node for lit in lights[name]], "parts": parts, "output": f"{name}.raw"} for name in lights]
     (folder / "jobs.json").write_text(json.dumps(jobs))
     run(folder, chroot, "--headless", "--import")
@@ -50,7 +52,7 @@ def compare(title: str, asset: Asset, lights: dict[str, list[Lit]], parts: int, 
     for renderer, arguments in RENDERERS.items():
         run(folder, chroot, *arguments, "--script", "res://godot_surfels.gd", display=True)
         for name, own in lights.items():
-            with patch("srbf.visibility.received.spot_cone", edge_of(own)):
+            with edge_of(own):
                 wanted = relight(asset, [lit.light() for lit in own]) / np.pi
                 lit = np.sum([on_patches(light) for light in in_asset_frame(asset, [lit.light() for lit in own])], axis=0)
             found = read(folder / f"{name}.raw")[: wanted.size // 3].reshape(wanted.shape)
@@ -67,14 +69,14 @@ def compare(title: str, asset: Asset, lights: dict[str, list[Lit]], parts: int, 
     return missed
 
 
-def edge_of(lights: list[Lit]) -> Callable[[ndarray, float, float], ndarray]:
-    """What Godot's spots send out by the cosine to their axis, in place of a smooth step."""
+def edge_of(lights: list[Lit]) -> AbstractContextManager[Any]:
+    """numpy with the edge of Godot's spots in place of a smooth step."""
     edge = next((lit.spot[1] for lit in lights if lit.spot is not None), 1.0)
 
     def cone(cosine: ndarray, inner: float, outer: float) -> ndarray:
         return np.asarray(1 - np.clip((1 - cosine) / (1 - outer), 1e-4, 1) ** (1 / edge))
 
-    return cone
+    return patch("srbf.visibility.received.spot_cone", cone)
 
 
 def read(path: Path) -> ndarray:

@@ -26,10 +26,10 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	var canvas := ColorRect.new()
 	canvas.size = viewport.size
 	relight.add_child(canvas)
-	viewport.add_child(_scene(asset))
+	viewport.add_child(preload("res://godot_scene.gd").scene(asset, "res://asset/scene.glb"))
 	viewport.add_child(relight)
 	for values in job.lights:
-		viewport.add_child(_light(values))
+		viewport.add_child(preload("res://godot_scene.gd").light(values))
 	root.add_child(viewport)
 	for frame in FRAMES:
 		await process_frame
@@ -38,27 +38,6 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	_write(relight.surfel_weights.viewports[1], "received_" + job.output)
 	viewport.queue_free()
 	await process_frame
-
-
-func _light(values: Dictionary) -> Light3D:
-	var light: Light3D = ClassDB.instantiate(values.kind)
-	for name in values:
-		if name != "kind":
-			light.set(name, str_to_var(values[name]))
-	return light
-
-
-## The asset's own geometry, where it is in the world.
-func _scene(asset: SrbfAsset) -> Node3D:
-	var document := GLTFDocument.new()
-	var state := GLTFState.new()
-	document.append_from_file(ProjectSettings.globalize_path("res://asset/scene.glb"), state)
-	var scene: Node3D = document.generate_scene(state)
-	for mesh in scene.find_children("*", "MeshInstance3D", true, false):
-		mesh.cast_shadow = GeometryInstance3D.SHADOW_CASTING_SETTING_DOUBLE_SIDED
-	var upright := SrbfSurfelWeights.UP
-	scene.transform = upright * asset.asset_from_world.affine_inverse() * upright.affine_inverse()
-	return scene
 
 
 func _write(viewport: SubViewport, output: String) -> void:

@@ -45,6 +45,8 @@ extends Resource
 ## Of lights inside a scene: weights of point lights by their place, and the surfels that any lights are measured by.
 @export var position_table: SrbfPositionTable
 @export var surfels: SrbfSurfels
+## Where the probes are, of an asset of probes: its pictures are of their facets.
+@export var probes: SrbfProbeGrid
 
 var _textures := {}
 var _table := PackedFloat32Array()  # red, green, blue of w_table
@@ -65,6 +67,8 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var receiver := _receiver_kind(manifest)
 	asset.is_view = receiver == "view"
 	asset.is_picture = receiver in ["view", ""]
+	if receiver == "probes":
+		asset.probes = SrbfProbeGrid.read(folder, manifest.receiver)
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))

@@ -68,6 +68,14 @@ func apply() -> void:
 	if surfel_weights:
 		surfel_weights.queue_free()
 		surfel_weights = null
+	_make_materials()
+	if asset.surfels and by_surfels:
+		surfel_weights = SrbfSurfelWeights.of(asset, surfel_parts, surfel_shadow_size)
+		add_child(surfel_weights, false, INTERNAL_MODE_FRONT)
+		_give("srbf_weights", surfel_weights.weights)
+
+
+func _make_materials() -> void:
 	var made := {}
 	for surface in surfaces if surfaces else get_children():
 		if surface is CanvasItem:
@@ -78,10 +86,6 @@ func apply() -> void:
 			if not made.has("spatial"):
 				made.spatial = _material("spatial", "spatial")
 			surface.material_override = made.spatial
-	if asset.surfels and by_surfels:
-		surfel_weights = SrbfSurfelWeights.of(asset, surfel_parts, surfel_shadow_size)
-		add_child(surfel_weights, false, INTERNAL_MODE_FRONT)
-		_give("srbf_weights", surfel_weights.weights)
 
 
 ## Dim, recolor or switch one of the scene's own lights. `intensity` 1 is as the scene has it set, 0 off; `color` as of Godot's lights.

@@ -46,7 +46,7 @@ func draw(asset_from_godot: Transform3D) -> void:
 
 
 func _add_squares(parts: int, shadow_size: int) -> void:
-	var viewport := _viewport(_layout.size)
+	var viewport := _add(viewport_of(_layout.size))
 	viewport.positional_shadow_atlas_size = shadow_size
 	viewport.positional_shadow_atlas_16_bits = false
 	viewport.mesh_lod_threshold = 0.0
@@ -101,29 +101,39 @@ func _add_passes(asset: SrbfAsset, parts: int) -> void:
 
 
 func _pass(shader: Shader, size: Vector2i, values: Dictionary) -> Texture2D:
-	var viewport := _viewport(size)
-	viewport.disable_3d = true
 	var material := ShaderMaterial.new()
 	material.shader = shader
 	material.set_shader_parameter("srbf_size", size)
 	for name in values:
 		material.set_shader_parameter(name, values[name])
+	return _add(pass_of(size, material)).get_texture()
+
+
+## Godot draws viewports in the order of the tree.
+func _add(viewport: SubViewport) -> SubViewport:
+	add_child(viewport)
+	viewports.append(viewport)
+	return viewport
+
+
+## A viewport of half floats that draws one canvas item.
+static func pass_of(size: Vector2i, material: ShaderMaterial) -> SubViewport:
+	var viewport := viewport_of(size)
+	viewport.disable_3d = true
+	viewport.transparent_bg = true  # keeps all four channels
 	var rect := ColorRect.new()
 	rect.size = size
 	rect.material = material
 	viewport.add_child(rect)
-	return viewport.get_texture()
+	return viewport
 
 
-## Godot draws viewports in the order of the tree.
-func _viewport(size: Vector2i) -> SubViewport:
+static func viewport_of(size: Vector2i) -> SubViewport:
 	var viewport := SubViewport.new()
 	viewport.size = size
 	viewport.use_hdr_2d = true
 	viewport.gui_disable_input = true
 	viewport.render_target_update_mode = SubViewport.UPDATE_DISABLED
-	add_child(viewport)
-	viewports.append(viewport)
 	return viewport
 
 
