@@ -49,6 +49,8 @@ test-fast: setup-test
 test-godot: setup-test
 	sh scripts/godot-chroot
 	$(BIN)/python scripts/test_godot.py
+	$(BIN)/python scripts/test_godot_surfels.py
+	$(BIN)/python scripts/test_godot_probes.py
 
 # The npm package, and the page of srbf view, by the Node.js of a Python package.
 NPM := cd web && PATH="$(abspath $(BIN)):$$PATH" NODE_USE_SYSTEM_CA=1 npm --no-fund --no-audit --no-update-notifier --loglevel=error
