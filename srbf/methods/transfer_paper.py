@@ -25,7 +25,7 @@ from srbf.methods.light_table_maps import stored_values
 from srbf.methods.over_lights import row_chunks
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.visibility.cloud_lights import CloudLights
-from srbf.visibility.patch_transfer import PatchTransfer, example_light, patch_transfer, surfel_clusters, thinned
+from srbf.visibility.patch_transfer import Exchange, PatchTransfer, example_light, patch_transfer, surfel_clusters, thinned
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.splats import splats_at
 from srbf.visibility.surface_cells import Cells
@@ -136,25 +136,27 @@ class TransferPaper(Method):
         >>> TransferPaper(d2=20).encode(inside).manifest["direct_bases"]["coefficients"]  # doctest: +SKIP
         20
         """
-        inside = CloudLights.of(capture)
         operator = TransferOperator.read(capture.folder)
         if not len(operator.cells.places):
             raise InputError(f"expected surfels in {capture.folder}, found none that light can reach; choose other `light_bounds`")
+        return self.of_transfer(capture, *self.transfer(capture, operator))
+
+    def transfer(self, capture: Capture, operator: TransferOperator) -> tuple[CloudLights, PatchTransfer]:
+        """(the surfels cluster by cluster, bases and matrices with all their entries)."""
+        inside = CloudLights.of(capture)
         clusters = surfel_clusters(operator.cells, None if self.cluster_size == "auto" else int(self.cluster_size), self.seed)
         order = np.argsort(clusters, kind="stable")
         cells = _at(operator.cells, order)
         inside = replace(inside, cells=cells)
         examples = example_light(ReceivedLight(cells, inside.occluders), cells.areas, inside.free, self.seed)
-        exchange = operator.exchange[order][:, order]
-        found = patch_transfer(exchange, cells, clusters[order], examples, self.d2, capture.manifest["surfels"].get("bounces"))
+        bounces = capture.manifest["surfels"].get("bounces")
+        exchange = Exchange(operator.exchange[order][:, order], cells, bounces, self.seed)
+        return inside, patch_transfer(exchange, cells, clusters[order], examples, self.d2)
+
+    def of_transfer(self, capture: Capture, inside: CloudLights, found: PatchTransfer) -> Asset:
+        """The asset of what `transfer` found."""
         if self.dropped != "none":
             found = replace(found, matrices=thinned(found, float(self.dropped)))
-        asset = self._asset(capture, inside, found)
-        asset.manifest["source"]["fit"]["train_lights"] = examples.shape[1]
-        kept_visibility.add_visibility(asset, inside, self.visibility, self.receiver_visibility)
-        return asset
-
-    def _asset(self, capture: Capture, inside: CloudLights, found: PatchTransfer) -> Asset:
         nearest = nearest_covered(capture.coverage())
         images = carried_images(capture, nearest)
         stored = np.stack([dilate(layer, nearest) for layer in _splat_layers(capture, inside)])
@@ -167,8 +169,11 @@ class TransferPaper(Method):
             tables[name], entry = stored_values(table)
             manifest[name] = {"file": self.tables[name], "scale": entry["light_values"]["scale"]}
         manifest["cells"] = {"file": self.tables["cells"]}
-        manifest["direct_bases"] |= {"coefficients": self.d2, "clusters": found.sizes.tolist()}
-        return Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+        manifest["direct_bases"] |= {"coefficients": len(found.bases), "clusters": found.sizes.tolist()}
+        manifest["source"]["fit"]["train_lights"] = found.examples
+        asset = Asset(manifest, stored, scale, bias, tables, images, carried_scene(capture))
+        kept_visibility.add_visibility(asset, inside, self.visibility, self.receiver_visibility)
+        return asset
 
     def __str__(self) -> str:
         return f"{self.d2} coefficients of direct light per cluster of surfels"
@@ -201,7 +206,7 @@ class TransferPaper(Method):
 
     @classmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        return _shown(asset, cls.projected_weights(asset, lights))
+        return on_receivers(asset, cls.projected_weights(asset, lights))
 
     @classmethod
     def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
@@ -259,7 +264,7 @@ def _sparse(asset: Asset) -> list[Any]:
     return _matrices[asset]
 
 
-def _shown(asset: Asset, light: Float64[ndarray, "S 3"]) -> Float32[ndarray, "H W 3"]:
+def on_receivers(asset: Asset, light: Float64[ndarray, "S 3"]) -> Float32[ndarray, "H W 3"]:
     """What receivers show of light on the surfels, in the asset's quantity."""
     result = np.empty((asset.height, asset.width, 3), np.float32)
     values = light.astype(np.float32)

@@ -16,7 +16,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.lights import PointLight
 from srbf.solve.pca import principal_axes
-from srbf.solve.radiosity import SERIES, Bounces, reciprocal
+from srbf.solve.radiosity import MOST_REFLECTED, Bounces, reciprocal
 from srbf.visibility.patches import PLACE_WEIGHT, group
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.surface_cells import Cells
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
 EXAMPLES = 1000  # point lights whose direct light the bases are made of
 SURFELS_PER_CLUSTER, CLUSTERS = 1000, 48  # of few surfels as many clusters, but smaller ones
-MOST_DENSE = 10_000  # surfels whose form factors are solved as a dense matrix
+MOST_DENSE = 10_000  # surfels whose form factors are solved as a dense matrix; of more, by groups:
+GROUPS = 1500
 ROWS = 1 << 12  # of matrices thinned at a time
 
 
@@ -35,13 +36,15 @@ class PatchTransfer:
     """S surfels in K clusters, the first `sizes[0]` of them in the first, and so on.
 
     Coefficient j of a light on a cluster is the sum of `bases` (d, S) times its irradiance there; coefficient d k + j is that of cluster k.
-    Indirect irradiance on the surfels is the sum over coefficients of `matrices` (K d, S, 3). `strengths` (K d,): rms of the examples'.
+    Indirect irradiance on the surfels is the sum over coefficients of `matrices` (K d, S, 3). `strengths` (K d,): rms of the
+    coefficients of the examples, as many as `examples`.
     """
 
     sizes: Int[ndarray, " K"]
     bases: Float32[ndarray, "d S"]
     matrices: Float32[ndarray, "M S 3"]
     strengths: Float64[ndarray, " M"]
+    examples: int
 
 
 def surfel_clusters(cells: Cells, size: int | None, seed: int = 0) -> Int[ndarray, " S"]:
@@ -69,18 +72,12 @@ def example_light(
 
 
 def patch_transfer(
-    exchange: csr_array,
-    cells: Cells,
-    clusters: Int[ndarray, " S"],
-    examples: Float32[ndarray, "S V"],
-    count: int,
-    most_bounces: int | None = None,
+    exchange: Exchange, cells: Cells, clusters: Int[ndarray, " S"], examples: Float32[ndarray, "S V"], count: int
 ) -> PatchTransfer:
     """Bases of `count` coefficients a cluster, and the light that they send.
 
-    `clusters`: ascending, so that surfels of one cluster follow each other. `exchange`: form factors between the surfels. Bases are
-    orthonormal where surfels count by their area. A cluster of fewer surfels than `count` has coefficients of 0.
-    Cost: `most_bounces` products of the form factors with K d columns, for each color.
+    `clusters`: ascending, so that surfels of one cluster follow each other. Bases are orthonormal where surfels count by their area. A
+    cluster of fewer surfels than `count` has coefficients of 0.
     """
     sizes = np.bincount(clusters)
     root = np.sqrt(np.maximum(cells.areas, 1e-30)).astype(np.float32)
@@ -95,20 +92,51 @@ def patch_transfer(
         strengths[number] = values / np.sqrt(examples.shape[1])
     matrices = np.empty((columns.shape[1], len(clusters), 3), np.float32)
     for c in range(3):
-        matrices[:, :, c] = indirect(exchange, cells, c, columns, most_bounces).T
-    return PatchTransfer(sizes, bases, matrices, strengths.ravel())
+        matrices[:, :, c] = exchange.indirect(c, columns).T
+    return PatchTransfer(sizes, bases, matrices, strengths.ravel(), examples.shape[1])
 
 
-def indirect(
-    exchange: csr_array, cells: Cells, channel: int, irradiance: Float32[ndarray, "S n"], most_bounces: int | None = None
-) -> Float32[ndarray, "S n"]:
-    """F (sum over k of (rho F)^k) rho E: what direct irradiance E on the surfels makes of indirect irradiance there, of one color."""
-    if exchange.shape[0] <= MOST_DENSE:
-        factors = reciprocal(exchange.toarray(), cells.areas)
-        return factors @ Bounces(factors, cells.albedo[:, channel].astype(np.float64), most_bounces).radiosity(irradiance)
-    most = SERIES - 1 if most_bounces is None else min(most_bounces, SERIES - 1)
-    factors = reciprocal(exchange, cells.areas)
-    return factors @ Bounces(factors, cells.albedo[:, channel].astype(np.float64), most).radiosity(irradiance)
+class Exchange:
+    """What direct irradiance on surfels makes of indirect irradiance there: F (sum over k of (rho F)^k) rho E.
+
+    Of up to MOST_DENSE surfels exactly. Of more, light bounces twice between surfels, and from then on between GROUPS of them, which is
+    what a last gather does [Goral1984]: two sparse products in place of one for each bounce.
+    """
+
+    def __init__(self, exchange: csr_array, cells: Cells, most_bounces: int | None = None, seed: int = 0) -> None:
+        self._cells, self._most = cells, most_bounces
+        self._groups: Int[ndarray, " S"] | None = None
+        if len(cells.places) <= MOST_DENSE:
+            self._factors = reciprocal(exchange.toarray(), cells.areas)
+            return
+        self._factors = reciprocal(exchange, cells.areas)
+        extent = max(float(np.ptp(cells.places, axis=0).max()), 1e-9)
+        features = np.concatenate([PLACE_WEIGHT * cells.places / extent, cells.normals, cells.albedo], axis=1)
+        self._groups = group(features, cells.areas, GROUPS, seed)
+
+    def indirect(self, channel: int, irradiance: Float32[ndarray, "S n"]) -> Float32[ndarray, "S n"]:
+        """Of n lights, in one color."""
+        albedo = self._cells.albedo[:, channel].astype(np.float64)
+        if self._groups is None:
+            return self._factors @ Bounces(self._factors, albedo, self._most).radiosity(irradiance)
+        once = self._factors @ Bounces(self._factors, albedo, 1 if self._most is None else min(1, self._most)).radiosity(irradiance)
+        if self._most is not None and self._most < 2:
+            return once
+        rho = np.clip(albedo, 0, MOST_REFLECTED).astype(np.float32)[:, None]
+        return once + self._factors @ (rho * (once + self._later(albedo, once)))
+
+    def _later(self, albedo: Float64[ndarray, " S"], once: Float32[ndarray, "S n"]) -> Float32[ndarray, "S n"]:
+        """Irradiance from the second bounce on, even over each group."""
+        from scipy.sparse import csr_array
+
+        groups, count = self._groups, len(albedo)
+        member = csr_array((np.ones(count, np.float32), (groups, np.arange(count))))  # (G, S)
+        area = self._cells.areas.astype(np.float64)
+        share = member * (area / np.maximum(member.T @ (member @ area), 1e-30)).astype(np.float32)
+        factors = np.ascontiguousarray((share @ self._factors @ member.T).toarray(), np.float32)
+        most = None if self._most is None else self._most - 2
+        received = share @ once
+        return member.T @ (factors @ Bounces(factors, share @ albedo, most).radiosity(np.ascontiguousarray(received)))
 
 
 def thinned(found: PatchTransfer, share: float) -> Float32[ndarray, "M S 3"]:

@@ -62,7 +62,8 @@ def operator_of(asset: Asset, capture: Capture, received: np.ndarray) -> np.ndar
     order = np.array([places[tuple(place)] for place in asset.tables["cells"][0, :, :3].tolist()])
     own = np.empty_like(received)
     own[order] = received
-    columns = [patches.indirect(operator.exchange, operator.cells, c, own[:, c : c + 1].astype(np.float32))[:, 0] for c in range(3)]
+    exchange = patches.Exchange(operator.exchange, operator.cells)
+    columns = [exchange.indirect(c, own[:, c : c + 1].astype(np.float32))[:, 0] for c in range(3)]
     return np.stack(columns, axis=1)[order]
 
 
@@ -86,6 +87,7 @@ def test_lights_add_up_and_scale_and_none_is_dark(asset: Asset) -> None:
     both = linear_response(asset, LIGHTS)
     apart = linear_response(asset, [one]) + linear_response(asset, [other])
     np.testing.assert_allclose(both, apart, atol=1e-5 * both.max())
+    assert isinstance(one, PointLight)
     twice = linear_response(asset, [replace(one, a0=2.0)])
     np.testing.assert_allclose(twice, 4 * linear_response(asset, [one]), rtol=1e-4, atol=1e-5)
     assert not linear_response(asset, []).any()
@@ -128,7 +130,7 @@ def test_entries_of_0_hold_the_share_that_was_asked_for(capture: Capture) -> Non
     clusters = np.sort(patches.surfel_clusters(operator.cells, SIZE))
     cells = operator.cells
     examples = patches.example_light(ReceivedLight(cells, inside.occluders), cells.areas, inside.free)
-    found = patches.patch_transfer(operator.exchange, cells, clusters, examples, 6)
+    found = patches.patch_transfer(patches.Exchange(operator.exchange, cells), cells, clusters, examples, 6)
     thin = patches.thinned(found, 0.1)
     lost = (found.strengths[:, None, None] ** 2 * (found.matrices - thin) ** 2).sum(axis=(0, 2))
     whole = (found.strengths[:, None, None] ** 2 * found.matrices**2).sum(axis=(0, 2))
@@ -136,12 +138,17 @@ def test_entries_of_0_hold_the_share_that_was_asked_for(capture: Capture) -> Non
     assert 0.05 < (thin != 0).any(axis=2).mean() < 0.8
 
 
-def test_many_surfels_are_solved_sparsely_alike(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("bounces", "error"), [(0, 0), (1, 1e-5), (2, 1e-5), (5, 0.01), (None, 0.02)])
+def test_many_surfels_exchange_later_bounces_in_groups(
+    capture: Capture, monkeypatch: pytest.MonkeyPatch, bounces: int | None, error: float
+) -> None:
     operator = TransferOperator.read(capture.folder)
     direct = np.random.default_rng(3).uniform(size=(len(operator.cells.places), 2)).astype(np.float32)
-    dense = patches.indirect(operator.exchange, operator.cells, 0, direct, 4)
+    whole = patches.Exchange(operator.exchange, operator.cells, bounces).indirect(0, direct)
     monkeypatch.setattr(patches, "MOST_DENSE", 0)
-    np.testing.assert_allclose(patches.indirect(operator.exchange, operator.cells, 0, direct, 4), dense, rtol=1e-4)
+    monkeypatch.setattr(patches, "GROUPS", 30)
+    found = patches.Exchange(operator.exchange, operator.cells, bounces).indirect(0, direct)
+    np.testing.assert_allclose(found, whole, rtol=error)
 
 
 def test_splats_end_at_walls_and_far_from_surfels() -> None:
