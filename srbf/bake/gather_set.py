@@ -29,7 +29,7 @@ from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.view_clusters import MOST_CLUSTERS
 
 POOL = 32_768  # surfels
-FRAGMENTS = 2  # per surfel, about, that the scene is asked for
+FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
 Progress = Callable[[int, int, str], None]
 

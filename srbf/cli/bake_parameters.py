@@ -86,7 +86,8 @@ LightSet = Annotated[
         metavar="SET",
         help="Other lights than directions. named: the scene's own, each by itself. cloud: --lights point lights in its free space. "
         "patches: parts of its surfaces, for any light inside. "
-        "surfels: light between its surfaces, by rays, for any light. gather: the same for a view alone, in full detail. point:SPACING: point lights that fill a box, so many meters apart.",
+        "surfels: light between its surfaces, by rays, for any light. "
+        "gather: the same for a view, in detail. point:SPACING: point lights that fill a box, so many meters apart.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),

@@ -244,7 +244,9 @@ class DeepFramebuffer(Method):
     @classmethod
     def summary(cls, asset: Asset) -> str:
         told = asset.manifest["gather"]
-        return f"{told['surfels']} surfels, {told['clusters']} view clusters of {told['view_rays']} rays, {cls.size(asset) / MEGABYTE:.1f} MB"
+        return (
+            f"{told['surfels']} surfels, {told['clusters']} view clusters of {told['view_rays']} rays, {cls.size(asset) / MEGABYTE:.1f} MB"
+        )
 
     @classmethod
     def describe(cls, asset: Asset) -> Mapping[str, Any]:

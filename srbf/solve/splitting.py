@@ -38,7 +38,9 @@ def split_clusters(features: Float[ndarray, "N d"], count: int, weights: Float[n
         moved = members[side]
         labels[moved] = len(spread) + own[side]
         renewed = np.concatenate([2 * own[~side], 2 * own[side] + 1])
-        found = _spreads(points[np.concatenate([members[~side], moved])], weight[np.concatenate([members[~side], moved])], renewed, 2 * len(chosen))
+        found = _spreads(
+            points[np.concatenate([members[~side], moved])], weight[np.concatenate([members[~side], moved])], renewed, 2 * len(chosen)
+        )
         spread[chosen] = found[::2]
         spread = np.concatenate([spread, found[1::2]])
     return np.unique(labels, return_inverse=True)[1].ravel()

@@ -10,15 +10,15 @@ from srbf.solve.splitting import split_clusters
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
-from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, exposed, grouped_cells, lit
-from srbf.visibility.surfels import Surfels, cut_at_walls, reached
+from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, grouped_cells, lit
+from srbf.visibility.surfels import Surfels, cut_at_walls
 
 MOST_POOL = 65_536  # indices of surfels are 16 bits
 LOOKS, LOOK_RAYS = 16_384, 64  # points of the view, and rays of each, by which it is known what the view gathers
 AGAIN, AGAIN_RAYS = 16_384, 16  # of their hits, which gather as well
 EVENLY = 0.1  # share of the pool that goes by area, whatever the view sees
 NORMAL_WEIGHT, ALBEDO_WEIGHT = 0.04, 0.02  # of the scene's longest side, beside places
-WITNESSES = 64  # free places by which it is known what a wall parts
+WITNESSES = 64  # free places by which it is known what light reaches, beside what the view gathers from, and what a wall parts
 
 
 def pool_of(
@@ -31,29 +31,26 @@ def pool_of(
     count: int,
     seed: int = 0,
 ) -> Surfels:
-    """At most about `count` surfels of all surfaces that light can reach, small where cosine rays from the view's `points` end.
+    """At most about `count` surfels of all surfaces that light reaches, small where cosine rays from the view's `points` end.
 
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well.
     """
     surfaces, objects = cut_at_walls(surfaces, objects, occluders)
     both = surfaces.both_sides()
-    kept = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
-    seen = np.zeros(len(both.corners), bool)
-    seen[kept[exposed(both.at(kept), occluders, free)]] = True
-    kept = kept[reached(both, seen)[kept]]
+    able = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
+    gathered = looked_at(surfaces, points, normals, seed)[able]
+    witnesses = lit(both.centers[able], both.normals[able], occluders, free[:WITNESSES])
+    found = witnesses.any(axis=1) | (gathered > 0)
+    kept, gathered, witnesses = able[found], gathered[found], witnesses[found]
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
         return Surfels(Cells.of_image(np.zeros((2, 0, 4), np.float32)), surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64))
     sides = both.at(kept)
-    gathered = looked_at(surfaces, points, normals, seed)[kept]
     weight = gathered / max(float(gathered.sum()), 1e-30) + EVENLY * sides.areas / sides.areas.sum()
     scale = float(np.ptp(sides.centers, axis=0).max())
     features = np.concatenate([sides.centers, NORMAL_WEIGHT * scale * sides.normals, ALBEDO_WEIGHT * scale * sides.albedo], axis=1)
-    witnesses = lit(sides.centers, sides.normals, occluders, free[:WITNESSES])
-    asked = count
-    owner = split_clusters(features, asked, weight)
-    owner = parted_groups(owner, witnesses)
+    owner = parted_groups(split_clusters(features, count, weight), witnesses)
     if owner.max() >= count:  # walls part some
         owner = parted_groups(split_clusters(features, max(1, 2 * count - int(owner.max()) - 1), weight), witnesses)
     owners[kept] = owner

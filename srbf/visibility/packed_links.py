@@ -39,8 +39,8 @@ def unpacked(links: ndarray, rows: ndarray, row_count: int, rays: int, surfel_co
 
 
 def link_count(links: SparseLinks, share: float = 1.0) -> float:
-    """How many links are left, about, of a `share` of the rays."""
-    return float((1 - (1 - min(share, 1.0)) ** links.counts.astype(np.float64)).sum())
+    """How many links are left, about, of a `share` of the rays: those of many rays stay."""
+    return float(np.minimum(1, min(share, 1.0) * links.counts.astype(np.float64)).sum())
 
 
 def share_within(links: SparseLinks, most: float) -> float:

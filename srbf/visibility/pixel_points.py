@@ -57,8 +57,10 @@ class PixelPoints:
         shares = np.concatenate([np.ones(len(plain)), share / total[many.texel[real]]])
         return PixelPoints(points, facing, np.concatenate([plain, many.texel[real]]), shares.astype(np.float32), size)
 
-    def gathered(self, clusters: Int[ndarray, "N K"], weights: Float[ndarray, "N K"]) -> tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]]:
-        """(clusters, weights) of the pixels from those of the points: the K heaviest of each pixel, which sum to 1; 0 of pixels without."""
+    def gathered(
+        self, clusters: Int[ndarray, "N K"], weights: Float[ndarray, "N K"]
+    ) -> tuple[Int[ndarray, "P M"], Float32[ndarray, "P M"]]:
+        """(clusters, weights) of the pixels from those of the points: the M heaviest of each pixel, which sum to 1; 0 of pixels without."""
         most = min(MOST_MIXED, int(clusters.max(initial=0)) + 1)
         pixel = np.repeat(self.pixels, clusters.shape[1])
         keys = pixel * (int(clusters.max(initial=0)) + 1) + clusters.ravel()

@@ -19,11 +19,11 @@ MOST_BOUNCES, NEGLIGIBLE = 512, 1e-5  # of all light, that a bounce adds and is 
 
 @dataclass(frozen=True, eq=False)
 class SparseLinks:
-    """Of n rows, row i the links `starts[i]` to `starts[i + 1]`: a surfel, and how many of the row's `rays` rays meet it."""
+    """Of n rows, row i has the links `starts[i]` to `starts[i + 1]`: a surfel (16 bits), and how many of the row's `rays` rays meet it."""
 
-    starts: Int[ndarray, " n"]
-    surfels: Int[ndarray, " L"]
-    counts: Int[ndarray, " L"]
+    starts: Int[ndarray, " m"]
+    surfels: ndarray
+    counts: ndarray
     rays: int
     surfel_count: int
 
