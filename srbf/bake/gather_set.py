@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,8 +16,8 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
-from srbf.bake.light_sets import PLACES, Box, PlacedLight
-from srbf.bake.point_lights import parse_box
+from srbf.bake.light_sets import PLACES, PlacedLight
+from srbf.bake.point_lights import Box, parse_box
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
@@ -49,24 +50,23 @@ class FoundSurfaces:
     free: Float64[ndarray, "F 3"]
     box: Float64[ndarray, " 6"]
     bounces: Int[ndarray, ""]
-    checksum: str = ""
 
-    def __post_init__(self) -> None:
+    @functools.cached_property
+    def checksum(self) -> str:
+        """Of all arrays."""
         digest = hashlib.sha256()
         for array in self.arrays().values():
             digest.update(np.ascontiguousarray(array).tobytes())
-        object.__setattr__(self, "checksum", digest.hexdigest())
+        return digest.hexdigest()
 
     def arrays(self) -> dict[str, ndarray]:
         """As a file holds them."""
-        names = ("corners", "albedo", "objects", "occluders", "random", "free", "box", "bounces")
-        return {name: np.asarray(getattr(self, name)) for name in names}
+        return {entry.name: np.asarray(getattr(self, entry.name)) for entry in fields(self)}
 
     @staticmethod
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
-        names = ("corners", "albedo", "objects", "occluders", "random", "free", "box", "bounces")
-        return FoundSurfaces(*(stored[name] for name in names))
+        return FoundSurfaces(*(stored[entry.name] for entry in fields(FoundSurfaces)))
 
     @staticmethod
     def of_facts(facts: dict[str, Any]) -> FoundSurfaces:
@@ -135,7 +135,7 @@ class GatherSet:
         }
 
     def with_facts(self, facts: dict[str, Any], say: Callable[[str], None]) -> GatherSet:
-        """The set with what the scene answered."""
+        """The set with the facts of the scene."""
         found = FoundSurfaces.of_facts(facts)
         x0, y0, z0, x1, y1, z1 = found.box.tolist()
         skipped = facts["places"]["skipped"]

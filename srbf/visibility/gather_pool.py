@@ -50,9 +50,11 @@ def pool_of(
     weight = gathered / max(float(gathered.sum()), 1e-30) + EVENLY * sides.areas / sides.areas.sum()
     scale = float(np.ptp(sides.centers, axis=0).max())
     features = np.concatenate([sides.centers, NORMAL_WEIGHT * scale * sides.normals, ALBEDO_WEIGHT * scale * sides.albedo], axis=1)
-    owner = parted_groups(split_clusters(features, count, weight), witnesses)
-    if owner.max() >= count:  # walls part some
-        owner = parted_groups(split_clusters(features, max(1, 2 * count - int(owner.max()) - 1), weight), witnesses)
+    asked = count
+    owner = parted_groups(split_clusters(features, asked, weight), witnesses)
+    while owner.max() >= count and asked > 1:  # walls part some
+        asked = max(1, asked - int(1.1 * (owner.max() + 1 - count)) - 1)
+        owner = parted_groups(split_clusters(features, asked, weight), witnesses)
     owners[kept] = owner
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]

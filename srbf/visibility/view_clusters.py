@@ -43,8 +43,8 @@ class ViewClusters:
         nearest = np.lexsort((away, labels))[np.cumsum(size) - size]
         own = np.asarray(normals, np.float64)[nearest]
         normal = mean[:, 3:] / np.maximum(np.linalg.norm(mean[:, 3:], axis=1, keepdims=True), 1e-30)
-        alike = np.einsum("nk,nk->n", own, normal) >= ONE_WAY
-        return ViewClusters(np.asarray(points, np.float64)[nearest], np.where(alike[:, None], normal, own), scale)
+        agrees = np.einsum("nk,nk->n", own, normal) >= ONE_WAY
+        return ViewClusters(np.asarray(points, np.float64)[nearest], np.where(agrees[:, None], normal, own), scale)
 
     def mixed(
         self, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], occluders: EmbreeTriangles | None = None

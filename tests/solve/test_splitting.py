@@ -1,4 +1,4 @@
-"""Clusters by splitting: blobs are told apart, counts hold, weights and equal points count as they should."""
+"""Clusters by splitting: blobs are clusters, counts hold, weights and equal points count as they should."""
 
 from __future__ import annotations
 
