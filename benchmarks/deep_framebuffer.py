@@ -4,7 +4,7 @@ Lights at random free places that no bake saw, each so that the view gets light 
 of 10 to 15, and points 5 cm off a surface in view (wall). References are rendered twice, so that their noise drops out: relative RMSE =
 sqrt(sum (a - r1)(a - r2) / sum r1 r2), of the indirect light and of the full picture with direct light by rays, median over lights; the
 ratio of energies of the indirect light, pooled and the one farthest from 1; megabytes of the asset's links, pool and pixels or maps; CPU
-seconds for one light. `--references FILE.npz` keeps what Cycles rendered.
+seconds for one light; the noise of one reference. `--references FILE.npz` keeps what Cycles rendered.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def main() -> None:
     capture = Capture.open(asked.capture)
     covered = capture.coverage() >= COVERED
     kept = dict(np.load(asked.references)) if asked.references is not None and asked.references.is_file() else {}
-    print(f"{'asset':>24}{'light':>8}{'indirect':>10}{'full':>8}{'energy':>8}{'worst':>8}{'MB':>8}{'CPU s':>8}")
+    print(f"{'asset':>24}{'light':>8}{'indirect':>10}{'full':>8}{'energy':>8}{'worst':>8}{'MB':>8}{'CPU s':>8}{'noise':>9}")
     for kind in asked.kinds.split(","):
         lights = placed(capture, kind, asked.lights)
         if kind not in kept:
@@ -130,16 +130,20 @@ def main() -> None:
             seconds = (time.process_time() - started) / len(lights)
             with Added(asset, "ray") as added:
                 direct = np.stack([added.response([light])[covered] for light in lights])  # type: ignore[index]
-            bounced, full = [], []
+            bounced, full, energies, noise = [], [], [], []
             for own, near, first, second in zip(indirect, direct, *references, strict=True):
+                known = np.isfinite(first + second).all(axis=(0, 2))  # Cycles leaves a few pixels of spots with sharp edges as NaN
+                own, near, first, second = own[known], near[known], first[:, known], second[:, known]
                 bounced.append(error(own, first[0], second[0]))
                 full.append(error(own + near, first.sum(axis=0), second.sum(axis=0)))
-            energy = indirect.sum(axis=(1, 2)) / references[:, :, 0].mean(axis=0).sum(axis=(1, 2))
-            whole = indirect.sum() / references[:, :, 0].mean(axis=0).sum()
+                energies.append((float(own.sum()), float((first[0] + second[0]).sum() / 2)))
+                noise.append(np.sqrt(((first[0] - second[0]) ** 2).sum() / 2 / (first[0] * second[0]).sum()))
+            energy = np.array([one / other for one, other in energies])
+            whole = sum(one for one, _ in energies) / sum(other for _, other in energies)
             size = (asset.stored.nbytes + sum(table.nbytes for table in asset.tables.values())) / 1e6
             print(
                 f"{path.name:>24}{kind:>8}{100 * np.median(bounced):>9.1f}%{100 * np.median(full):>7.2f}%{whole:>8.3f}"
-                f"{energy[np.abs(energy - 1).argmax()]:>8.3f}{size:>8.1f}{seconds:>8.2f}",
+                f"{energy[np.abs(energy - 1).argmax()]:>8.3f}{size:>8.1f}{seconds:>8.2f}{100 * np.median(noise):>8.0f}%",
                 flush=True,
             )
 

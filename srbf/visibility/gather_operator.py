@@ -27,7 +27,8 @@ from srbf.visibility.view_clusters import ViewClusters
 
 POOL_FILE = "pool.exr"
 GATHER_FILE = "gather.npz"
-VIEW_RAYS, SURFEL_RAYS = 512, 64
+VIEW_RAYS, MOST_VIEW_RAYS = 512, 2048  # of a view cluster: more where there are fewer than DEFAULT_CLUSTERS
+SURFEL_RAYS = 64
 SURFEL_POINTS = 4  # of a surfel, that its rays start from
 ROWS = 1 << 12  # traced between two reports of progress
 DEFAULT_CLUSTERS = 20_000  # of a view with more pixels
@@ -61,7 +62,8 @@ class GatherOperator:
         found = ViewClusters.of_points(pixels.points, pixels.normals, clusters, extent)
         nearest, weights = pixels.gathered(*found.mixed(pixels.points, pixels.normals, occluders))
         total = len(found.places) + pool.count
-        view = _traced(pool, RayOrigins.even(found.places[:, None], found.normals[:, None]), VIEW_RAYS, seed, lambda n: progress(n, total))
+        rays = int(np.clip(VIEW_RAYS * DEFAULT_CLUSTERS // max(1, len(found.places)), VIEW_RAYS, MOST_VIEW_RAYS))
+        view = _traced(pool, RayOrigins.even(found.places[:, None], found.normals[:, None]), rays, seed, lambda n: progress(n, total))
         origins = RayOrigins.even(*pool.spread(SURFEL_POINTS, seed))
         own = _traced(pool, origins, SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total))
         return GatherOperator(pool.cells, view, own, nearest, weights)
@@ -121,6 +123,6 @@ def _traced(pool: Surfels, origins: RayOrigins, rays: int, seed: int, progress: 
     for start in range(0, len(origins.points), ROWS):
         part = slice(start, start + ROWS)
         own = RayOrigins(origins.points[part], origins.normals[part], origins.weights[part])
-        parts.append(form_factors(pool, own, rays // own.weights.shape[1], hash((seed, start)) & 0x7FFFFFFF))
+        parts.append(form_factors(pool, own, rays // own.weights.shape[1], (seed * 0x9E3779B1 + start * 0x85EBCA77) & 0x7FFFFFFF))
         progress(min(start + ROWS, len(origins.points)))
     return SparseLinks.of_shares(vstack(parts, format="csr"), rays)
