@@ -221,7 +221,8 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
     if places.get("open_share", 0) > OPEN:
         say(
             f"the scene is open: {places['open_share']:.0%} of rays from the free places leave it; lights are captured in that box "
-            "alone, and distant light is not: `light_bounds` gives another box"
+            f"alone, and {'environments by what surfels see' if surfels is not None else 'distant light is not'}: `light_bounds` gives "
+            "another box"
         )
     box = (x0, y0, z0, x1, y1, z1)
     if surfels is not None:

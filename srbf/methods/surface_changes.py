@@ -17,6 +17,7 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.errors import InputError
+from srbf.methods.environment_table import without_environment_table
 from srbf.solve.radiosity import MOST_REFLECTED, SERIES
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.transfer_basis import TransferBasis, grouped
@@ -160,7 +161,8 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     Returns
     -------
     Asset
-        In memory. Its table of places, for engines without rays, is that of before.
+        In memory. Its table of places, for engines without rays, is that of before. It has none of environments, which are
+        measured by rays.
 
     Raises
     ------
@@ -186,7 +188,7 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
         asset, manifest=manifest, tables={**asset.tables, "surfel_transfer": (table / np.float32(largest)).astype(np.float16)}
     )
     painted.add_to(changed)
-    return changed
+    return without_environment_table(changed)
 
 
 def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64, Int
+from srbf.arrays import Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
@@ -17,7 +17,15 @@ from srbf.captured_light import NOWHERE, CapturedLight
 from srbf.compute.full_precision import by_channel
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.lights import Light, NamedLight
+from srbf.lights import EnvironmentLight, Light, NamedLight
+from srbf.methods.environment_table import FILES as TABLE_FILES
+from srbf.methods.environment_table import (
+    add_environment_table,
+    environment_columns,
+    environment_weights,
+    has_environment_table,
+    read_environment_table,
+)
 from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
@@ -31,7 +39,8 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
 SURFELS, MOST_SURFELS = 3000, 8000
-BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
+BITS = 9  # of a weight, sign included, by the largest of its row: what has few bits packs well
+VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
 TEXELS_PER_CLUSTER = 24  # at least, of a candidate
@@ -86,14 +95,14 @@ class Transfer(LightsInsideMaps):
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
     takes_objects: ClassVar[bool] = True
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES}
+    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES, **TABLE_FILES}
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
-    smooth: bool = setting(True, "Take the noise of few rays out of the components.")
+    smooth: bool = setting(False, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     visibility: str = setting("none", VISIBILITY_HELP)
     receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
@@ -156,10 +165,13 @@ class Transfer(LightsInsideMaps):
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
+        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
         count = inside.cells.patch_count
         own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        if operator.environment is not None:
+            add_environment_table(asset, _rounded(environment_columns(basis.transfer, operator.environment)), operator.environment)
         if self.editable:
             told = capture.manifest["surfels"]
             names = tuple(told.get("objects", ()))
@@ -181,19 +193,30 @@ class Transfer(LightsInsideMaps):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["surfel_transfer"]
         table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
-        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16), **Surfaces.read(reader)}
+        return {
+            **super().read_tables(reader),
+            "surfel_transfer": table.astype(np.float16),
+            **Surfaces.read(reader),
+            **read_environment_table(reader),
+        }
+
+    @classmethod
+    def needs_rays(cls, asset: Asset, light: Light) -> bool:
+        """An environment map does not, where the asset knows the environment, nor does an object that emits."""
+        return not (isinstance(light, NamedLight) or (isinstance(light, EnvironmentLight) and has_environment_table(asset)))
 
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """A named light is an object whose surfaces emit radiance of its color."""
-        on_patches = light_on_patches(asset)
         received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
         emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
         for light in lights:
             if isinstance(light, NamedLight):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
+            elif isinstance(light, EnvironmentLight) and has_environment_table(asset):
+                emitted += environment_weights(asset, light)
             else:
-                received += on_patches(light)
+                received += light_on_patches(asset)(light)
         table = by_channel(asset.tables["surfel_transfer"])
         columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
@@ -214,6 +237,14 @@ def _rounded(values: Float32[ndarray, "r S 3"]) -> Float32[ndarray, "r S 3"]:
     largest = np.maximum(np.abs(values).max(axis=1, keepdims=True), np.float32(1e-30))
     step = np.exp2(np.ceil(np.log2(largest / (2 ** (BITS - 1) - 1))))
     return (np.round(values / step) * step).astype(np.float32)
+
+
+def _even_steps(values: Float16[ndarray, "F r c"], clusters: int) -> Float16[ndarray, "F r c"]:
+    """Values as multiples of a power of two for each cluster."""
+    of_cluster = values.astype(np.float32).reshape(clusters, -1)
+    rms = np.sqrt((of_cluster**2).mean(axis=1, keepdims=True))
+    step = np.exp2(np.round(np.log2(VALUE_STEP * np.maximum(rms, np.float32(1e-30)))))
+    return (np.round(of_cluster / step) * step).reshape(values.shape).astype(np.float16)
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:

@@ -40,9 +40,16 @@ class Surfels:
 
     def seen_along(self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]) -> Int[ndarray, " n"]:
         """The surfel that each ray meets first; -1 where it meets none, or black."""
+        return self.met_along(origins, directions)[0]
+
+    def met_along(
+        self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]
+    ) -> tuple[Int[ndarray, " n"], Bool[ndarray, " n"]]:
+        """(the surfel that each ray meets first, -1 where it meets none, or black; whether it meets any surface)."""
         triangle, _, _ = self._triangles.first_hit(origins, directions)
         back = np.einsum("nk,nk->n", self._normals[triangle], directions) > 0
-        return np.where(triangle >= 0, self.owners[back.astype(np.int64), triangle], -1)
+        met = triangle >= 0
+        return np.where(met, self.owners[back.astype(np.int64), triangle], -1), met
 
     def spread(self, count: int, seed: int = 0) -> tuple[Float64[ndarray, "S q 3"], Float64[ndarray, "S q 3"]]:
         """`count` points of each surfel, evenly over its area, and unit normals there."""
