@@ -26,6 +26,7 @@ SOURCES = {  # of train lights, by light set
     "named": "lights of the scene",
     "cloud": "point lights in free space",
     "patches": "patches of the surfaces",
+    "gather": "links of view clusters to a pool of surfels in place of train lights",
     "surfels": "form factors of surfels in place of train lights",
 }
 

@@ -73,7 +73,13 @@ def _flags() -> dict[str, Any]:
     flags |= {name: _annotation(found) for name, found in owners.items()}
     flags["budget"] = Annotated[
         int | None,
-        typer.Option("--budget", metavar="BYTES", parser=COUNT, help=f"auto: per texel, at most ({DEFAULT_BUDGET}).", show_default=False),
+        typer.Option(
+            "--budget",
+            metavar="BYTES",
+            parser=COUNT,
+            help=f"auto: per texel, at most ({DEFAULT_BUDGET}). deep-framebuffer: megabytes in all.",
+            show_default=False,
+        ),
     ]
     flags["psnr"] = Annotated[
         float | None,

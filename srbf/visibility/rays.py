@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -90,6 +90,14 @@ class RayTracer:
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
+
+    def samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
+        """Points on surfaces: samples `numbers`, from 0, of the footprints of `texels`, ordered by sample."""
+        step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
+        if len(texels) <= step:
+            return self._samples(texels, numbers)
+        parts = [self._samples(texels, range(number, number + 1)) for number in numbers]
+        return Samples(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Samples)))
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
