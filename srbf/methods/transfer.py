@@ -38,7 +38,7 @@ from srbf.visibility.transfer_basis import MOST_RANK, TransferBasis, grouped, tr
 from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
-SURFELS, MOST_SURFELS = 3000, 8000
+MOST_SURFELS = 8000
 BITS = 9  # of a weight, sign included, by the largest of its row: what has few bits packs well
 VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
@@ -60,7 +60,7 @@ class Transfer(LightsInsideMaps):
     Parameters
     ----------
     surfels
-        How many parts of the surfaces a light is measured by; `auto`: about 3000, or as many as the capture has.
+        How many parts of the surfaces a light is measured by; `auto`: the capture's surfels, at most 8000.
     rank
         How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 768.
     clusters
@@ -149,7 +149,7 @@ class Transfer(LightsInsideMaps):
             raise InputError(
                 f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
             )
-        count = SURFELS if self.surfels == "auto" else int(self.surfels)
+        count = MOST_SURFELS if self.surfels == "auto" else int(self.surfels)
         inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed))
         if self.editable:  # an object emits by itself
             inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))

@@ -76,6 +76,8 @@ NOT_RUN = {
     "python benchmarks/quality.py": "its own scene of 300 lights takes minutes",
     "python benchmarks/quality.py REALRTI": "fits again for each light left out: minutes for one small item",
     "python scripts/test_godot.py": "wants the chroot with Godot that scripts/godot-chroot makes, as root",
+    "python scripts/test_godot_surfels.py": "the same",
+    "python scripts/test_godot_probes.py": "the same",
     "godot *": "the same",
     "blender --command extension install-file *": "wants a Blender with a user's folder; the zip itself is built and validated by a test",
     "npm install *": "asks the registry",
