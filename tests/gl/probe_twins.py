@@ -9,7 +9,8 @@ from closed_forms import quad
 from made_probes import grid_in, packed
 from twins import SUM, Evaluate, twin, units, vec4
 
-from srbf.basis.irradiance_harmonics import irradiance_at
+from srbf.basis.irradiance_harmonics import irradiance_at, radiance_harmonics
+from srbf.export.asset_shader import probe_weights
 from srbf.probe_grid import ProbeGrid
 
 STEEP = 1e-4  # of the weights' sum: a surface a centimeter from a probe takes 30 / m times a distance's rounding, ten times over
@@ -91,3 +92,20 @@ def _(evaluate: Evaluate) -> None:
     expected = irradiance_at(np.einsum("ne,nekc->nkc", weight, radiance[probe].astype(float)), normals)
     np.testing.assert_allclose(found, expected, atol=(STEEP + SUM) * expected.max())
     assert expected.min() >= 0 and np.ptp(expected) > 1
+
+
+@twin("probes/probe_harmonics.glsl")
+def _(evaluate: Evaluate) -> None:
+    grid = room()
+    picture = np.random.default_rng(55).uniform(0, 2, (grid.counts[1] * grid.counts[2], 12 * grid.counts[0], 3)).astype(np.float32)
+    expected = packed(grid, radiance_harmonics(grid.values(picture))[grid.sources])
+    row, column = np.divmod(np.arange(expected.shape[0] * expected.shape[1]), expected.shape[1])
+    found = evaluate(
+        "probes/probe_harmonics.glsl",
+        f"srbfProbeHarmonics(facets, places, weights, {grid.counts[0]}, ivec2(a.xy))",
+        vec4(np.column_stack([column, row, row])),
+        declarations="uniform vec4 weights[84];",
+        arrays={"weights": probe_weights()},
+        images={"facets": picture, "places": images(grid)["places"]},
+    )
+    np.testing.assert_allclose(found, expected.reshape(-1, 4), atol=12 * SUM)
