@@ -24,6 +24,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 
 def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
     folder, asset = tmp_path / "capture", tmp_path / "asset"
+    assert "pool of surfels" in done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0", "--dry-run").output
     done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
     made = (folder / GATHER_FILE).stat().st_mtime_ns
     done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
