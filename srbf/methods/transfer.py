@@ -39,7 +39,7 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
 MOST_SURFELS = 8000
-BITS = 9  # of a weight, sign included, by the largest of its row: what has few bits packs well
+BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
 VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
