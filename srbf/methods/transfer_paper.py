@@ -89,6 +89,7 @@ class TransferPaper(Method):
     implied_by: ClassVar[tuple[str, ...]] = ("d2", "basis=paper")
     has_shader: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
+    exportable: ClassVar[bool] = False
 
     basis: Literal["paper"] | str = setting(PAPER, "Patch-to-patch matrices over bases of direct light, of captures of surfels.")
     d2: int = setting(10, "Coefficients of direct light per cluster of surfels.")

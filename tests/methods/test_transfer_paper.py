@@ -13,6 +13,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
+from srbf.export import export
 from srbf.fitting.options import check_settings, fit
 from srbf.io import files
 from srbf.lights import AreaLight, Light, NamedLight, PointLight
@@ -197,7 +198,9 @@ def test_settings_out_of_range_are_refused(settings: dict, words: str) -> None:
         check_settings(None, settings)
 
 
-def test_what_it_cannot_have_is_said(asset: Asset, capture: Capture) -> None:
+def test_what_it_cannot_have_is_said(asset: Asset, capture: Capture, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected an asset that engines can read, found a transfer-paper one"):
+        export(asset, "gltf", tmp_path / "exported")
     with pytest.raises(InputError, match="expected lights inside the scene for a transfer-paper asset, found a named one"):
         linear_response(asset, [NamedLight("Walls")])
     blind = replace(capture, manifest={key: told for key, told in capture.manifest.items() if key != "normal"})
