@@ -89,6 +89,7 @@ class TransferPaper(Method):
     implied_by: ClassVar[tuple[str, ...]] = ("d2", "basis=paper")
     has_shader: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
+    exportable: ClassVar[bool] = False
 
     basis: Literal["paper"] | str = setting(PAPER, "Patch-to-patch matrices over bases of direct light, of captures of surfels.")
     d2: int = setting(10, "Coefficients of direct light per cluster of surfels.")
@@ -286,7 +287,8 @@ def _splat_layers(capture: Capture, inside: CloudLights) -> ndarray:
         raise InputError(f"expected the albedo of the receivers in {capture.folder}, found none; bake again")
     covered = capture.coverage() >= COVERED
     points, directions = positions[covered].astype(np.float64), normals[covered].astype(np.float64)
-    surfels, weights = splats_at(points, directions, inside.cells, inside.occluders, SPLATS)
+    is_view = (capture.manifest.get("receiver") or {}).get("kind") == "view"
+    surfels, weights = splats_at(points, directions, inside.cells, inside.occluders, SPLATS, is_view)
     layers = np.zeros((3, *covered.shape, SPLATS), np.uint8)
     layers[0, covered], layers[1, covered], layers[2, covered] = _bytes(weights), surfels % 256, surfels // 256
     return layers

@@ -19,12 +19,18 @@ RECEIVERS = 1 << 14  # at a time
 
 
 def splats_at(
-    points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], cells: Cells, occluders: EmbreeTriangles, count: int
+    points: Float[ndarray, "P 3"],
+    normals: Float[ndarray, "P 3"],
+    cells: Cells,
+    occluders: EmbreeTriangles,
+    count: int,
+    is_seen: bool = False,
 ) -> tuple[Int[ndarray, "P n"], Float64[ndarray, "P n"]]:
     """(surfels, weights that add up to 1) of the `count` splats that cover each point most; weights of 0 where none does.
 
     A splat covers a point where nothing stands between the two and both face about the same way. What no splat covers is dark: surfels are
-    wherever light comes.
+    wherever light comes. `is_seen`: every point is, as pixels of a view are, so that those on a border, in part of two surfaces, show
+    what is near.
     """
     from scipy.spatial import KDTree
 
@@ -42,6 +48,7 @@ def splats_at(
         cosine = np.einsum("nk,nmk->nm", normals[part], cells.normals[near])
         strength = -0.5 * squared / (SPREAD * size[near]) ** 2
         seen = (cosine > FACING) & (strength > -0.5 * (REACH / SPREAD) ** 2)
+        covering = seen.copy()
         for raised in RAISED:
             row, column = np.nonzero(seen)
             surfel = near[row, column]
@@ -51,6 +58,9 @@ def splats_at(
             distance = np.linalg.norm(toward, axis=1)
             blocked = occluders.occluded(starts.astype(np.float32), toward / np.maximum(distance, 1e-30)[:, None], distance)
             seen[row[blocked], column[blocked]] = False
+        if is_seen:
+            hidden = ~seen.any(axis=1)
+            seen[hidden] = covering[hidden]
         strength = np.where(seen, strength, -np.inf)
         order = np.argsort(-strength, axis=1)[:, :count]
         found = np.exp(np.take_along_axis(strength, order, axis=1))

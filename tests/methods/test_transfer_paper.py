@@ -13,6 +13,7 @@ from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import ImageError, InputError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
+from srbf.export import export
 from srbf.fitting.options import check_settings, fit
 from srbf.io import files
 from srbf.lights import AreaLight, Light, NamedLight, PointLight
@@ -151,6 +152,13 @@ def test_many_surfels_exchange_later_bounces_in_groups(
     np.testing.assert_allclose(found, whole, rtol=error)
 
 
+def walls_about(x: float) -> EmbreeTriangles:
+    """Two walls, 2 cm apart."""
+    sides = [[[at, -1, -0.01], [at, 2, -0.01], [at, 2, 1]] for at in (x - 0.01, x + 0.01)]
+    others = [[[at, -1, -0.01], [at, 2, 1], [at, -1, 1]] for at in (x - 0.01, x + 0.01)]
+    return EmbreeTriangles(np.array([*sides, *others], np.float32))
+
+
 def test_splats_end_at_walls_and_far_from_surfels() -> None:
     """A floor of squares of 10 cm, a wall across it at x = 1."""
     x, y = (grid.ravel() for grid in np.meshgrid(np.arange(0.05, 2, 0.1), np.arange(0.05, 1, 0.1)))
@@ -164,6 +172,10 @@ def test_splats_end_at_walls_and_far_from_surfels() -> None:
     np.testing.assert_allclose(weights.sum(axis=1), [1, 1, 1, 0, 0])
     assert (places[surfels[0], 0] < 1).all() and (places[surfels[1], 0] > 1).all()
     np.testing.assert_allclose(weights[2], 0.25)
+    inside_wall = np.array([[1.0, 0.5, 0.0]])
+    for is_seen in (False, True):
+        hidden = splats_at(inside_wall, np.array([[0.0, 0.0, 1.0]]), cells, walls_about(1.0), 4, is_seen)[1]
+        assert hidden.sum() == (1 if is_seen else 0)
     np.testing.assert_allclose(weights[2] @ places[surfels[2]], points[2], atol=1e-6)
 
 
@@ -197,7 +209,9 @@ def test_settings_out_of_range_are_refused(settings: dict, words: str) -> None:
         check_settings(None, settings)
 
 
-def test_what_it_cannot_have_is_said(asset: Asset, capture: Capture) -> None:
+def test_what_it_cannot_have_is_said(asset: Asset, capture: Capture, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected an asset that engines can read, found a transfer-paper one"):
+        export(asset, "gltf", tmp_path / "exported")
     with pytest.raises(InputError, match="expected lights inside the scene for a transfer-paper asset, found a named one"):
         linear_response(asset, [NamedLight("Walls")])
     blind = replace(capture, manifest={key: told for key, told in capture.manifest.items() if key != "normal"})
