@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 from mathutils import Matrix, Vector
 
+from blender_bake.environment import EnvironmentWorld
 from blender_bake.named_lights import NamedLights
 
 AREA_WATTS = math.pi  # a Lambertian surface of P watts gives P / (pi d^2) on its axis, far away
@@ -38,13 +39,15 @@ class SoleLight:
         self._point = _point_light(scene, "POINT")
         self._point.data.shadow_soft_size = 0.0
         self._others: dict[str, bpy.types.Object] = {}
+        self._environment: EnvironmentWorld | None = None
 
     def aim(self, light: dict[str, Any] | None) -> None:
         """Turn on `light` alone; None: no light.
 
         {kind: directional, direction} (towards the light, unit), {kind: point, position} (m), {kind: named, name}, {kind: patch, patch}; to
         measure others by, {kind: spot, position, direction, outer} (where it shines, half-angle in rad, a sharp edge) and {kind: area,
-        position, u, v} (side vectors, m; it shines towards u x v), of unit irradiance at 1 m on the axis far away.
+        position, u, v} (side vectors, m; it shines towards u x v), of unit irradiance at 1 m on the axis far away, and {kind: environment,
+        file} (see `EnvironmentWorld`).
         """
         light = {"kind": None} if light is None else light
         kind = light["kind"]
@@ -56,6 +59,10 @@ class SoleLight:
         elif kind == "point":
             self._point.location = light["position"]
         self._aim_other(light)
+        if kind == "environment" and self._environment is None:
+            self._environment = EnvironmentWorld(self._scene)
+        if self._environment is not None:
+            self._environment.set(light.get("file"))
         if self._named is not None:
             self._named.aim(light["name"] if kind == "named" else None)
         if kind == "patch" and self._patches is None and self._file is not None:

@@ -1,7 +1,7 @@
 """Compare Godot's pixels with numpy's, on both renderers, in the chroot that scripts/godot-chroot makes; exits 1 if they differ.
 
 Every method, as a picture (canvas) and on a mesh (spatial), lit by Godot's own directional, omni and spot lights; mixes of named lights; a
-light cloud by its table of places. CI does not run it.
+light cloud by its table of places. Lights on surfels: scripts/test_godot_surfels.py. CI runs neither.
     python scripts/test_godot.py [--keep] [--only WORD]
 """
 
@@ -110,7 +110,7 @@ def jobs(asset: Asset) -> Iterator[dict[str, Any]]:
         for name in every if asset.transport == "combined" else ("directional", "point", "squared"):
             yield {"name": name, "mode": "spatial", "hdr": True, "placed": STRAIGHT}
             yield {"name": name, "mode": "spatial", "hdr": False, "placed": STRAIGHT}
-        for name in ("directional", "point", "squared"):
+        for name in ("directional", "point", "squared", "spot"):
             yield {"name": name, "mode": "white", "hdr": True, "placed": STRAIGHT}
 
 
@@ -167,6 +167,10 @@ def white(asset: Asset, lit: Lit) -> ndarray:
         vector = np.array(light.position) - asset.images["position"]
         distance = np.linalg.norm(vector, axis=2)
         towards, strength = vector / distance[..., None], attenuation(distance, light) * (1 - (distance / RANGE) ** 4) ** 2
+        if lit.spot is not None:
+            outer, edge = np.cos(lit.spot[0]), lit.spot[1]
+            past = (1 - np.maximum(towards @ lit.direction_z_up, outer)) / (1 - outer)
+            strength = strength * (1 - np.maximum(past, 1e-4) ** (1 / edge))
     normal = np.array([-0.1, -0.2, 1.0]) / np.linalg.norm([-0.1, -0.2, 1.0])
     cosine = np.maximum(towards @ normal, 0) * strength
     return cosine[..., None] * np.array(light.color) / np.pi
@@ -239,6 +243,14 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     return missed
 
 
+def chroot_of_godot() -> Path:
+    """The folder of Godot's chroot; exits where it is not made yet."""
+    chroot = Path(os.environ.get("SRBF_GODOT_CHROOT", Path.home() / ".cache" / "srbf" / "godot")).resolve()
+    if not (chroot / "srbf-ready").exists():
+        sys.exit(f"expected a chroot with Godot at {chroot}, found none; scripts/godot-chroot makes it, or set SRBF_GODOT_CHROOT")
+    return chroot
+
+
 def say(line: str) -> None:
     sys.stdout.write(line + "\n")
     sys.stdout.flush()
@@ -249,9 +261,7 @@ def main() -> None:
     parser.add_argument("--keep", action="store_true", help="leave the projects in the chroot's /tmp")
     parser.add_argument("--only", default="", metavar="WORD", help="only assets with this word in their title")
     arguments = parser.parse_args()
-    chroot = Path(os.environ.get("SRBF_GODOT_CHROOT", Path.home() / ".cache" / "srbf" / "godot")).resolve()
-    if not (chroot / "srbf-ready").exists():
-        sys.exit(f"expected a chroot with Godot at {chroot}, found none; scripts/godot-chroot makes it, or set SRBF_GODOT_CHROOT")
+    chroot = chroot_of_godot()
     say(f"{'asset':28}{'renderer':18}{'mode':9}{'target':7}{'lights':13}{'largest':>7}{'error':>11}{'/ bound':>7}")
     missed = sum(compare(title, asset, settings, chroot, arguments.keep) for title, asset, settings in assets() if arguments.only in title)
     if missed:

@@ -279,7 +279,7 @@ class Asset:
         return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some texels alone, of their geometry with the normals only: to relight it, not to save.
+        """An asset of some texels alone, of their geometry with normals and albedo only: to relight it, not to save.
 
         Parameters
         ----------
@@ -300,7 +300,7 @@ class Asset:
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
-        images = {name: self.images[name].reshape(-1, 3)[texels][None] for name in ("normal",) if name in self.images}
+        images = {name: image.reshape(-1, 3)[texels][None] for name, image in self.images.items() if name in ("normal", "albedo")}
         return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images=images)
 
     def bytes_per_texel(self) -> dict[str, int | float]:

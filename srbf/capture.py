@@ -84,7 +84,7 @@ class Capture(ReceiverImages):
         schemas.check_version(manifest, "srbf-capture", path)
         schemas.check(manifest, "capture", str(path))
         lights = [CapturedLight.of_manifest(entry, f"light {i} in {path}") for i, entry in enumerate(manifest["lights"])]
-        if not (lights or "surfels" in manifest):
+        if not (lights or "surfels" in manifest or "gather" in manifest):
             raise ManifestError(f"expected one or more lights in {path}, found none; bake or import again")
         texels = manifest["width"] * manifest["height"]
         for i, light in enumerate(lights):
@@ -109,8 +109,10 @@ class Capture(ReceiverImages):
     @property
     def kind(self) -> LightKind:
         """The kind of its train lights, which are listed first; the lights that measure a fit may be point lights whatever it is. `surfel`
-        where a transfer operator stands in for train lights.
+        where a transfer operator stands in for train lights, `pool` where a deep framebuffer does.
         """
+        if "gather" in self.manifest:
+            return "pool"
         if "surfels" in self.manifest:
             return "surfel"
         return self.lights[0].kind if self.lights else "directional"

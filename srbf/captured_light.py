@@ -10,7 +10,7 @@ import numpy as np
 
 from srbf.errors import InputError, ManifestError
 
-LightKind = Literal["directional", "point", "named", "patch", "surfel"]
+LightKind = Literal["directional", "point", "named", "patch", "surfel", "pool"]
 Role = Literal["train", "validation", "holdout"]
 ROLES: tuple[Role, ...] = ("train", "validation", "holdout")
 UNIT_TOLERANCE = 1e-3  # of a manifest's directions

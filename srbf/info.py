@@ -127,6 +127,9 @@ def light_facts(asset: Asset) -> dict[str, Any]:
         told = manifest["position_table"]
         size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith("position_"))
         facts["position_table"] = {"nodes": told["nodes"], "spacing": told["spacing"], "rank": told["rank"], "bytes": size}
+    if "environment_transfer" in manifest:
+        told = manifest["environment_transfer"]
+        facts["environment"] = {"cells": len(told["cells"]), "of": told["side"] ** 2, "bytes": asset.tables["environment_transfer"].nbytes}
     for kind in SETS:
         if kind in manifest:
             told = manifest[kind]

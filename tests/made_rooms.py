@@ -34,10 +34,20 @@ class Room:
     albedo: np.ndarray
     corners: np.ndarray
     free: np.ndarray
+    closed: bool = True
 
     @staticmethod
-    def box(size: tuple[float, float, float], step: float, albedo: float = 0.5, wall: tuple[float, float, float] | None = None) -> Room:
-        """A box from the origin, its walls seen from inside; `wall` (x, door's low y, door's high y): a thin wall across, with a door."""
+    def box(
+        size: tuple[float, float, float],
+        step: float,
+        albedo: float = 0.5,
+        wall: tuple[float, float, float] | None = None,
+        lid: bool = True,
+    ) -> Room:
+        """A box from the origin, its walls seen from inside; `wall` (x, door's low y, door's high y): a thin wall across, with a door.
+
+        Without `lid` the top is open.
+        """
         sides = []
         for axis in range(3):
             for end in (0, 1):
@@ -47,6 +57,7 @@ class Room:
                 inward = np.zeros(3)
                 inward[axis] = 1 - 2 * end
                 sides.append((corner, along, across, inward))
+        sides = sides if lid else sides[:-1]
         if wall is not None:
             x, low, high = wall
             for start, stop in ((0.0, low), (high, size[1])):
@@ -70,7 +81,7 @@ class Room:
         points = np.concatenate(places)
         color = np.full((len(points), 3), albedo)
         color[points[:, 0] < 1e-6] = [albedo, 0.3 * albedo, 0.2 * albedo]
-        return Room(points, np.concatenate(normals), np.concatenate(areas), color, np.array(triangles, np.float32), free)
+        return Room(points, np.concatenate(normals), np.concatenate(areas), color, np.array(triangles, np.float32), free, lid)
 
     def sees(self, from_: np.ndarray, to: np.ndarray) -> np.ndarray:
         """(n,) bool: nothing between."""
@@ -92,7 +103,8 @@ class Room:
         near = np.flatnonzero(factor > 0)
         factor[near] *= self.sees(lifted[i[near]], lifted[j[near]])
         factor = factor.reshape(count, count)
-        factor /= np.maximum(factor.sum(axis=1, keepdims=True), 1e-12)  # closed: all that leaves arrives
+        if self.closed:  # all that leaves arrives
+            factor /= np.maximum(factor.sum(axis=1, keepdims=True), 1e-12)
         result = np.empty((count, count, 3), np.float32)
         for c in range(3):
             rho = self.albedo[:, c]

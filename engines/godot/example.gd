@@ -18,9 +18,9 @@ var _model: Node3D
 
 func _ready() -> void:
 	if _asset.position:
-		if ResourceLoader.exists(MODEL):
+		if ResourceLoader.exists(MODEL) and not _asset.probes:
 			_show_model()
-		else:
+		elif not _asset.probes:
 			$Surface.mesh = SrbfTexelMesh.of(_asset)
 		var box := SrbfTexelMesh.bounds(_asset)
 		_middle = box.get_center()
@@ -36,6 +36,8 @@ func _ready() -> void:
 		$Relight.exposure = 0.5
 	if _asset.position_table:
 		_light_a_room()
+	if _asset.probes:
+		_show_sphere()
 	if _asset.light_table:
 		$PointLight.visible = false
 	if _asset.is_weighted():
@@ -61,7 +63,7 @@ func _unhandled_input(event: InputEvent) -> void:
 			KEY_TAB:
 				_show_picture(not _picture.visible)
 			KEY_S:
-				$Sun.visible = not $Sun.visible and not _asset.is_weighted()
+				$Sun.visible = not $Sun.visible and (_asset.surfels != null or not _asset.is_weighted())
 			KEY_PLUS, KEY_EQUAL, KEY_KP_ADD:
 				$Relight.exposure += 0.5
 			KEY_MINUS, KEY_KP_SUBTRACT:
@@ -108,11 +110,27 @@ func _light_a_room() -> void:
 	$PointLight.light_energy = 0.04 * _size * _size
 	$PointLight.shadow_enabled = true
 	$PointLight.position = _middle
+	$Sun.shadow_enabled = true
+	$Surface.cast_shadow = GeometryInstance3D.SHADOW_CASTING_SETTING_DOUBLE_SIDED
+
+
+## What moves between probes; give the room's own meshes and their lightmap in a scene of yours.
+func _show_sphere() -> void:
+	var probes := SrbfProbes.new()
+	probes.asset = _asset
+	var sphere := MeshInstance3D.new()
+	sphere.mesh = $PointLight/Bulb.mesh
+	sphere.transform = Transform3D(Basis.from_scale(Vector3.ONE * 0.2 * _size), _middle)
+	probes.add_child(sphere)
+	add_child(probes)
+	$PointLight.position = _middle + Vector3(0.1, 0.2, 0.2) * _size
 
 
 func _show_model() -> void:
 	_model = load(MODEL).instantiate()
 	add_child(_model)
+	for mesh: MeshInstance3D in _model.find_children("*", "MeshInstance3D", true, false):
+		mesh.cast_shadow = GeometryInstance3D.SHADOW_CASTING_SETTING_DOUBLE_SIDED  # walls are thin
 	var surfaces: Array[Node] = [_picture]
 	surfaces.append_array(_model.find_children("*", "MeshInstance3D", true, false))
 	$Relight.surfaces = surfaces

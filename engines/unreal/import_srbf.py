@@ -4,7 +4,8 @@
 node.json, images/ and Shaders/ must lie beside it. It copies Shaders/ into the project's folder of that name, imports the images below
 /Game/Srbf, combines the layers in a texture array, and creates a parameter collection for the lights and a material whose Custom node
 relights. `py "…/import_srbf.py" follow` then copies the level's first directional and first point or spot light into the collection.
-Named lights and light clouds have no collection: add Source/ to the project's module, and the component SrbfRelit to the mesh's actor.
+Named lights and lights inside have no collection: add Source/ to the project's module, and the component SrbfRelit, or SrbfSurfelLights, to
+the mesh's actor.
 """
 
 import json
@@ -34,11 +35,11 @@ def copy_shaders():
         shutil.copyfile(path, target / path.name)
 
 
-def copy_tables(name):
-    """What the component SrbfRelit reads; returns its path below Content."""
+def copy_tables(file, name):
+    """What a component reads; returns its path below Content."""
     target = Path(unreal.Paths.convert_relative_path_to_full(unreal.Paths.project_content_dir())) / "Srbf"
     target.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(HERE / "SrbfTables.bin", target / f"{name}.bin")
+    shutil.copyfile(HERE / file, target / f"{name}.bin")
     return f"Srbf/{name}.bin"
 
 
@@ -97,22 +98,28 @@ def make_collection(node, folder):
     return collection
 
 
+def make_custom(material, description, told, include):
+    """A Custom node of three floats, with its inputs still open."""
+    custom = unreal.MaterialEditingLibrary.create_material_expression(material, unreal.MaterialExpressionCustom, -400, 0)
+    custom.set_editor_property("description", description)
+    custom.set_editor_property("output_type", unreal.CustomMaterialOutputType.CMOT_FLOAT3)
+    custom.set_editor_property("code", told["code"])
+    custom.set_editor_property("include_file_paths", [include])
+    inputs = []
+    for name in told["inputs"]:
+        entry = unreal.CustomInput()
+        entry.set_editor_property("input_name", name)
+        inputs.append(entry)
+    custom.set_editor_property("inputs", inputs)
+    return custom
+
+
 def make_material(node, folder, textures, collection):
     """A material whose emissive color is the asset's response to the collection's lights."""
     editing = unreal.MaterialEditingLibrary
     material = make("Relit", folder, unreal.Material, unreal.MaterialFactoryNew())
     material.set_editor_property("shading_model", unreal.MaterialShadingModel.MSM_UNLIT)
-    custom = editing.create_material_expression(material, unreal.MaterialExpressionCustom, -400, 0)
-    custom.set_editor_property("description", "srbf")
-    custom.set_editor_property("output_type", unreal.CustomMaterialOutputType.CMOT_FLOAT3)
-    custom.set_editor_property("code", node["code"])
-    custom.set_editor_property("include_file_paths", [node["include"]])
-    inputs = []
-    for name in node["inputs"]:
-        entry = unreal.CustomInput()
-        entry.set_editor_property("input_name", name)
-        inputs.append(entry)
-    custom.set_editor_property("inputs", inputs)
+    custom = make_custom(material, "srbf", node, node["include"])
     for row, name in enumerate(node["inputs"]):
         y = 120 * row
         if name in textures:
@@ -144,6 +151,43 @@ def make_material(node, folder, textures, collection):
     editing.recompile_material(material)
     unreal.EditorAssetLibrary.save_loaded_asset(material)
     return material
+
+
+def make_pass(name, told, include, folder, textures):
+    """A material that is drawn into a render target, whose Custom node may give numbers below 0."""
+    editing = unreal.MaterialEditingLibrary
+    material = make(name, folder, unreal.Material, unreal.MaterialFactoryNew())
+    material.set_editor_property("shading_model", unreal.MaterialShadingModel.MSM_UNLIT)
+    material.set_editor_property("allow_negative_emissive_color", True)
+    custom = make_custom(material, name, told, include)
+    for row, entry_name in enumerate(told["inputs"]):
+        y = 120 * row
+        if entry_name == "UV":
+            source = editing.create_material_expression(material, unreal.MaterialExpressionTextureCoordinate, -1000, y)
+        elif entry_name in told["vectors"]:
+            vector = editing.create_material_expression(material, unreal.MaterialExpressionVectorParameter, -1200, y)
+            vector.set_editor_property("parameter_name", entry_name)
+            source = editing.create_material_expression(material, unreal.MaterialExpressionAppendVector, -1000, y)
+            editing.connect_material_expressions(vector, "", source, "A")
+            editing.connect_material_expressions(vector, "A", source, "B")
+        else:
+            source = editing.create_material_expression(material, unreal.MaterialExpressionTextureObjectParameter, -1000, y)
+            source.set_editor_property("parameter_name", entry_name)
+            if entry_name in told["textures"]:
+                source.set_editor_property("texture", textures[told["textures"][entry_name]])
+            source.set_editor_property("sampler_type", unreal.MaterialSamplerType.SAMPLERTYPE_LINEAR_COLOR)
+        editing.connect_material_expressions(source, "", custom, entry_name)
+    editing.connect_material_property(custom, "", unreal.MaterialProperty.MP_EMISSIVE_COLOR)
+    editing.recompile_material(material)
+    unreal.EditorAssetLibrary.save_loaded_asset(material)
+
+
+def make_surfels(surfels, folder, exact):
+    """The materials of the passes that SrbfSurfelLights draws, and their textures."""
+    files = sorted({file for told in surfels["materials"].values() for file in told["textures"].values()})
+    textures = {file: import_texture(file, folder + "/Surfels", False, exact) for file in files}
+    for name, told in surfels["materials"].items():
+        make_pass(name, told, surfels["include"], folder, textures)
 
 
 def follow_lights():
@@ -199,7 +243,10 @@ def main():
     make_material(node, folder, textures, make_collection(node, folder) if node["lights"] else None)
     then = "run this script again with the word follow"
     if not node["lights"]:
-        then = f"add the component SrbfRelit to its actor, with the tables {copy_tables(name_of(node))}"
+        then = f"add the component SrbfRelit to its actor, with the tables {copy_tables('SrbfTables.bin', name_of(node))}"
+    if "surfels" in node:
+        make_surfels(node["surfels"], folder, exact)
+        then += f"; or SrbfSurfelLights, with the folder {folder} and {copy_tables('SrbfSurfels.bin', name_of(node) + '_surfels')}"
     unreal.log(f"srbf: {folder}/Relit is ready; assign it to a mesh, then {then}")
 
 

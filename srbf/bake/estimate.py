@@ -26,6 +26,7 @@ SOURCES = {  # of train lights, by light set
     "named": "lights of the scene",
     "cloud": "point lights in free space",
     "patches": "patches of the surfaces",
+    "gather": "links of view clusters to a pool of surfels in place of train lights",
     "surfels": "form factors of surfels in place of train lights",
 }
 
@@ -42,17 +43,17 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     lights = plan_lights(settings)
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
-        probe = lights[len(lights) // 3]
-        counts = (1, 1, 1 + PROBE_SAMPLES)
-        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=probe.parts) for i, n in enumerate(counts)]
+        counts = (1, 1, 1 + PROBE_SAMPLES) if lights else ()  # a light set may have none
+        probe = lights[len(lights) // 3] if lights else None
+        requests = [RenderRequest(replace(probe, index=i), n, probe.seed, channels=probe.parts) for i, n in enumerate(counts) if probe]
         job = base_job(bake.scene, settings, scratch, requests)
         facts: dict[str, Any] = {}
-        seconds, image_bytes = [0.0] * len(requests), 0
+        seconds, image_bytes = [0.0] * 3, 0
         with Worker(job, scratch, scratch / "bake.log", bake.blender) as worker:
             for event in worker.events(say):
                 if event["event"] == "scene":
                     facts = event
-                elif event["event"] == "rendered":
+                elif event["event"] == "rendered" and probe is not None:
                     seconds[event["light"]] = event["seconds"]
                     image_bytes = 0
                     for part, file in event["files"].items():

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet
 from srbf.bake.settings import BakeSettings
 from srbf.bake.surface_checks import warn_of_receivers
@@ -19,11 +20,15 @@ from srbf.visibility.transfer_operator import TransferOperator, is_traced
 def write_light_set(folder: Path, settings: BakeSettings, identity: dict[str, Any]) -> None:
     """What a cloud knows of the scene: for a fit, and for a bake that is resumed. Again where it is gone or damaged."""
     light_set = settings.light_set
-    if not isinstance(light_set, CloudSet):
+    if not isinstance(light_set, (CloudSet, GatherSet)):
         return
     assert light_set.found is not None
     patches, path = folder / PATCHES_FILE, folder / LIGHT_SET_FILE
     key = light_set.key(identity["scene_sha256"], settings.validation + settings.holdout, settings.seed, settings.scene)
+    if isinstance(light_set, GatherSet):
+        if not replace(light_set, found=None).read(path, key).is_known:
+            light_set.write(path, key)
+        return
     if not (patches.is_file() and replace(light_set, found=None).read(path, key).is_known):
         write_image(patches, light_set.found.patches.cells.image(), "float")
         light_set.write(path, key)
@@ -43,6 +48,8 @@ def trace_operator(
     `say` gets a line where receivers see no surface; InputError where none of them does.
     """
     light_set = settings.light_set
+    if isinstance(light_set, GatherSet):
+        light_set.trace(receivers, settings.seed, progress)
     if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:
         return
     key = f"{light_set.found.checksum} {settings.width}x{settings.height} {settings.seed}"

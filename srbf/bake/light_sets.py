@@ -259,7 +259,6 @@ def _surfel_keys(found: FoundPlaces) -> dict[str, Any]:
 
 FINGERPRINT_PATCHES = 1024  # which see the lights of a cloud differently
 
-LightSet = NamedSet | CloudSet
 Operator = Literal["rays", "cycles"]
 
 
@@ -272,7 +271,7 @@ def parse_light_set(
     light_bounds: str | None,
     surfels_per_m2: float | None = None,
     operator: Operator = "rays",
-) -> LightSet:
+) -> NamedSet | CloudSet:
     """From the command line's flags; InputError on words and combinations that mean nothing.
 
     The operator of surfels by Cycles: what each of the patches that surfels make sends to the receivers, rendered.
@@ -303,4 +302,4 @@ def parse_light_set(
             raise InputError("expected `light_set=surfels` without `patches` and `grid`, found them; leave them out")
         apart = None if surfels_per_m2 is None else surfels_per_m2**-0.5
         return CloudSet("surfels", SURFELS if apart is None else MOST_SURFELS, apart, parse_box(light_bounds))
-    raise InputError(f"expected `light_set` named, cloud, patches, surfels or point:SPACING, found {word!r}")
+    raise InputError(f"expected `light_set` named, cloud, patches, surfels, gather or point:SPACING, found {word!r}")

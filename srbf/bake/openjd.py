@@ -9,9 +9,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from srbf.bake.light_sets import LightSet, NamedSet
+from srbf.bake.gather_set import GatherSet
+from srbf.bake.light_sets import NamedSet
 from srbf.bake.run import Bake
-from srbf.bake.settings import BakeSettings, plan_lights
+from srbf.bake.settings import BakeSettings, LightSet, plan_lights
 from srbf.errors import InputError
 from srbf.io import files
 
@@ -112,6 +113,8 @@ def _light_set(light_set: LightSet | None) -> dict[str, Any]:
     if isinstance(light_set, NamedSet):
         return {"light-set": light_set.kind}
     box = None if light_set.box is None else ",".join(map(repr, light_set.box))
+    if isinstance(light_set, GatherSet):
+        return {"light-set": light_set.kind, "pool": light_set.count, "view-clusters": light_set.clusters, "light-bounds": box}
     if light_set.kind == "surfels":
         density = None if light_set.spacing is None else round(light_set.spacing**-2, 6)
         return {"light-set": light_set.kind, "surfels-per-m2": density, "light-bounds": box}

@@ -22,7 +22,7 @@ from srbf.bake.images import CaptureImages
 from srbf.bake.job import serving_job
 from srbf.bake.light_pass import add_pass
 from srbf.bake.light_set_files import trace_operator, write_light_set, write_probes
-from srbf.bake.light_sets import CloudSet, NamedSet
+from srbf.bake.light_sets import NamedSet
 from srbf.bake.manifest import capture_manifest
 from srbf.bake.schedule import FIRST_SAMPLES, TESTED_GROWTH, next_samples, render_order
 from srbf.bake.settings import BakeSettings, PlannedLight, noise_seed, plan_lights
@@ -415,7 +415,7 @@ class _Passes:
         if self._shard is not None:
             return
         lights = [(light, self._accumulation.samples(light)) for light in self._lights if self._accumulation.passes(light)]
-        traced = isinstance(self._settings.light_set, CloudSet) and self._settings.light_set.kind == "surfels"
+        traced = self._settings.light_set is not None and self._settings.light_set.kind in ("surfels", "gather")
         reached = [self._goal] if traced else [samples for light, samples in lights if light.role == "train"]
         if reached and self._images.prepared is not None:
             curve = stopping.record(self._curve)

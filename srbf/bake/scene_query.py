@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from srbf.bake.folder import STATE
-from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlaces, LightSet, NamedSet
+from srbf.bake.gather_set import GatherSet
+from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlaces, NamedSet
 from srbf.bake.probes import facts_line, grid_of
 from srbf.bake.run import Bake, require_scene
-from srbf.bake.settings import LARGEST_SIDE, BakeSettings
+from srbf.bake.settings import LARGEST_SIDE, BakeSettings, LightSet
 from srbf.bake.surface_checks import require_surfels, warn_of_surfaces
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError, ManifestError
@@ -168,7 +169,7 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
     if light_set is None or light_set.is_known:
         return bake
     tested = settings.validation + settings.holdout
-    if isinstance(light_set, CloudSet):
+    if isinstance(light_set, (CloudSet, GatherSet)):
         require_scene(bake.scene)
         key = light_set.key(files.sha256_of(bake.scene), tested, settings.seed, settings.scene)
         kept = light_set.read(bake.folder / LIGHT_SET_FILE, key)
@@ -185,6 +186,8 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
         shown = ", ".join(repr(name) for name, _ in entries[:SHOWN])
         say(f"{len(entries)} named lights: {shown}{', …' if len(entries) > SHOWN else ''}")
         known = replace(light_set, entries=entries)
+    elif isinstance(light_set, GatherSet):
+        known = light_set.with_facts(found, say)
     else:
         known = _with_places(light_set, found, settings.seed, say)
     return replace(bake, settings=replace(settings, light_set=known))
@@ -224,7 +227,8 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
     if places.get("open_share", 0) > OPEN:
         say(
             f"the scene is open: {places['open_share']:.0%} of rays from the free places leave it; lights are captured in that box "
-            "alone, and distant light is not: `light_bounds` gives another box"
+            f"alone, and {'environments by what surfels see' if surfels is not None else 'distant light is not'}: `light_bounds` gives "
+            "another box"
         )
     box = (x0, y0, z0, x1, y1, z1)
     if surfels is not None:

@@ -11,7 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from srbf.bake.light_sets import LightSet, PlacedLight
+from srbf.bake.gather_set import GatherSet
+from srbf.bake.light_sets import CloudSet, NamedSet, PlacedLight
 from srbf.bake.point_lights import PointGrid
 from srbf.basis.exitant_harmonics import MAX_ORDER
 from srbf.captured_light import ROLES, LightKind, Role
@@ -25,6 +26,7 @@ Kind = Literal["lightmap", "vertices", "view", "probes"]
 Rendered = Literal["response", "direct", "indirect", "denoised", "toward"]  # images of a light that a worker renders
 Unwrap = Literal["smart", "lightmap-pack", "keep"]
 LARGEST_SIDE = 16384
+LightSet = NamedSet | CloudSet | GatherSet
 
 
 @dataclass(frozen=True)
@@ -319,7 +321,10 @@ class BakeSettings:
             raise InputError(f"expected {what} without `denoise`, which belongs to directional lights")
         if light_set.kind == "named" and self.keep_scene_lights:
             raise InputError(f"expected {what} without `keep_scene_lights`: the scene's lights are what is captured")
-        if light_set.kind in ("patches", "surfels") and self.transport != "indirect":
+        if light_set.kind == "gather" and (self.receiver.kind != "view" or self.quantity != "radiance"):
+            found = self.receiver.kind if self.receiver.kind != "view" else self.quantity
+            raise InputError(f"expected the radiance of a view with {what}, found {found}; use `light_set=surfels`")
+        if light_set.kind in ("patches", "surfels", "gather") and self.transport != "indirect":
             raise InputError(f"expected `transport=indirect` with {what}, found combined: what surfaces reflect is indirect light")
 
     def _check_gloss(self, order: int) -> None:

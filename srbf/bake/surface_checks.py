@@ -48,7 +48,7 @@ def warn_of_receivers(operator: TransferOperator, covered: Bool[ndarray, " P"], 
     """A line where many of the `covered` receivers see no surfel; InputError where none sees one."""
     blind = covered & (np.diff(operator.receivers.indptr) == 0)
     share = float(blind.sum() / max(1, int(covered.sum())))
-    advice = "are their normals turned inside out, or do they look at the sky alone?"
+    advice = "are their normals turned inside out, or do they look out of the scene alone?"
     if share == 1:
         raise InputError(f"expected receivers that see surfaces which light reaches, found none; {advice}")
     if share > BLIND:

@@ -29,8 +29,12 @@ def radiance_harmonics(irradiance: Float[ndarray, "*n 12 3"]) -> Float64[ndarray
     Least squares over twelve normals, exact for l <= 2; light of l = 3 gives no irradiance, and what l = 4 gives, 1/24 of it, is the first
     that is taken for l = 2. Order and signs as of `SphericalHarmonics`.
     """
-    weights = 4 * np.pi / FACETS * SphericalHarmonics(HARMONICS).evaluate(facet_normals()) / COSINE_LOBE  # (12, 9)
-    return np.einsum("fk,...fc->...kc", weights, np.asarray(irradiance, np.float64))
+    return np.einsum("fk,...fc->...kc", facet_weights(), np.asarray(irradiance, np.float64))
+
+
+def facet_weights() -> Float64[ndarray, "12 9"]:
+    """How much irradiance on each facet adds to each coefficient."""
+    return 4 * np.pi / FACETS * SphericalHarmonics(HARMONICS).evaluate(facet_normals()) / COSINE_LOBE
 
 
 def irradiance_at(radiance: Float[ndarray, "n 9 3"], normals: Float[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:

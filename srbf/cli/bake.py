@@ -9,12 +9,13 @@ from typing import Literal
 import typer
 
 from srbf.bake.estimate import estimate
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import parse_light_set
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
 from srbf.bake.point_lights import PointGrid
 from srbf.bake.run import Bake, Reporter
 from srbf.bake.scene_query import objects_of, with_frame, with_free_point_lights, with_light_set, with_size
-from srbf.bake.settings import BakeSettings, Receiver, captures_of, folder_names
+from srbf.bake.settings import BakeSettings, LightSet, Receiver, captures_of, folder_names
 from srbf.bake.shard import Shard
 from srbf.bake.worker_pool import WorkerPoolSettings
 from srbf.cli import bake_parameters as flag
@@ -47,13 +48,15 @@ def bake(
     light_group: flag.LightGroups = None,
     patches: flag.PatchCount = None,
     surfels_per_m2: flag.SurfelDensity = None,
+    pool: flag.PoolSize = None,
+    view_clusters: flag.ViewClusterCount = None,
     operator: flag.OperatorOf = "rays",
     grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
-    transport: flag.TransportOf = "combined",
+    transport: flag.TransportOf = None,
     gloss: flag.Gloss = None,
-    validation: flag.ValidationLights = 16,
+    validation: flag.ValidationLights = None,
     holdout: flag.HoldoutLights = 32,
     size: flag.SizeOf = None,
     texels_per_meter: flag.TexelsPerMeter = None,
@@ -81,8 +84,10 @@ def bake(
         named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
         by_grid = light_set is not None and light_set.startswith("point:")
         points = PointGrid.parse(str(light_set), light_bounds) if by_grid else None
-        inside = None
-        if light_set is not None and not by_grid:
+        inside: LightSet | None = None
+        if light_set == GatherSet.kind:
+            inside = GatherSet.parse(pool, view_clusters, light_bounds)
+        elif light_set is not None and not by_grid:
             inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2, operator)
     if not (named or collection):
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
@@ -96,7 +101,14 @@ def bake(
     ):
         if value and (light_set is None or (by_grid and name != "--light-bounds")):
             raise typer.BadParameter(f"expected --light-set named, cloud, patches or surfels with {name}, found {light_set or 'none'}")
-    pool = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
+    gathers = light_set == GatherSet.kind
+    for name, value in (("--pool", pool), ("--view-clusters", view_clusters)):
+        if value is not None and not gathers:
+            raise typer.BadParameter(f"expected --light-set gather with {name}, found {light_set or 'none'}")
+    for name, value in (("--light-group", light_group), ("--patches", patches), ("--grid", grid), ("--surfels-per-m2", surfels_per_m2)):
+        if value and gathers:
+            raise typer.BadParameter(f"expected --light-set gather without {name}, found both; leave it out")
+    workers_of = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
         with flags_alone():
@@ -107,7 +119,7 @@ def bake(
                 lights=lights,
                 domain=domain,
                 samples=samples or (2 if time_limit is None else UNLIMITED),
-                validation=validation,
+                validation=(0 if gathers else 16) if validation is None else validation,
                 holdout=holdout,
                 holdout_samples=holdout_samples,
                 quantity=quantity or ("radiance" if one.kind == "view" or gloss is not None else "irradiance"),
@@ -115,7 +127,7 @@ def bake(
                 sun_angle=0.0 if sun_angle == "auto" else sun_angle,
                 keep_scene_lights=keep_scene_lights,
                 light_list=light_list,
-                transport=transport,
+                transport=transport or ("indirect" if gathers else "combined"),
                 points=points,
                 light_set=inside,
                 no_shadow=tuple(no_cast_shadow or ()),
@@ -127,7 +139,7 @@ def bake(
                 raise typer.BadParameter("expected directional lights with --sun-angle auto, found --light-set; leave one of them out")
         settings = settings.with_matched_sun() if sun_angle == "auto" else settings
         with flags_alone():
-            return Bake(scene, folder, settings, blender, pool, time_limit, keep_accumulation, dask)
+            return Bake(scene, folder, settings, blender, workers_of, time_limit, keep_accumulation, dask)
 
     if collection:
         known = {one.name for one in named if one.kind == "lightmap"}

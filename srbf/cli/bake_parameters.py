@@ -86,7 +86,8 @@ LightSet = Annotated[
         metavar="SET",
         help="Other lights than directions. named: the scene's own, each by itself. cloud: --lights point lights in its free space. "
         "patches: parts of its surfaces, for any light inside. "
-        "surfels: light between its surfaces, by rays, for any light. point:SPACING: point lights that fill a box, so many meters apart.",
+        "surfels: light between its surfaces, by rays, for any light. "
+        "gather: the same for a view, in detail. point:SPACING: point lights that fill a box, so many meters apart.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -112,6 +113,28 @@ SurfelDensity = Annotated[
         metavar="DENSITY",
         parser=POSITIVE,
         help="surfels: how many per square meter of surface, 8000 in all at most (about 5000 in all).",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+PoolSize = Annotated[
+    int | None,
+    typer.Option(
+        "--pool",
+        metavar="COUNT",
+        parser=COUNT,
+        help="gather: surfels of the whole scene that the view gathers from, at most 65536 (32768).",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+ViewClusterCount = Annotated[
+    Any,
+    typer.Option(
+        "--view-clusters",
+        metavar="auto|COUNT",
+        parser=AUTO_OR_COUNT,
+        help="gather: parts of the view that gather light, at most 65536; auto: one a pixel, at most 20000.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -154,8 +177,12 @@ SunAngle = Annotated[
     ),
 ]
 TransportOf = Annotated[
-    Literal["combined", "indirect"],
-    typer.Option(help="All light, or all but the light's direct diffuse part.", rich_help_panel=LIGHTS),
+    Literal["combined", "indirect"] | None,
+    typer.Option(
+        help="All light, or all but the light's direct diffuse part. Default: combined, of gather indirect.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
 ]
 Gloss = Annotated[
     int | None,
@@ -168,7 +195,16 @@ Gloss = Annotated[
         rich_help_panel=LIGHTS,
     ),
 ]
-ValidationLights = Annotated[int, typer.Option(metavar="COUNT", parser=COUNT_OR_NONE, help="Validation lights.", rich_help_panel=LIGHTS)]
+ValidationLights = Annotated[
+    int | None,
+    typer.Option(
+        metavar="COUNT",
+        parser=COUNT_OR_NONE,
+        help="Validation lights. Default: 16, of gather none.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
 HoldoutLights = Annotated[
     int,
     typer.Option(metavar="COUNT", parser=COUNT_OR_NONE, help="Held-out lights, for the reported error alone.", rich_help_panel=LIGHTS),

@@ -15,12 +15,14 @@ from srbf.cli.method_flags import FitCommand, with_method_flags
 from srbf.cli.parameters import AssetFolder, Blender, Json
 from srbf.cli.terminal import note, print_json, progress_bar
 from srbf.cli.values import COUNT, COUNT_OR_NONE
+from srbf.evaluation.environment_errors import environment_errors
 from srbf.evaluation.errors_by_role import evaluate as evaluate_capture
 from srbf.evaluation.leave_one_out import leave_one_out as errors_left_out
 from srbf.evaluation.random_mixes import mix_errors
 from srbf.evaluation.viewer_errors import viewer_errors, viewer_line
 from srbf.fitting.options import method_for
 from srbf.light_domain import domain_of_capture
+from srbf.methods.environment_table import has_environment_table
 from srbf.relighting.direct_light import Added, chosen
 
 COMMAND = FitCommand
@@ -93,6 +95,8 @@ def evaluate(
         result["mixes"] = mix_errors(opened, images).as_dict()
     if "harmonics" in opened.manifest and images.gloss is not None:
         result["viewers"] = viewer_errors(opened, images)
+    if has_environment_table(opened) and "surfels" in images.manifest:
+        result["environments"] = environment_errors(opened, images)
     _print_errors(result, json)
 
 
@@ -112,7 +116,7 @@ def _print_errors(result: dict[str, Any], json: bool) -> None:
     mean = f"{'mean':>8}" if with_mean else ""
     typer.echo(f"{'role':<14}{'lights':>7}{'rmse':>12}{'relative':>10}{mean}{'PSNR, dB':>10}{'pooled':>8}{'peak':>8}")
     for role, error in result.items():
-        if role not in ("lights", "mixes", "viewers"):
+        if role not in ("lights", "mixes", "viewers", "environments"):
             count = sum(light["role"] == role for light in result["lights"])
             mean = f"{error['relative_rmse_mean']:>8.4f}" if with_mean else ""
             typer.echo(
@@ -121,6 +125,13 @@ def _print_errors(result: dict[str, Any], json: bool) -> None:
             )
     for role, error in result.get("viewers", {}).items():
         typer.echo(f"{role} lights toward random viewers: {viewer_line(error)}")
+    if "environments" in result:
+        found = result["environments"]
+        by_rays = f", against rays {found['rays']:.4f}" if "rays" in found else ""
+        typer.echo(
+            f"bounces of {found['count']} half bright environments: relative {found['relative_rmse']:.4f} against the capture's form "
+            f"factors, {found['worst']:.4f} at worst{by_rays}"
+        )
     if "mixes" in result:
         mixes = result["mixes"]
         typer.echo(

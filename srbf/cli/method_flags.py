@@ -73,7 +73,13 @@ def _flags() -> dict[str, Any]:
     flags |= {name: _annotation(found) for name, found in owners.items()}
     flags["budget"] = Annotated[
         int | None,
-        typer.Option("--budget", metavar="BYTES", parser=COUNT, help=f"auto: per texel, at most ({DEFAULT_BUDGET}).", show_default=False),
+        typer.Option(
+            "--budget",
+            metavar="BYTES",
+            parser=COUNT,
+            help=f"auto: per texel, at most ({DEFAULT_BUDGET}). deep-framebuffer: megabytes in all.",
+            show_default=False,
+        ),
     ]
     flags["psnr"] = Annotated[
         float | None,
@@ -122,7 +128,7 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
         return Annotated[str | None, typer.Option(_flag(entry), metavar="TEXT", help=help_text, show_default=False)]
     if hints == {int}:
         return Annotated[int | None, typer.Option(_flag(entry), metavar="COUNT", parser=COUNT, help=help_text, show_default=False)]
-    choices = tuple(dict.fromkeys(choice for hint in hints for choice in _choices(hint)))
+    choices = tuple(dict.fromkeys(choice for _, _, hint in owners for choice in _choices(hint)))
     return Annotated[Literal[choices] | None, typer.Option(_flag(entry), help=help_text, show_default=False)]  # type: ignore[valid-type]
 
 

@@ -36,6 +36,7 @@ from srbf.io.image import write_image
 from srbf.light_domain import domain_of_asset
 from srbf.lights import Light, NamedLight
 from srbf.methods import outside_domain
+from srbf.methods.environment_table import without_environment_table
 from srbf.methods.kept_visibility import by_depths
 from srbf.methods.surface_changes import with_albedo
 from srbf.relighting import probe_light
@@ -139,7 +140,8 @@ def relight(
     shadows: Annotated[
         Shadows | None,
         typer.Option(
-            help="Of the light that bounces, on the surfels of an asset fitted with --visibility; default: ray, without embreex pca.",
+            help="Of the light that bounces, on an asset's surfels: rays, or the depths of --visibility; default: ray, without embreex "
+            "pca; of an environment neither where the asset knows the environment.",
             show_default=False,
         ),
     ] = None,
@@ -306,6 +308,8 @@ def _shadowed(asset: Asset, shadows: Shadows | None) -> Asset:
     """As its surfels are to be shadowed; MissingLibraryError for rays without embreex."""
     if shadows == "ray" and not has_embree():
         raise MissingLibraryError("rays from surfels need embreex: pip install embreex; or use `shadows=pca`")
+    if shadows is not None:
+        asset = without_environment_table(asset)
     return by_depths(asset) if shadows == "pca" else asset
 
 

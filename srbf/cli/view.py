@@ -32,6 +32,12 @@ def view(
         Path | None,
         typer.Option(metavar="FILE", help="A .glb whose lightmap UV set is shown, instead of the asset's texels.", show_default=False),
     ] = None,
+    probes: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="An asset of probes under the same lights: a white sphere to move among them.", show_default=False
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
         Path | None,
@@ -52,9 +58,9 @@ def view(
         )
     capture = captures[0] if captures else None
     if save is not None:
-        _save(save, contents_of(assets, None, mesh), capture, force)
+        _save(save, contents_of(assets, None, mesh, probes), capture, force)
         return
-    serve(contents_of(assets, capture, mesh), port, browser)
+    serve(contents_of(assets, capture, mesh, probes), port, browser)
 
 
 def serve(contents: dict[str, Content], port: int = 0, browser: bool = True) -> None:

@@ -255,7 +255,7 @@ def lights_of_peak(capture: Capture) -> list[int]:
     images: the point lights that test them stand in."""
     train = capture.indices("train")
     lacking = isinstance(capture, CombinedCapture) and any(capture.lights[i].direct is None for i in train)
-    if capture.kind not in ("patch", "surfel") and not lacking:
+    if capture.kind not in ("patch", "surfel", "pool") and not lacking:
         return train
     return [*capture.indices("validation"), *capture.indices("holdout")] or train
 

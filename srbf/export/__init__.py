@@ -12,6 +12,7 @@ from srbf.export.loss import relit_psnr
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.info import folder_bytes
 from srbf.io.files import atomic_folder, check_replaceable, checksums, write_json
+from srbf.methods import method_of
 
 __all__ = ["TARGETS", "Report", "Settings", "Target", "Written", "check_target", "export"]
 
@@ -77,7 +78,8 @@ def export(
     Raises
     ------
     InputError
-        On an unknown target, on settings that the target cannot have, and where the PSNR is below `min_psnr`; nothing is written then.
+        On an unknown target, an asset that no engine can read, settings that the target cannot have, and where the PSNR is below
+        `min_psnr`; nothing is written then.
     OutputExistsError
         Where the folder exists and `force` is not set, or it holds something else than an asset.
 
@@ -91,6 +93,8 @@ def export(
     9
     """
     check_target(target)
+    if not method_of(asset).exportable:
+        raise InputError(f"expected an asset that engines can read, found a {asset.method} one; relight it by numpy, or fit another method")
     check_replaceable(folder, force, MANIFEST)
     with atomic_folder(folder, force, MANIFEST) as temporary:
         write: Target = import_module(TARGETS[target]).write

@@ -3,7 +3,7 @@
 `srbfAssetDirectional`, `srbfAssetPoint` and `srbfAssetLights` are written once, in the pack's GLSL, and translated with it. Counts,
 centers, scale and bias are constants of the shader, floats that need no decoding are not decoded, and an engine passes weights and
 point lights alone. Where lights are named, or stand in a cloud, all of them enter through the weights, and only `srbfAssetDirectional`
-is there.
+is there. Assets of probes have `srbfAssetProbeHarmonics` and `srbfAssetProbeIrradiance`, too.
 """
 
 from __future__ import annotations
@@ -14,10 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy import ndarray
 
+from srbf.arrays import Float64
 from srbf.asset import Asset
+from srbf.basis.irradiance_harmonics import FACETS, HARMONICS, facet_weights
 from srbf.export.translation import PackFile, pack_files, parse
 from srbf.lights import PointLight
 from srbf.methods import method_of
+from srbf.probe_grid import ProbeGrid
 
 LAST = ["combine/finish.glsl", "combine/mip_level.glsl"]
 # By stem of the pack: the file and the function for assets all of whose lights are in the weights, which are a texture.
@@ -46,6 +49,19 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, highp sampler2D clusters,
 }
 """,
 }
+PROBES = ["probes/probe_harmonics.glsl", "probes/probe_irradiance.glsl"]
+PROBE_TEXELS = 7  # of a probe's harmonics: 27 numbers, four to a texel
+_PROBES_GLSL = """
+/* The light of this asset's probes, PROBE_COLUMNS x PROBE_ROWS texels, from the finished picture of their facets. */
+vec4 srbfAssetProbeHarmonics(highp sampler2D facets, highp sampler2D places, ivec2 at) {
+    return srbfProbeHarmonics(facets, places, srbfProbeWeights, WIDTH, at);
+}
+
+/* Irradiance at a place (m) and unit normal of the asset's frame. */
+vec3 srbfAssetProbeIrradiance(highp sampler2D light, highp sampler2D places, highp sampler2D nearness, vec3 place, vec3 normal) {
+    return srbfProbeIrradiance(light, places, nearness, GRID, COUNTS, place, normal);
+}
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +91,7 @@ def counts(asset: Asset, pairs: bool = False) -> dict[str, int]:
 
     `pairs`: relighting maps find the R table as values and differences, one fetch in place of two.
     """
-    defines = method_of(asset).shader_parts(asset, pairs).defines
+    defines = method_of(asset).shader_parts(asset, pairs).defines | ({} if asset.probes is None else {"SRBF_PROBE_WEIGHTS": 84})
     return {key: count for key, count in defines.items() if not (key == "SRBF_POINT_LIGHTS" and by_weights_alone(asset))}
 
 
@@ -88,7 +104,34 @@ def asset_shader(asset: Asset, defines: dict[str, int], prepare: Callable[[str, 
         needed, functions = [WEIGHTED[stem]], _WEIGHTED_GLSL[stem]
     else:
         needed, functions = [f"methods/{stem}.glsl", f"methods/{stem}_lights.glsl"], parts.functions
-    return AssetShader(defines, parts.arrays, [*pack_files([*needed, *LAST], None, prepare), parse(functions, "asset")])
+    arrays = parts.arrays
+    if asset.probes is not None:
+        needed, functions = [*needed, *PROBES], functions + _probe_functions(asset.probes)
+        arrays = arrays | {"srbfProbeWeights": ("SRBF_PROBE_WEIGHTS", probe_weights())}
+    return AssetShader(defines, arrays, [*pack_files([*needed, *LAST], None, prepare), parse(functions, "asset")])
+
+
+def probe_weights() -> Float64[ndarray, "84 4"]:
+    """What `srbfProbeHarmonics` takes: of texel t and facet f at 12 t + f, the last number unused."""
+    numbers = np.repeat(facet_weights(), 3, axis=1)  # (12, 27)
+    padded = np.pad(numbers, ((0, 0), (0, 4 * PROBE_TEXELS - 3 * HARMONICS)))
+    return padded.reshape(FACETS, PROBE_TEXELS, 4).swapaxes(0, 1).reshape(-1, 4)
+
+
+def _probe_functions(grid: ProbeGrid) -> str:
+    x, y, z = grid.counts
+    numbers = ", ".join(_decimal(np.float32(value)) for value in (*grid.origin, grid.spacing))
+    words = {
+        "PROBE_COLUMNS": PROBE_TEXELS * x,
+        "PROBE_ROWS": y * z,
+        "WIDTH": x,
+        "GRID": f"vec4({numbers})",
+        "COUNTS": f"ivec3({x}, {y}, {z})",
+    }
+    text = _PROBES_GLSL
+    for word, value in words.items():
+        text = text.replace(word, str(value))
+    return text
 
 
 def rows_of(values: ndarray, row: Callable[[str], str]) -> str:

@@ -45,5 +45,8 @@ def below(data: str, manifest: dict[str, Any]) -> dict[str, Any]:
     for key in (*GEOMETRY, "scene"):
         if key in manifest:
             moved[key] = f"{data}/{manifest[key]}"
+    if manifest.get("receiver", {}).get("kind") == "probes":
+        receiver = manifest["receiver"]
+        moved["receiver"] = {**receiver, **{key: f"{data}/{receiver[key]}" for key in ("places", "nearness")}}
     moved["sha256"] = {f"{data}/{name}": digest for name, digest in manifest["sha256"].items()}
     return moved

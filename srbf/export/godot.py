@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
@@ -20,6 +21,7 @@ DATA = "asset"  # the folder of the asset's images, hidden from Godot's own impo
 IMPORTED = "asset.srbf"  # the file that Godot imports: it holds the path of asset.json
 MODEL = "model.glb"  # shown by the example instead of the asset's texels
 SHADERS = Path("addons/srbf/shaders")
+PROBES = "probes/probe_irradiance.glsl"
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
@@ -40,6 +42,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     for name in WEIGHTED:
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))
         files.write_text(folder / SHADERS / f"{name}_weighted.gdshaderinc", weighted_include(name))
+    files.write_text(folder / SHADERS / f"{Path(PROBES).stem}.gdshaderinc", _include(Path(PROBES).stem, PROBES, ()))
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held
     writer = WRITERS[encoding] if settings.levels in ("auto", 0, 1) else dds.write
@@ -64,8 +67,8 @@ def weighted_include(name: str) -> str:
     return _include(f"{name}_weighted", WEIGHTED[name])
 
 
-def _include(name: str, path: str) -> str:
-    source = "".join(f'#include "{part}"\n' for part in (path, *LAST))
+def _include(name: str, path: str, last: Sequence[str] = LAST) -> str:
+    source = "".join(f'#include "{part}"\n' for part in (path, *last))
     text = translated(resolve_text(source, name).text)
     guard = f"SRBF_{name.upper()}_INCLUDED"
     head = f"// SPDX-License-Identifier: MIT\n// From glsl/{path} and its includes, by srbf export --target godot.\n"

@@ -10,6 +10,7 @@ from numpy import ndarray
 from srbf.arrays import Float32
 from srbf.asset import SCENE_FILE, Asset
 from srbf.methods import method_of
+from srbf.probe_grid import NEARNESS_FILE, PLACES_FILE
 
 
 def with_layers(
@@ -34,6 +35,8 @@ def with_layers(
         **{name: f"{name}.exr" for name in asset.images},
         **({"scene": SCENE_FILE} if asset.scene is not None else {}),
     }
+    if asset.probes is not None:
+        manifest["receiver"] = {**manifest["receiver"], "places": PLACES_FILE, "nearness": NEARNESS_FILE}
     for name, table in asset.tables.items():
         told = {"size": table.size} if name == "r_table" else {"mapping": "octahedral"} if name == "w_table" else {}
         manifest[name] = {**told, **manifest.get(name, {}), "file": method_of(asset).tables[name]}

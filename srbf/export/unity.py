@@ -7,18 +7,24 @@ import math
 import shutil
 from pathlib import Path
 
-from srbf.asset import Asset
+from srbf.asset import MANIFEST, Asset
 from srbf.export import dds, exr
 from srbf.export.asset_shader import by_weights_alone
 from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
+from srbf.export.hlsl import include as pack_include
 from srbf.export.settings import PLAIN, Settings, Written
+from srbf.export.surfel_textures import PASSES, has_surfels, write_surfels
 from srbf.io import files
 
 DATA = "images~"  # Unity passes by folders that end so: the importer reads the images itself
 INCLUDE = "SrbfAsset.hlsl"
 SHADER = "Relit.shader"
 IMPORTED = "relit.srbf"
+SURFEL_PACK = "SrbfSurfelPack.hlsl"  # what SrbfSurfels.hlsl includes: the same for all assets
+SURFEL_FILES = [
+    f"surfels/{name}.glsl" for name in ("cell_irradiance", "cell_on_cube", "cell_on_map", "patch_mean", "table_part", "block_sum")
+]
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
@@ -30,9 +36,14 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """
     asset_include(asset)  # refuses before anything is written
     plain = settings.encoding in (None, "half", "float") and settings.levels in ("auto", 0, 1)
-    include = unity_include(write_asset(asset, folder, DATA, settings, exr.write if plain else dds.write))
+    written = write_asset(asset, folder, DATA, settings, exr.write if plain else dds.write)
+    include = unity_include(written)
     name = hashlib.sha256(include.encode()).hexdigest()[:8]
     shutil.copytree(engine_root("unity") / "Srbf", folder / "Srbf")
+    files.write_text(folder / "Srbf/Shaders" / SURFEL_PACK, pack_include(SURFEL_FILES))
+    if has_surfels(written):
+        manifest = files.read_json(folder / MANIFEST)
+        files.write_json(folder / MANIFEST, manifest | {PASSES: write_surfels(written, folder, DATA)})
     files.write_text(folder / INCLUDE, include)
     shader = (engine_root("unity") / SHADER).read_text(encoding="utf-8")
     files.write_text(folder / SHADER, shader.replace("@ID@", name))

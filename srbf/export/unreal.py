@@ -14,6 +14,8 @@ from srbf.export.engine_folder import engine_root, write_asset
 from srbf.export.hlsl import asset_include
 from srbf.export.light_tables import first_weights, table_file
 from srbf.export.settings import PLAIN, Settings, Written
+from srbf.export.surfel_textures import has_surfels
+from srbf.export.unreal_surfels import SOURCES, write_unreal_surfels
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.methods import method_of
@@ -35,7 +37,8 @@ LIGHTS = {
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     """Fill an empty folder: `asset.json` with its images, `Shaders/Srbf_*.ush` under a unique name, `node.json`, the Custom node, and the
-    editor script that imports all of it. Named lights and clouds: also `Source/`, a component that makes their weights, and its tables.
+    editor script that imports all of it. Named lights and clouds: also `Source/`, a component that makes their weights, and its tables;
+    assets with surfels: what lights those.
 
     InputError on an asset that no shader relights.
     """
@@ -45,12 +48,13 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     name = f"Srbf_{hashlib.sha256(text.encode()).hexdigest()[:8]}"
     files.make_folder(folder / "Shaders")
     files.write_text(folder / "Shaders" / f"{name}.ush", text)
-    files.write_json(folder / "node.json", custom_node(written, name))
+    surfels = {"surfels": write_unreal_surfels(written, folder, DATA)} if has_surfels(written) else {}
+    files.write_json(folder / "node.json", custom_node(written, name) | surfels)
     shutil.copyfile(engine_root("unreal") / SCRIPT, folder / SCRIPT)
     if by_weights_alone(written):
         write_image(folder / DATA / WEIGHTS, first_weights(written), "float")
         (folder / TABLES).write_bytes(table_file(written))
-        shutil.copytree(engine_root("unreal") / "Source", folder / "Source")
+        shutil.copytree(engine_root("unreal") / "Source", folder / "Source", dirs_exist_ok=True, ignore=shutil.ignore_patterns(*SOURCES))
     return Written(("docs/engines/unreal.md: run import_srbf.py in the editor; it copies Shaders/ into the project",))
 
 

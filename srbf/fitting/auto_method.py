@@ -62,7 +62,7 @@ def within_budget(
     budget below LEAST_BUDGET, or on psnr beside budget or error.
     """
     check_budget(budget, psnr, error)
-    if capture.kind == "surfel":  # any light is known, and bytes alone decide
+    if capture.kind in ("surfel", "pool"):  # any light is known, and bytes alone decide
         if psnr is not None:
             raise InputError("expected a `budget` for a capture of surfels, found `psnr`: it has no train lights to measure by")
         (chosen,) = _candidates(capture, budget or DEFAULT_BUDGET, int((capture.coverage() >= COVERED).sum()), 0)

@@ -105,7 +105,7 @@ def method_for(
 
 def check_settings(method: str | None, settings: dict[str, Any]) -> str:
     """The method's name, given or implied. InputError on a setting that it does not have, and on a value out of range."""
-    name = implied_method(settings) if method is None else method
+    name = implied_method(settings) if method is None else _variant(method, settings)
     if name == AUTO:
         _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
         check_budget(settings.get("budget"), settings.get("psnr"), settings.get("error"))
@@ -124,7 +124,14 @@ def implied_method(settings: dict[str, Any]) -> str:
     """The method that the settings are of, the most special first; `auto` where they name none."""
     if any(name in settings for name in BUDGET_SETTINGS):
         return AUTO
-    return next((m.name for m in reversed(all_methods()) if any(name in settings for name in m.implied_by)), AUTO)
+    named = {*settings, *(f"{name}={value}" for name, value in settings.items())}
+    return next((m.name for m in reversed(all_methods()) if named & set(m.implied_by)), AUTO)
+
+
+def _variant(method: str, settings: dict[str, Any]) -> str:
+    """Method M with basis B is the method M-B, where there is one."""
+    variant = f"{method}-{settings.get('basis')}"
+    return variant if variant in method_names() else method
 
 
 def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool = True) -> Asset:

@@ -10,11 +10,12 @@ from srbf.errors import InputError
 from srbf.light_domain.cloud import Cloud
 from srbf.light_domain.directions import Directions
 from srbf.light_domain.named import Named
+from srbf.light_domain.pool import PoolLights
 from srbf.light_domain.protocol import LightDomain
 from srbf.light_domain.surfels import SurfelLights
 from srbf.lights import DirectionalLight, Light, NamedLight, PointLight
 
-DOMAINS: tuple[type[LightDomain], ...] = (Directions, Named, Cloud, SurfelLights)
+DOMAINS: tuple[type[LightDomain], ...] = (Directions, Named, Cloud, SurfelLights, PoolLights)
 
 
 def domain_of_capture(capture: Capture, region: str = "auto") -> LightDomain:

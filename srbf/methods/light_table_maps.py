@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal, get_args
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float16, Float32, Float64, Int
+from srbf.arrays import Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import COVERED, Capture
@@ -118,13 +118,11 @@ def encode_table(
     seed: int,
     zones: int = 1,
     respond: Callable[[Asset, Capture, Sequence[int]], ndarray] | None = None,
-    sharp: Bool[ndarray, " P"] | None = None,
 ) -> Asset:
     """Clusters and components by the responses to V mixtures of the captured lights, then the table of all of them, in three passes.
 
-    `sharp`: receivers whose components are not smoothed. `respond`: what an asset of this table shows under lights of the capture, by
-    default the method's `captured_responses`. With `zones`, every cluster is of one part of the scene, by the receivers' positions;
-    `cluster_zone` of the manifest says which.
+    `respond`: what an asset of this table shows under lights of the capture, by default the method's `captured_responses`. With `zones`,
+    every cluster is of one part of the scene, by the receivers' positions; `cluster_zone` of the manifest says which.
     The manifest has no keys of the table's own meaning yet. InputError without train lights, or with more components than numbers per
     texel. Peak memory: that of a clustered eigen map, and 12 (V + L) bytes per sampled texel.
     """
@@ -147,7 +145,7 @@ def encode_table(
         run.on_image,
         lambda images: run.progress(images, steps),
         parts,
-        refinement(capture, sharp) if method.smooth else lambda projected, index: projected,
+        refinement(capture) if method.smooth else lambda projected, index: projected,
         None if method.mean_components == "auto" else float(method.mean_components),
     )
     clusters = clusters if found.cluster_zone is None else len(found.cluster_zone)
@@ -174,15 +172,10 @@ def encode_table(
     return asset
 
 
-def refinement(capture: Capture, sharp: Bool[ndarray, " P"] | None = None) -> Callable[[ndarray, ndarray], ndarray]:
-    """What takes the noise of a capture out of components, see `component_filter`; nothing does without positions and normals.
-
-    Receivers that are `sharp` stay as they are.
-    """
+def refinement(capture: Capture) -> Callable[[ndarray, ndarray], ndarray]:
+    """What takes the noise of a capture out of components, see `component_filter`; nothing does without positions and normals."""
     positions, normals = capture.geometry("position"), capture.geometry("normal")
     covered = capture.coverage().ravel() >= COVERED
-    if sharp is not None:
-        covered &= ~sharp
 
     def refine(components: ndarray, index: ndarray) -> ndarray:
         if positions is None or normals is None:

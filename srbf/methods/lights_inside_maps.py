@@ -74,9 +74,16 @@ class LightsInsideMaps(LightTableMaps):
             raise InputError(
                 f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
             )
-        if not has_embree() and not kept_visibility.has_depths(asset):
-            return np.sum([_from_table(asset, light) for light in lights], axis=0)
-        return super().projected_weights(asset, lights)
+        if has_embree() or kept_visibility.has_depths(asset):
+            return super().projected_weights(asset, lights)
+        traced = [light for light in lights if cls.needs_rays(asset, light)]
+        others = [light for light in lights if not cls.needs_rays(asset, light)]
+        return np.sum([super().projected_weights(asset, others), *(_from_table(asset, light) for light in traced)], axis=0)
+
+    @classmethod
+    def needs_rays(cls, asset: Asset, light: Light) -> bool:
+        """Whether a light is measured on the surfaces, by rays or compressed depths."""
+        return True
 
     @classmethod
     def captured_responses(cls, asset: Asset, capture: Capture, lights: Sequence[int]) -> Float32[ndarray, "b H W 3"]:

@@ -88,9 +88,10 @@ class Method(ABC):
     tables: ClassVar[dict[str, str]]  # what it looks up: key of asset.json -> file
     domains: ClassVar[tuple[str, ...]] = ("directions",)
     receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices", "probes")
-    implied_by: ClassVar[tuple[str, ...]] = ()  # settings that choose the method where none is named
+    implied_by: ClassVar[tuple[str, ...]] = ()  # settings, or setting=value, that choose the method where none is named
     rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
+    exportable: ClassVar[bool] = True  # layers may be encoded otherwise, for engines
     takes_objects: ClassVar[bool] = False  # whether a named light is an object whose surfaces emit
     filterable: ClassVar[bool] = True  # layers mean the same at neighboring texels: they may be filtered, and have mip levels
 

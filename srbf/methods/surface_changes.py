@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.errors import InputError
+from srbf.methods.environment_table import without_environment_table
 from srbf.solve.radiosity import MOST_REFLECTED, SERIES
 from srbf.visibility.transfer_basis import Emitted, TransferBasis, grouped
 from srbf.visibility.transfer_operator import TransferOperator
@@ -31,7 +32,6 @@ FILES = {
 }
 EMISSION = "surface_emission"  # which older assets lack
 SHINING, MAY_SHINE = 16.0, 4.0  # lights that an object counts as among those that shapes are made for
-SHARP = 2.0
 EMISSION_FILE = {EMISSION: "surface_emission.exr"}
 
 
@@ -174,7 +174,8 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     Returns
     -------
     Asset
-        In memory. Its table of places, for engines without rays, is that of before.
+        In memory. Its table of places, for engines without rays, is that of before. It has none of environments, which are
+        measured by rays.
 
     Raises
     ------
@@ -200,7 +201,7 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
         asset, manifest=manifest, tables={**asset.tables, "surfel_transfer": (table / np.float32(largest)).astype(np.float16)}
     )
     painted.add_to(changed)
-    return changed
+    return without_environment_table(changed)
 
 
 def emitted_by_objects(operator: TransferOperator) -> Emitted:
@@ -222,17 +223,6 @@ def emitted_by_objects(operator: TransferOperator) -> Emitted:
         pattern = np.where(lit, operator.emission[:, c] / np.maximum(mean[owner], 1e-30), shines)
         result[np.arange(len(owner)), owner, c] = np.pi * pattern
     return Emitted(result, np.where(some, SHINING, MAY_SHINE))
-
-
-def beside_what_shines(operator: TransferOperator) -> Bool[ndarray, " P"]:
-    """Receivers that are much brighter than others under an object that emits in the scene, SHARP times the rms by its own light."""
-    shines = operator.emission.any(axis=1)
-    found = np.zeros(operator.receivers.shape[0], bool)
-    for number in np.unique(operator.objects[shines]):
-        light = operator.receivers @ np.where((operator.objects == number)[:, None], operator.emission, 0).mean(axis=1)
-        lit = np.diff(operator.receivers.indptr) > 0
-        found |= light > SHARP * np.sqrt((light[lit] ** 2).mean())
-    return found
 
 
 def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.arrays import Bool, Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
@@ -17,12 +17,20 @@ from srbf.captured_light import NOWHERE, CapturedLight
 from srbf.compute.full_precision import by_channel
 from srbf.errors import InputError
 from srbf.io.image import Encoding
-from srbf.lights import Light, NamedLight
+from srbf.lights import EnvironmentLight, Light, NamedLight
+from srbf.methods.environment_table import FILES as TABLE_FILES
+from srbf.methods.environment_table import (
+    add_environment_table,
+    environment_columns,
+    environment_weights,
+    has_environment_table,
+    read_environment_table,
+)
 from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, check_error, setting
-from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, beside_what_shines, emitted_by_objects
+from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, emitted_by_objects
 from srbf.methods.transfer_choice import Judges, Sizes, fit_for_error, truncated
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
@@ -32,9 +40,10 @@ from srbf.visibility.transfer_basis import MOST_RANK, RANK_ERROR, TransferBasis,
 from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
-SURFELS, MOST_SURFELS = 3000, 8000
+MOST_SURFELS = 8000
 BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
 SHAPES_LEFT_OUT = 0.25  # of an error that is asked for, on the lights that shapes are made for
+VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
 TEXELS_PER_CLUSTER = 24  # at least, of a candidate
@@ -54,7 +63,7 @@ class Transfer(LightsInsideMaps):
     Parameters
     ----------
     surfels
-        How many parts of the surfaces a light is measured by; `auto`: about 3000, or as many as the capture has.
+        How many parts of the surfaces a light is measured by; `auto`: the capture's surfels, at most 8000.
     rank
         How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 768.
     clusters
@@ -92,7 +101,13 @@ class Transfer(LightsInsideMaps):
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
     takes_objects: ClassVar[bool] = True
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES, **EMISSION_FILE}
+    tables: ClassVar[dict[str, str]] = {
+        **LightsInsideMaps.tables,
+        "surfel_transfer": TRANSFER_FILE,
+        **FILES,
+        **EMISSION_FILE,
+        **TABLE_FILES,
+    }
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
@@ -100,7 +115,7 @@ class Transfer(LightsInsideMaps):
     components: int = setting(12, "How many numbers per texel.")
     error: float | None = None
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
-    smooth: bool = setting(True, "Take the noise of few rays out of the components.")
+    smooth: bool = setting(False, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
     visibility: str = setting("none", VISIBILITY_HELP)
     receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
@@ -166,13 +181,11 @@ class Transfer(LightsInsideMaps):
         basis = transfer_basis(operator, lit, (exchange, bounces), asked, self.seed, most, emitted, left_out)
         silent = replace(run, on_image=QUIET.on_image)
 
-        sharp = beside_what_shines(operator) if self.editable else None
-
         def encode(basis: TransferBasis, cells: Cells, components: int) -> Asset:
-            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured, sharp)
+            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured)
 
         if self.error is None:
-            cells = cells_of(SURFELS if self.surfels == "auto" else int(self.surfels))
+            cells = cells_of(MOST_SURFELS if self.surfels == "auto" else int(self.surfels))
             asset = encode(basis, cells, self.components)
         else:
             judges = Judges.of(capture, operator, received, bounces, inside.free)
@@ -180,6 +193,8 @@ class Transfer(LightsInsideMaps):
             sizes = Sizes.of(cells_of, measured, surfels, MOST_SURFELS, basis.shapes.shape[1])
             found = fit_for_error(self.error, judges, sizes, basis, self.components, encode, Transfer, run.say)
             asset, cells, basis = found.asset, found.cells, truncated(basis, found.rank)
+        if operator.environment is not None:
+            add_environment_table(asset, _rounded(environment_columns(basis.transfer, operator.environment)), operator.environment)
         if self.editable:
             names = tuple(told.get("objects", ()))
             Surfaces.of_basis(basis, operator, cells.patches, names, told.get("bounces")).add_to(asset)
@@ -190,21 +205,14 @@ class Transfer(LightsInsideMaps):
         self.add_visibility(asset, inside)
         return asset
 
-    def _of_basis(
-        self,
-        capture: Capture,
-        run: FitRun,
-        basis: TransferBasis,
-        cells: Cells,
-        measured: Bool[ndarray, " S"],
-        sharp: Bool[ndarray, " P"] | None,
-    ) -> Asset:
+    def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
         rank = basis.shapes.shape[1]
-        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed, sharp=sharp)
+        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed)
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
+        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
         count = cells.patch_count
         own = np.stack([grouped(basis.transfer[:, measured, c], cells.patches, count) for c in range(3)], axis=2)
         asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
@@ -222,19 +230,30 @@ class Transfer(LightsInsideMaps):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["surfel_transfer"]
         table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
-        return {**super().read_tables(reader), "surfel_transfer": table.astype(np.float16), **Surfaces.read(reader)}
+        return {
+            **super().read_tables(reader),
+            "surfel_transfer": table.astype(np.float16),
+            **Surfaces.read(reader),
+            **read_environment_table(reader),
+        }
+
+    @classmethod
+    def needs_rays(cls, asset: Asset, light: Light) -> bool:
+        """An environment map does not, where the asset knows the environment, nor does an object that emits."""
+        return not (isinstance(light, NamedLight) or (isinstance(light, EnvironmentLight) and has_environment_table(asset)))
 
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """A named light is an object whose surfaces emit radiance of its color."""
-        on_patches = light_on_patches(asset)
         received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
         emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
         for light in lights:
             if isinstance(light, NamedLight):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
+            elif isinstance(light, EnvironmentLight) and has_environment_table(asset):
+                emitted += environment_weights(asset, light)
             else:
-                received += on_patches(light)
+                received += light_on_patches(asset)(light)
         table = by_channel(asset.tables["surfel_transfer"])
         columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
         return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
@@ -255,6 +274,14 @@ def _rounded(values: Float32[ndarray, "r S 3"]) -> Float32[ndarray, "r S 3"]:
     largest = np.maximum(np.abs(values).max(axis=1, keepdims=True), np.float32(1e-30))
     step = np.exp2(np.ceil(np.log2(largest / (2 ** (BITS - 1) - 1))))
     return (np.round(values / step) * step).astype(np.float32)
+
+
+def _even_steps(values: Float16[ndarray, "F r c"], clusters: int) -> Float16[ndarray, "F r c"]:
+    """Values as multiples of a power of two for each cluster."""
+    of_cluster = values.astype(np.float32).reshape(clusters, -1)
+    rms = np.sqrt((of_cluster**2).mean(axis=1, keepdims=True))
+    step = np.exp2(np.round(np.log2(VALUE_STEP * np.maximum(rms, np.float32(1e-30)))))
+    return (np.round(of_cluster / step) * step).reshape(values.shape).astype(np.float16)
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:

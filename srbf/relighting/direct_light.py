@@ -37,7 +37,7 @@ class DirectLight(Protocol):
     """Adds what an indirect asset leaves out; lights are in the asset's frame."""
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The direct diffuse light of `lights`; environments and named lights add nothing."""
+        """The direct diffuse light of `lights`; environments are added by rays alone, named lights not at all."""
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
@@ -110,9 +110,9 @@ class Added:
             return []
         if self._emits:
             lights = [light for light in lights if not isinstance(light, NamedLight)]  # what it lays on receivers is in the asset
-        without = (EnvironmentLight, NamedLight)
+        without = (NamedLight,) if self._kind == "ray" else (EnvironmentLight, NamedLight)
         lines = [] if lights and all(isinstance(light, without) for light in lights) else [f"added {NAMES[self._kind]}"]
-        if any(isinstance(light, EnvironmentLight) for light in lights):
+        if self._kind != "ray" and any(isinstance(light, EnvironmentLight) for light in lights):
             lines.append("an environment's direct light is not added: the picture holds only what it reflects on")
         if any(isinstance(light, NamedLight) for light in lights):
             lines.append("a named light's direct light is not added: the picture holds only what it reflects on")

@@ -39,7 +39,7 @@ UNTESTED = "Not shown: the capture holds point lights of no role; bake some with
 class PlacesReport(DomainReport):
     """Of lights by their places. `tested`: the point lights of the subject's role; `missing`: why there is no motion."""
 
-    kinds: ClassVar[tuple[str, ...]] = ("cloud", "surfels")
+    kinds: ClassVar[tuple[str, ...]] = ("cloud", "surfels", "pool")
     steps: ClassVar[int] = 3
     drawings: ClassVar[int] = 1
     subject: Subject

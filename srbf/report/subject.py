@@ -23,7 +23,13 @@ from srbf.sphere import farthest_points
 
 SHOWN_LIGHTS = 6  # compared
 EXPOSURE_QUANTILE, EXPOSURE_LEVEL = 0.995, 0.9  # the exposure maps this quantile of the references to this linear level
-NOUNS = {"directions": "directions", "cloud": "point lights", "surfels": "point lights", "named": "lights"}  # by light domain
+NOUNS = {
+    "directions": "directions",
+    "cloud": "point lights",
+    "surfels": "point lights",
+    "pool": "point lights",
+    "named": "lights",
+}  # by light domain
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 MOST_REFLECTED = 0.99  # share of light that a bounce keeps at most: a closed white room has no solution
 ROUNDS = 16  # of balancing rows and columns
@@ -21,7 +24,7 @@ class Bounces:
     bound them; None: all, (1 - rho F)^-1 rho E, by one factorization of an S by S matrix in float32.
     """
 
-    def __init__(self, form_factors: Float32[ndarray, "S S"], albedo: Float64[ndarray, " S"], most: int | None = None) -> None:
+    def __init__(self, form_factors: ndarray | csr_array, albedo: Float64[ndarray, " S"], most: int | None = None) -> None:
         self._albedo = np.clip(albedo, 0, MOST_REFLECTED).astype(np.float32)
         self._form_factors, self._most = form_factors, most if most is None or most < SERIES else None
         if self._most is not None:
@@ -59,7 +62,7 @@ class Bounces:
         return np.asarray(lu_solve(self._factors, right, trans=transposed, check_finite=False), np.float32)
 
 
-def reciprocal(form_factors: Float32[ndarray, "S S"], areas: Float32[ndarray, " S"]) -> Float32[ndarray, "S S"]:
+def reciprocal(form_factors: ndarray | csr_array, areas: Float32[ndarray, " S"]) -> Any:
     """Form factors of rays made to agree with reciprocity, A_i F_ij = A_j F_ji: the mean of both estimates, which halves the variance.
 
     Rows keep their sums, what of each hemisphere the surfels fill, so that no light is lost: flux is scaled by D F D, a few rounds.

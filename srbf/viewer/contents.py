@@ -19,6 +19,7 @@ from srbf.viewer.references import References
 from srbf.viewer.site import shown_mesh
 
 CAPTURE = "capture/"
+PROBES = "probes/"
 
 Content = bytes | Path | Callable[[], bytes]
 
@@ -30,10 +31,13 @@ def read(content: Content) -> bytes:
     return content if isinstance(content, bytes) else content()
 
 
-def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path | None = None) -> dict[str, Content]:
-    """All content that the page may request of the assets in `folders`; it shows the first one first.
+def contents_of(
+    folders: Sequence[Path], capture: Path | None = None, mesh: Path | None = None, probes: Path | None = None
+) -> dict[str, Content]:
+    """All content that the page may request of the assets in `folders`; it shows the first one first, and a sphere lit by `probes`.
 
-    InputError if they, or the capture, belong to different scenes; also the errors of `Asset.open`, `Capture.open` and `page_files`.
+    InputError if they, or the capture, belong to different scenes, or the probes to other lights; also the errors of `Asset.open`,
+    `Capture.open` and `page_files`.
     """
     page = page_files()
     assets = [Asset.open(folder) for folder in folders]
@@ -48,6 +52,7 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
     if references is not None and compared is None:
         notes.append("the page compares directional and point lights with a capture: of this one it uses the spectrum alone")
     shown = shown_mesh(assets[0], mesh, notes)
+    probed = None if probes is None else _probes_beside(assets[0], Asset.open(probes), probes)
     measures = Measures(assets, references.capture if references else None)
     contents: dict[str, Content] = {"": page["index.html"], **page}
     told = []
@@ -63,12 +68,20 @@ def contents_of(folders: Sequence[Path], capture: Path | None = None, mesh: Path
         told.append(page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors))
     if shown is not None:
         contents[page_manifest.MESH] = shown
+    if probed is not None and probes is not None:
+        contents |= _files(probed, probes, PROBES)
     if compared is not None:
         contents[f"{CAPTURE}lights.json"] = json.dumps(compared.lights()).encode()
         for index in compared.compared:
             contents[f"{CAPTURE}{index}.exr"] = partial(compared.image, index)
     page_facts = page_manifest.facts(
-        assets[0], told, shown is not None, page_manifest.title(folders), CAPTURE if compared else None, tuple(notes)
+        assets[0],
+        told,
+        shown is not None,
+        page_manifest.title(folders),
+        CAPTURE if compared else None,
+        tuple(notes),
+        PROBES if probed else None,
     )
     contents[page_manifest.NAME] = json.dumps(page_facts).encode()
     return contents
@@ -82,9 +95,31 @@ def _check_siblings(assets: Sequence[Asset], folders: Sequence[Path]) -> None:
 
     for asset, folder in zip(assets, folders, strict=True):
         if kind(asset) != kind(assets[0]):
+            advice = "view them apart" if assets[0].probes is asset.probes else "name the one of probes by `probes`"
             raise InputError(
-                f"expected assets of one capture, found {kind(assets[0])} in {folders[0]} and {kind(asset)} in {folder}; view them apart"
+                f"expected assets of one capture, found {kind(assets[0])} in {folders[0]} and {kind(asset)} in {folder}; {advice}"
             )
+
+
+def _probes_beside(asset: Asset, probes: Asset, folder: Path) -> Asset:
+    """The probes, if a lightmap's lights shine on them, too."""
+    if probes.probes is None:
+        raise InputError(
+            f"expected an asset of probes in {folder} for `probes`, found one of a {probes.receiver_kind}; bake --receiver probes"
+        )
+    if asset.receiver_kind == "view":
+        raise InputError("expected a lightmap or vertices for `probes` to move a sphere among, found a view, which has no mesh")
+
+    def lights(of: Asset) -> str:
+        kind = domain_of_asset(of.manifest).kind
+        names = sorted(light["name"] for light in of.manifest["lights"]) if kind == "named" else []
+        return " ".join(["lights inside the scene" if kind in ("cloud", "surfels") else kind, *names])
+
+    if lights(asset) != lights(probes):
+        raise InputError(
+            f"expected probes of the same lights, {lights(asset)}, found {lights(probes)} in {folder}; bake both with one light set"
+        )
+    return probes
 
 
 def _files(asset: Asset, folder: Path, place: str) -> dict[str, Content]:
@@ -102,4 +137,5 @@ def _named(asset: Asset) -> list[str]:
     entries = [entry["file"] for entry in asset.layers]
     tables = [asset.manifest[name]["file"] for name in asset.tables]
     scene = [asset.manifest["scene"]] if "scene" in asset.manifest else []
-    return [*entries, *tables, *scene, *(asset.manifest[name] for name in asset.images)]
+    probes = [asset.receiver[name] for name in ("places", "nearness")] if asset.probes is not None else []
+    return [*entries, *tables, *scene, *probes, *(asset.manifest[name] for name in asset.images)]

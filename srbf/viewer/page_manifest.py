@@ -16,9 +16,16 @@ SPECTRUM = "spectrum.json"
 
 
 def facts(
-    asset: Asset, assets: list[dict[str, Any]], mesh: bool, title: str, capture: str | None = None, notes: tuple[str, ...] = ()
+    asset: Asset,
+    assets: list[dict[str, Any]],
+    mesh: bool,
+    title: str,
+    capture: str | None = None,
+    notes: tuple[str, ...] = (),
+    probes: str | None = None,
 ) -> dict[str, Any]:
-    """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link."""
+    """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link;
+    `probes`: the folder of an asset of probes."""
     view = asset.receiver_kind == "view"
     camera = fitted_camera(asset) if view else None
     return {
@@ -27,6 +34,7 @@ def facts(
         "kind": "view" if view else "lightmap",
         "mesh": MESH if mesh else None,
         "capture": capture,
+        "probes": probes,
         "camera": None
         if camera is None
         else {"position": camera.position.tolist(), "rotation": camera.rotation.tolist(), "lens": camera.lens.tolist()},

@@ -15,7 +15,12 @@ from srbf.io.image import write_image
 from srbf.light_domain import domain_of_asset, domain_of_capture
 
 CACHED_IMAGES = 32
-COMPARED = {"directions": "directional", "cloud": "point", "surfels": "point"}  # by light domain: lights that the page can place
+COMPARED = {
+    "directions": "directional",
+    "cloud": "point",
+    "surfels": "point",
+    "pool": "point",
+}  # by light domain: lights that the page can place
 
 
 @dataclass(eq=False)

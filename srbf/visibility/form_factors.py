@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float
 from srbf.compute.threads import each
+from srbf.visibility.environment_cells import EnvironmentRows, Openings
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.surface_cells import OFFSET
 from srbf.visibility.surfels import Surfels
@@ -43,6 +44,21 @@ def form_factors(
     So irradiance at the receivers is this times the radiosity of the surfels; the rest of the rays meets black or nothing. All rays of a
     receiver are one stratified set, shifted at random by `seed`. `progress` counts receivers.
     """
+    return _traced(surfels, origins, rays, seed, progress, None)[0]
+
+
+def factors_and_environment(
+    surfels: Surfels, openings: Openings, origins: RayOrigins, rays: int, seed: int = 0
+) -> tuple[csr_array, EnvironmentRows]:
+    """`form_factors`, and of the rays that leave the scene the shares that come from each cell of the environment."""
+    factors, environment = _traced(surfels, origins, rays, seed, lambda done: None, openings)
+    assert environment is not None
+    return factors, environment
+
+
+def _traced(
+    surfels: Surfels, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None], openings: Openings | None
+) -> tuple[csr_array, EnvironmentRows | None]:
     from scipy.sparse import csr_array, vstack
 
     count, of_each = origins.weights.shape
@@ -50,6 +66,7 @@ def form_factors(
     batch = max(1, RAYS // (rays * of_each))
     starts = list(range(0, count, batch))
     parts: list[csr_array] = [None] * len(starts)
+    environments: list[Any] = [None] * len(starts)
     done = [0]
 
     def trace(number: int) -> None:
@@ -57,12 +74,15 @@ def form_factors(
         normals = np.asarray(origins.normals[part], np.float64)
         weights = np.asarray(origins.weights[part], np.float64)
         places = origins.points[part] + OFFSET * size * normals
-        directions = cosine_directions(normals, rays, np.random.default_rng([seed, number]))
-        surfel = surfels.seen_along(np.repeat(places.reshape(-1, 3), rays, axis=0), directions.reshape(-1, 3))
+        directions = cosine_directions(normals, rays, np.random.default_rng([seed, number])).reshape(-1, 3)
+        places = np.repeat(places.reshape(-1, 3), rays, axis=0)
+        surfel, met = surfels.met_along(places, directions)
         shares = np.repeat(weights / (rays * np.maximum(weights.sum(axis=1, keepdims=True), 1e-30)), rays)
         row = np.repeat(np.arange(len(weights)), rays * of_each)
-        met = surfel >= 0
-        matrix = csr_array((shares[met].astype(np.float32), (row[met], surfel[met])), shape=(len(weights), surfels.count))
+        if openings is not None:
+            environments[number] = openings.rows(len(weights), row, shares, places, directions, met)
+        known = surfel >= 0
+        matrix = csr_array((shares[known].astype(np.float32), (row[known], surfel[known])), shape=(len(weights), surfels.count))
         matrix.sum_duplicates()
         parts[number] = matrix
         done[0] += len(weights)
@@ -70,5 +90,5 @@ def form_factors(
 
     each(trace, len(starts))
     if not parts:
-        return csr_array((0, surfels.count), dtype=np.float32)
-    return vstack(parts, format="csr")
+        return csr_array((0, surfels.count), dtype=np.float32), None if openings is None else EnvironmentRows.none(0, openings.channels)
+    return vstack(parts, format="csr"), None if openings is None else EnvironmentRows.stacked(environments)

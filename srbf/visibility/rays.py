@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
+from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
+from srbf.visibility.environment_rays import EnvironmentSampler
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
-from srbf.visibility.shadow import rounded_share, transmittance
+from srbf.visibility.shadow import rounded_share
+from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
 from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
 
@@ -28,8 +33,8 @@ SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of
 SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
-RAY_OFFSET = 1e-5  # m, plus this share of the distance from the origin: between a surface and the start of its shadow rays
-MAX_WALLS = 32
+ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environment
+ENVIRONMENT_BATCH = 1 << 18  # such rays at a time
 NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
@@ -54,11 +59,7 @@ class RayTracer:
         self._count = max(samples, FIRST_SAMPLES)
         triangles = receivers.triangles
         self._all = EmbreeTriangles(triangles.corners)
-        self._occluders = EmbreeTriangles(triangles.corners[triangles.occluders])
-        self._filters = EmbreeTriangles(triangles.corners[triangles.filters])
-        self._transmittance = triangles.transmittance
-        self._filter_material = triangles.material[triangles.filters]
-        self._filter_normals = triangles.normals[triangles.filters]
+        self._shadow_rays = ShadowRays(triangles)
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
         self._most = max(self._count, MAX_SAMPLES)
@@ -76,10 +77,12 @@ class RayTracer:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The direct light of `lights` in the receivers' quantity; environments and named lights add nothing."""
+        """The direct light of `lights` in the receivers' quantity; named lights add nothing."""
         height, width = self._receivers.height, self._receivers.width
         total = np.zeros((height * width, 3), np.float32)
         for light in lights:
+            if isinstance(light, EnvironmentLight):
+                total += self._of_environment(light) * np.array(light.color, np.float32)
             if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
                 total += self._irradiance(light) * np.array(light.color, np.float32)
         return dilate(total.reshape(height, width, 3), self._nearest) * self._receivers.reflectance()
@@ -87,6 +90,14 @@ class RayTracer:
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
+
+    def samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
+        """Points on surfaces: samples `numbers`, from 0, of the footprints of `texels`, ordered by sample."""
+        step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
+        if len(texels) <= step:
+            return self._samples(texels, numbers)
+        parts = [self._samples(texels, range(number, number + 1)) for number in numbers]
+        return Samples(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Samples)))
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
@@ -105,6 +116,43 @@ class RayTracer:
         most = min(self._most, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
         self._refine(sums, light, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
+
+    def _of_environment(self, light: EnvironmentLight) -> Float32[ndarray, "P 3"]:
+        """By ENVIRONMENT_POINTS points of every texel."""
+        sampler = EnvironmentSampler.of(light)
+        sums = TexelSums.empty(self._receivers.height, self._receivers.width, None)
+        step = max(1, ENVIRONMENT_BATCH // (2 * ENVIRONMENT_POINTS * ENVIRONMENT_RAYS))
+        starts = range(0, len(self._texels), step)
+        found: list[Any] = [None] * len(starts)
+
+        def trace(number: int) -> None:
+            samples = self._samples(self._texels[starts[number] : starts[number] + step], range(ENVIRONMENT_POINTS))
+            found[number] = samples, self._under_environment(samples, sampler, np.random.default_rng(starts[number]))
+
+        each(trace, len(starts))
+        for samples, visible in found:
+            ones = np.ones(len(samples.texel))
+            sums.add(samples.texel, samples.share, ones, visible, ones)
+        return sums.mean().astype(np.float32)
+
+    def _under_environment(self, samples: Samples, sampler: EnvironmentSampler, rng: np.random.Generator) -> Float32[ndarray, "n 3"]:
+        """The irradiance of each sample; the rays of a texel's points are one even set."""
+        normals = samples.normal.reshape(ENVIRONMENT_POINTS, -1, 3).transpose(1, 0, 2).astype(np.float64)
+        ways, light = (array.transpose(1, 0, 2, 3).reshape(-1, 3) for array in sampler.rays(normals, rng))
+        point = np.repeat(np.arange(len(samples.texel)), 2 * ENVIRONMENT_RAYS)
+        lit = np.flatnonzero(light.any(axis=1) & (samples.weight[point] > 0))
+        own, direction = point[lit], ways[lit].astype(np.float32)
+        passed = light[lit] * self._shadow_rays.passed(self._origins(samples, own, direction), direction, None)
+        return np.stack([np.bincount(own, passed[:, c], len(samples.texel)) for c in range(3)], axis=1).astype(np.float32)
+
+    @staticmethod
+    def _origins(samples: Samples, chosen: Int[ndarray, " n"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
+        """Where shadow rays of the `chosen` samples start: off their face, and on the rounded surface where that matters."""
+        point, face = samples.point[chosen], samples.face[chosen]
+        NoL, NgL = (np.einsum("nc,nc->n", normal, direction) for normal in (samples.normal[chosen], face))
+        origin = point + samples.lift[chosen] * rounded_share(NoL, NgL)[:, None]
+        offset = np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1, initial=0))
+        return (origin + face * offset[:, None]).astype(np.float32)
 
     def _scale(self, light: CastingLight) -> Float64[ndarray, " P"] | None:
         """Every texel's unshadowed irradiance over the mean of those that have any; None for suns."""
@@ -146,39 +194,9 @@ class RayTracer:
         visible = np.repeat(rays.opening.astype(np.float32)[:, None], 3, axis=1)
         lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0))
         direction = rays.direction[lit].astype(np.float32)
-        point, face = samples.point[lit], samples.face[lit]
-        NgL = np.einsum("nc,nc->n", face, direction)
-        origin = point + samples.lift[lit] * rounded_share(NoL[lit], NgL)[:, None]
-        origin += face * (np.where(NgL < 0, -1, 1) * RAY_OFFSET * (1 + np.abs(point).max(axis=1)))[:, None]
-        visible[lit] *= self._passed(origin, direction, None if rays.distance is None else rays.distance[lit])
+        origin = self._origins(samples, lit, direction)
+        visible[lit] *= self._shadow_rays.passed(origin, direction, None if rays.distance is None else rays.distance[lit])
         sums.add(samples.texel, samples.share, rays.importance, visible, rays.irradiance)
-
-    def _passed(self, origin: np.ndarray, direction: np.ndarray, distance: np.ndarray | None) -> Float32[ndarray, "n 3"]:
-        """Transmittance of each ray: 0 behind opaque surfaces, else the product over the walls on the way."""
-        free = ~self._occluders.occluded(origin, direction, distance)
-        passed = np.repeat(free.astype(np.float32)[:, None], 3, axis=1)
-        if not len(self._filter_material):
-            return passed
-        active = np.flatnonzero(free)
-        start = origin[active].copy()
-        left = None if distance is None else distance[active].copy()
-        for _ in range(MAX_WALLS):
-            hit, far, bary = self._filters.first_hit(start, direction[active])
-            meets = (hit >= 0) if left is None else (hit >= 0) & (far < left)
-            active, start, far, hit, bary = active[meets], start[meets], far[meets], hit[meets], bary[meets]
-            if not len(active):
-                break
-            passed[active] *= self._wall(hit, bary, direction[active])
-            step = far + RAY_OFFSET * (1 + np.abs(start).max(axis=1))
-            start = start + direction[active] * step[:, None]
-            left = None if left is None else left[meets] - step
-        return passed
-
-    def _wall(self, wall: Int[ndarray, " n"], bary: Float32[ndarray, "n 3"], direction: Float32[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
-        """Transmittance of one wall at the angle of each ray."""
-        normal = np.einsum("nk,nkc->nc", bary, self._filter_normals[wall])
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-20)
-        return transmittance(self._transmittance[self._filter_material[wall]], np.einsum("nc,nc->n", normal, direction))
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""

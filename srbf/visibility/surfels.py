@@ -45,9 +45,16 @@ class Surfels:
 
     def seen_along(self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]) -> Int[ndarray, " n"]:
         """The surfel that each ray meets first; -1 where it meets none, or a side out of reach."""
+        return self.met_along(origins, directions)[0]
+
+    def met_along(
+        self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]
+    ) -> tuple[Int[ndarray, " n"], Bool[ndarray, " n"]]:
+        """(the surfel that each ray meets first, -1 where it meets none, or a side out of reach; whether it meets any surface)."""
         triangle, _, _ = self._triangles.first_hit(origins, directions)
         back = np.einsum("nk,nk->n", self._normals[triangle], directions) > 0
-        return np.where(triangle >= 0, self.owners[back.astype(np.int64), triangle], -1)
+        met = triangle >= 0
+        return np.where(met, self.owners[back.astype(np.int64), triangle], -1), met
 
     def blocked(self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"], distance: Float64[ndarray, " n"]) -> ndarray:
         """(n,) whether a surface stands closer than `distance` along each ray."""

@@ -17,6 +17,7 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.errors import InputError
 from srbf.lights import PointLight, SpotLight
 from srbf.solve.radiosity import Bounces, reciprocal
+from srbf.solve.sparse_rows import product, transposed_product
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
 
@@ -31,6 +32,7 @@ POWER_STEPS = 1
 RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
 MOST_RANK = 768
 NORM_TEXELS = 2048
+SAMPLE_TEXELS = 1 << 15  # whose pictures the shapes are made for
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
 
 
@@ -58,7 +60,7 @@ class Emitted:
 
 
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
-    """(S, V) float32: irradiance on the surfels under point lights and spots in free space, and point lights close to surfaces."""
+    """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments."""
     rng = np.random.default_rng(seed)
     cells = operator.cells
     placed = free[rng.permutation(len(free))[:PLACED]]
@@ -72,7 +74,8 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         dx, dy, dz = (direction / np.linalg.norm(direction)).tolist()
         outer = float(rng.uniform(*CONE))
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
-    return np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+    inside = np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+    return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
 
 
 Exchange = tuple[Float32[ndarray, "S S"], list[Bounces]]
@@ -96,16 +99,16 @@ def transfer_basis(
 ) -> TransferBasis:
     """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out `left_out`, or `most_rank`.
 
-    `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many
-    lights. The pictures are never formed: their axes come from random
-    mixtures of them [Halko2011]. InputError where no light bounces onto a receiver.
+    `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many lights. The pictures are never formed:
+    their axes come from random mixtures of them [Halko2011], at SAMPLE_TEXELS receivers. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
-    form_factors = operator.receivers
     cells = operator.cells
     exchange, bounces = exchanged
-    lit = np.flatnonzero(np.diff(form_factors.indptr))
-    some = form_factors[lit[:: max(1, len(lit) // NORM_TEXELS)]]
+    lit = np.flatnonzero(np.diff(operator.receivers.indptr))
+    some = operator.receivers[lit[:: max(1, len(lit) // NORM_TEXELS)]]
+    sampled = len(lit) > SAMPLE_TEXELS
+    form_factors = operator.receivers[np.sort(rng.choice(lit, SAMPLE_TEXELS, replace=False)) if sampled else lit]
     radiosity = []
     for channel, one in enumerate(bounces):
         own = _of_unit_norm(one.radiosity(irradiance), some)
@@ -122,23 +125,25 @@ def transfer_basis(
         )
     most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, len(lit)))
     mixed = lights @ rng.normal(size=(lights.shape[1], most + OVERSAMPLED)).astype(np.float32)
-    found = np.linalg.qr(form_factors @ mixed)[0]
+    found = np.linalg.qr(product(form_factors, mixed))[0]
     for _ in range(POWER_STEPS):
-        found = np.linalg.qr(form_factors @ (lights @ (lights.T @ (form_factors.T @ found))))[0]
-    left, values, _ = np.linalg.svd((form_factors.T @ found).T @ lights, full_matrices=False)
+        found = np.linalg.qr(product(form_factors, lights @ (lights.T @ transposed_product(form_factors, found))))[0]
+    left, values, _ = np.linalg.svd(transposed_product(form_factors, found).T @ lights, full_matrices=False)
     axes = found @ left
     mixtures = form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES)))
     count = most if rank is not None else _enough(axes[:, :most], mixtures, left_out)
     values = np.maximum(values[:count], 1e-7 * max(float(values[0]), 1e-30))
     axes = axes[:, :count]
-    share = np.float32(max(1, len(lit)) / max(1, lights.shape[1]))
+    share = np.float32(len(axes) / lights.shape[1])
     scale = values * np.sqrt(share)
-    gather = (form_factors.T @ axes).T / scale[:, None]  # (r, S)
+    gather = transposed_product(form_factors, axes).T / scale[:, None]  # (r, S)
     transfer = np.stack([one.gathered(gather) for one in bounces], axis=2)
     mixture = share * (lights @ (lights.T @ gather.T))  # radiosity that makes each shape: shapes = F_p mixture
     sent = exchange @ mixture
     feedback = np.stack([gather.astype(np.float64) @ (cells.albedo[:, c, None] * sent) for c in range(3)], axis=2)
-    return TransferBasis(axes * scale, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
+    shapes = np.zeros((operator.receivers.shape[0], count), np.float32)
+    shapes[lit] = product(operator.receivers[lit], mixture.astype(np.float32)) if sampled else axes * scale
+    return TransferBasis(shapes, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
 
 
 def _of_unit_norm(radiosity: Float32[ndarray, "S n"], receivers: csr_array) -> Float32[ndarray, "S n"]:

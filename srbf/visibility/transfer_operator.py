@@ -6,7 +6,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -17,7 +17,8 @@ from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.visibility.aimed_factors import AimedFactors
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.environment_cells import EnvironmentRows, Openings
+from srbf.visibility.form_factors import RayOrigins, factors_and_environment, form_factors
 from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.surface_cells import Cells
@@ -40,7 +41,8 @@ class TransferOperator:
     """Form factors from P receivers (P, S) and from surfels (S, S) to S surfels, sparse, float32.
 
     Irradiance at receivers is `receivers` times the radiosity of the surfels. `objects` (S,): the number of each surfel's object.
-    `emission` (S, 3): radiance that it emits itself.
+    `emission` (S, 3): radiance that it emits itself. `environment`: what the surfels see of it, S rows; None where no ray left the scene,
+    or the capture is older than this.
     """
 
     cells: Cells
@@ -48,6 +50,7 @@ class TransferOperator:
     emission: Float32[ndarray, "S 3"]
     receivers: csr_array
     exchange: csr_array
+    environment: EnvironmentRows | None = None
 
     @staticmethod
     def traced(
@@ -71,14 +74,15 @@ class TransferOperator:
             parts.append(aimed.put(factors, origins, len(chosen), _hash(seed, start)))
             progress(start + len(rows), total)
         spread = RayOrigins.even(*surfels.spread(POINTS, seed))
-        own = form_factors(surfels, spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
+        own, environment = factors_and_environment(surfels, Openings(receivers.triangles), spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
         own = aimed.put(own, spread, len(chosen), _hash(seed, -1))
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)
         counts[chosen + 1] = np.diff(traced.indptr)
         every = csr_array((traced.data, traced.indices, np.cumsum(counts)), shape=(texels, surfels.count))
-        return TransferOperator(surfels.cells, surfels.objects, surfels.emission, every, own)
+        seen = environment if len(environment.cells) else None
+        return TransferOperator(surfels.cells, surfels.objects, surfels.emission, every, own, seen)
 
     def write(self, folder: Path, key: str) -> None:
         """surfels.exr, rows (x, y, z, area), (normal, patch), (albedo, object) and, if any emits, (emission, 0), and operator.npz.
@@ -95,6 +99,14 @@ class TransferOperator:
             arrays[f"{name}_starts"] = matrix.indptr.astype(np.int64)
             arrays[f"{name}_surfels"] = matrix.indices.astype(np.uint16)
             arrays[f"{name}_shares"] = matrix.data.astype(np.float16)
+        if self.environment is not None:
+            cells, shares = self.environment.cells.astype(np.uint16), self.environment.shares.astype(np.float16)
+            arrays |= {
+                "environment_side": np.array(self.environment.side),
+                "environment_starts": self.environment.starts,
+                "environment_cells": cells,
+                "environment_shares": shares,
+            }
         with files.atomic_path(folder / OPERATOR_FILE) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, key=np.array(key), **arrays)
 
@@ -116,11 +128,23 @@ class TransferOperator:
                     if surfels.max(initial=0) >= count:
                         raise ImageError(f"expected surfels below {count} in {path}, found {surfels.max()}; bake again with `force=True`")
                     found[name] = csr_array((shares.astype(np.float32), surfels.astype(np.int32), starts), shape=(len(starts) - 1, count))
+                environment = _read_environment(stored, path)
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
+        objects = np.round(image[2, :, 3]).astype(np.int64)
         emission = np.ascontiguousarray(image[3, :, :3]) if len(image) == 4 else np.zeros((count, 3), np.float32)
-        return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), emission, found["receivers"], found["exchange"])
+        return TransferOperator(cells, objects, emission, found["receivers"], found["exchange"], environment)
+
+
+def _read_environment(stored: Any, path: Path) -> EnvironmentRows | None:
+    """None where the file has none."""
+    if "environment_starts" not in stored:
+        return None
+    side, starts, cells, shares = (stored[f"environment_{part}"] for part in ("side", "starts", "cells", "shares"))
+    if cells.max(initial=0) >= side**2:
+        raise ImageError(f"expected cells of the environment below {side**2} in {path}, found {cells.max()}; bake again with `force=True`")
+    return EnvironmentRows(starts, cells.astype(np.int64), shares.astype(np.float32), int(side))
 
 
 def is_traced(folder: Path, key: str) -> bool:

@@ -40,6 +40,12 @@ def test_free_space_is_closed_and_faces_look_into_it(tmp_path: Path, name: str) 
     assert found["overlap"] == 0 and found["receivers"] == receivers
 
 
+def test_the_box_with_a_window_opens_there_alone(tmp_path: Path) -> None:
+    found = facts(tmp_path, "cornell_box", ("-1,-1,0", "1,1,2"), "--window")
+    assert found["back"] == 0 and 0.01 < found["escaped"] / (found["front"] + found["escaped"]) < 0.04
+    assert found["overlap"] == 0 and found["receivers"] == ["Outside", "Room", "Short block", "Tall block"]
+
+
 def test_the_loft_opens_at_its_windows_alone(tmp_path: Path) -> None:
     found = facts(tmp_path, "loft", ("0,0,0", "8,5,3"))
     assert found["back"] == 0 and 0.01 < found["escaped"] / found["front"] < 0.06

@@ -148,10 +148,10 @@ def test_a_named_light_has_no_direct_light_of_its_own(asset: Path) -> None:
         assert len(added.notes([NamedLight("Window"), PointLight((0.0, 0.0, 1.0))])) == 2
 
 
-def test_an_environment_says_what_it_lacks(asset: Path, tmp_path: Path) -> None:
+def test_an_environments_direct_light_is_added_by_rays(asset: Path, tmp_path: Path) -> None:
     write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
     done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--environment", tmp_path / "environment.exr")
-    assert done.exit_code == 0 and "environment's direct light is not added" in done.stderr
+    assert done.exit_code == 0 and "added exact direct light by rays" in done.stderr and "not added" not in done.stderr
 
 
 @pytest.mark.slow

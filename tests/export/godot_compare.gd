@@ -19,6 +19,7 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	var relight := SrbfRelight.new()
 	relight.asset = asset
 	relight.suns_by_table = job.by_table
+	relight.by_surfels = false
 	for name in job.mix:
 		var color: Array = job.mix[name][1]
 		relight.set_light(name, job.mix[name][0], Color(color[0], color[1], color[2]))

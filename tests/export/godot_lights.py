@@ -30,31 +30,43 @@ class Lit:
     position: ndarray
     energy: float
     decay: float = 1.0
-    spot: tuple[float, float] | None = None  # half-angle (rad), exponent of its edge
+    spot: tuple[float, float] | None = None  # half-angle (rad), spot_angle_attenuation
+    color: tuple[float, float, float] = COLOR
+
+    @property
+    def direction_z_up(self) -> ndarray:
+        """Towards a distant light, against where a spot shines, in srbf's world."""
+        return np.asarray(Z_UP[:3, :3] @ self.direction)
 
     def light(self) -> Light:
         """The same light in srbf, in the world frame, z up."""
-        color = tuple((np.pi * self.energy * decode_srgb(np.array(COLOR))).tolist())
-        towards, place = Z_UP[:3, :3] @ self.direction, tuple(Z_UP[:3, :3] @ self.position)
+        color = tuple((np.pi * self.energy * decode_srgb(np.array(self.color))).tolist())
+        towards, place = self.direction_z_up, tuple(Z_UP[:3, :3] @ self.position)
         falloff: Falloff = "inverse-square" if self.decay >= 1.5 else "linear"
         if self.node["kind"] == "DirectionalLight3D":
             return DirectionalLight(tuple(towards), color)
         if self.spot is None:
             return PointLight(place, color, falloff=falloff)
         outer, exponent = self.spot
-        share = max(0.0, 2 * 0.5 ** (1 / exponent) - 1)
+        share = max(0.0, 2 * 0.5**exponent - 1)
         inner = float(np.arccos(1 - share * (1 - np.cos(outer))))
         return SpotLight(place, color, falloff=falloff, direction=tuple(-towards), inner=inner, outer=outer)
 
 
-def node(kind: str, energy: float, **properties: float) -> dict[str, Any]:
-    across = np.cross([0.3, 1.0, 0.2], TOWARDS)
+def node(
+    kind: str,
+    energy: float,
+    place: ndarray = PLACE,
+    towards: ndarray = TOWARDS,
+    color: tuple[float, float, float] = COLOR,
+    **properties: float,
+) -> dict[str, Any]:
+    across = np.cross([0.3, 1.0, 0.2], towards)
     across /= np.linalg.norm(across)
     frame = np.eye(4)
-    frame[:3] = np.stack([across, np.cross(TOWARDS, across), TOWARDS, PLACE], axis=1)
-    color = "Color({}, {}, {}, 1)".format(*COLOR)
+    frame[:3] = np.stack([across, np.cross(towards, across), towards, place], axis=1)
     numbers = {name: repr(float(value)) for name, value in {"light_energy": energy, **properties}.items()}
-    return {"kind": kind, "transform": transform(frame), "light_color": color, **numbers}
+    return {"kind": kind, "transform": transform(frame), "light_color": "Color({}, {}, {}, 1)".format(*color), **numbers}
 
 
 def transform(matrix: ndarray) -> str:
@@ -65,12 +77,12 @@ SUN = Lit(node("DirectionalLight3D", 0.3), TOWARDS, PLACE, 0.3)
 OMNI = Lit(node("OmniLight3D", 0.5, omni_range=RANGE), TOWARDS, PLACE, 0.5)
 SQUARED = Lit(node("OmniLight3D", 0.4, omni_range=RANGE, omni_attenuation=2), TOWARDS, PLACE, 0.4, 2.0)
 SPOT = Lit(
-    node("SpotLight3D", 0.7, spot_range=RANGE, spot_angle=50, spot_attenuation=2, spot_angle_attenuation=2),
+    node("SpotLight3D", 0.7, spot_range=RANGE, spot_angle=50, spot_attenuation=2, spot_angle_attenuation=0.5),
     TOWARDS,
     PLACE,
     0.7,
     2.0,
-    (np.radians(50), 2.0),
+    (np.radians(50), 0.5),
 )
 LIGHTS = {
     "directional": [SUN],

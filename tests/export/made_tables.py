@@ -41,7 +41,7 @@ def made(kind: str, encoding: Any = "half", *, ambient: bool = True, height: int
     manifest = {key: value for key, value in base.manifest.items() if key not in dropped} | {"method": method}
     tables = {key: table for key, table in base.tables.items() if key == "cluster_index"}
     if method == "light-cloud":
-        return _in_a_room(replace(base, manifest=manifest, tables=tables), rng)
+        return in_a_room(replace(base, manifest=manifest, tables=tables), rng)
     manifest |= {"light_domain": "named", "lights": [{"name": name, "objects": [name]} for name in NAMES]}
     if method == "light-mix":
         manifest |= {"cluster_zone": [0] * base.clusters}
@@ -54,10 +54,13 @@ def _add_values(manifest: dict[str, Any], tables: dict[str, np.ndarray], base: A
     manifest["light_values"] = {"file": "light_values.exr", "lights": lights, "scale": 0.5}
 
 
-def _in_a_room(base: Asset, rng: np.random.Generator) -> Asset:
-    room = Room.box((2.2, 1.6, 1.5), 0.5)
+SMALL = Room.box((2.2, 1.6, 1.5), 0.5)
+
+
+def in_a_room(base: Asset, rng: np.random.Generator, room: Room = SMALL, patches: int = 6) -> Asset:
+    """A light cloud of random tables, its cells those of a room."""
     shift = np.array([-1.0, -0.8, 0.0])
-    labels = room.patches(6)
+    labels = room.patches(patches)
     cells = Cells(
         (room.places + shift).astype(np.float32), room.normals.astype(np.float32), room.areas.astype(np.float32),
         room.albedo.astype(np.float32), labels,

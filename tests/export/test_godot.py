@@ -124,6 +124,7 @@ def test_script_and_shaders_name_the_same_uniforms(projects: dict[str, Path]) ->
     declared = {
         name
         for path in (addon / "shaders").glob("*.gdshaderinc")
+        if not path.stem.startswith("probe_")
         for name in re.findall(r"^uniform \w+ (srbf_\w+)", path.read_text(), re.M)
     }
     script = (addon / "srbf_relight.gd").read_text()
@@ -161,6 +162,7 @@ def as_glsl(text: str, folder: Path) -> str:
     text = re.sub(r"^varying ", "in ", text, flags=re.M)
     text = re.sub(r"^void vertex\(\) \{.*?^\}$", "", text, flags=re.M | re.S)
     built_in = (
-        "in vec2 UV, UV2; out vec4 COLOR; vec3 ALBEDO; vec4 IRRADIANCE, RADIANCE; float SPECULAR, ROUGHNESS; const float PI = 3.1415927;\n"
+        "in vec2 UV, UV2; out vec4 COLOR; vec3 ALBEDO, NORMAL; vec4 IRRADIANCE, RADIANCE; float SPECULAR, ROUGHNESS;\n"
+        "uniform mat4 INV_VIEW_MATRIX; const float PI = 3.1415927;\n"
     )
     return f"#version 330 core\n{built_in}{text}\nvoid main() {{ fragment(); COLOR.rgb += ALBEDO * IRRADIANCE.rgb; }}\n"

@@ -31,7 +31,7 @@ needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono"
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 HERE = Path(__file__).parent / "unity"
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds", "SrbfLightTable", "SrbfPositionTable")
+ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds", "SrbfLightTable", "SrbfPositionTable", "SrbfSurfels")
 AXES = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)  # of the asset from Unity's, written down once more
 OFFSET = np.array([0.2, -0.4, 0.3])  # of the imported scene's root, in the asset's axes
 FARS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)), DirectionalLight((-0.6, 0.1, 0.4), (0.2, 0.5, 0.9))]
@@ -282,7 +282,7 @@ def test_c_sharp_says_what_is_wrong_with_a_manifest(
 @needs_mono
 def test_the_files_that_use_unity_compile_against_its_interfaces(tmp_path: Path) -> None:
     sources = sorted((engine_root("unity") / "Srbf").rglob("*.cs"))
-    assert len(sources) == len(ENGINE_FREE) + 3
+    assert len(sources) == len(ENGINE_FREE) + 5
     command = [
         "mcs",
         "-langversion:7",

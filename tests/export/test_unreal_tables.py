@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import runpy
 import shutil
 import subprocess
@@ -23,6 +24,7 @@ from srbf.asset import Asset
 from srbf.export import spirv, unreal
 from srbf.export.engine_folder import engine_root
 from srbf.export.light_tables import first_weights, table_file
+from srbf.export.unreal_surfels import SOURCES
 from srbf.lights import PointLight, SpotLight, moved
 
 pytestmark = pytest.mark.engines
@@ -99,27 +101,23 @@ def test_c_plus_plus_refuses_what_are_no_tables(ask: Any, tmp_path: Path) -> Non
     assert "another size" in ask(tmp_path / "tables", [])["refused"][0]
 
 
-@needs_compiler
-def test_the_component_compiles_against_unreals_interfaces(tmp_path: Path) -> None:
-    names = [
-        "CoreMinimal",
-        "Components/ActorComponent",
-        "SrbfRelit.generated",
-        "Components/MeshComponent",
-        "Components/PointLightComponent",
-    ]
-    names += ["Components/SpotLightComponent", "Engine/Texture2D", "GameFramework/Actor", "Materials/MaterialInstanceDynamic"]
-    for name in [*names, "Misc/FileHelper", "Misc/Paths", "UObject/UObjectIterator"]:
-        (tmp_path / f"{name}.h").parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / f"{name}.h").write_text('#include "Declarations.h"\n')
-    text = "\n".join(line for line in (SOURCE / "SrbfRelit.h").read_text().splitlines())
-    (tmp_path / "SrbfRelit.h").write_text(
-        text.replace("public:\n    USrbfRelit", "public:\n    using Super = UActorComponent;\n    USrbfRelit")
-    )
-    shutil.copy(SOURCE / "SrbfRelit.cpp", tmp_path)
-    command = ["g++", "-std=c++17", "-Wall", "-fsyntax-only", f"-I{tmp_path}", f"-I{SOURCE}", f"-I{HERE}", str(tmp_path / "SrbfRelit.cpp")]
+def component_compiles(name: str, folder: Path) -> None:
+    """Against handwritten interfaces: each header that it includes and srbf does not have is all of them."""
+    shutil.copy(SOURCE / f"{name}.cpp", folder)
+    header = (SOURCE / f"{name}.h").read_text()
+    for file in re.findall(r'#include "(.+)"', header + (SOURCE / f"{name}.cpp").read_text()):
+        if not (SOURCE / file).exists():
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
+            (folder / file).write_text('#include "Declarations.h"\n')
+    (folder / f"{name}.h").write_text(header.replace("public:\n", "public:\n    using Super = UActorComponent;\n", 1))
+    command = ["g++", "-std=c++17", "-Wall", "-fsyntax-only", f"-I{folder}", f"-I{SOURCE}", f"-I{HERE}", str(folder / f"{name}.cpp")]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@needs_compiler
+def test_the_component_compiles_against_unreals_interfaces(tmp_path: Path) -> None:
+    component_compiles("SrbfRelit", tmp_path)
 
 
 @pytest.mark.skipif(not spirv.available(), reason="needs glslang-tools, spirv-tools and spirv-cross (Debian)")
@@ -149,7 +147,8 @@ def test_the_script_connects_the_weights_and_copies_the_tables(
     runpy.run_path(str(folders[kind] / "import_srbf.py"), run_name="__main__")
     copied = tmp_path / "Project/Srbf" / f"{Path(node['include']).stem}.bin"
     assert copied.read_bytes() == (folders[kind] / "SrbfTables.bin").read_bytes()
-    assert {path.name for path in (folders[kind] / "Source").iterdir()} == {"SrbfWeights.h", "SrbfRelit.h", "SrbfRelit.cpp"}
+    sources = {"SrbfWeights.h", "SrbfRelit.h", "SrbfRelit.cpp"} | (set(SOURCES) if kind == "light-cloud" else set())
+    assert {path.name for path in (folders[kind] / "Source").iterdir()} == sources
     custom = next(part for part in stand_in.made if part.kind == "MaterialExpressionCustom")
     connected = [call[4] for call in stand_in.calls if call[0].endswith("connect_material_expressions") and call[3] is custom]
     assert connected == node["inputs"] and "Weights" in connected and "WorldPosition" not in connected

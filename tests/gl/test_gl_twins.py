@@ -417,7 +417,7 @@ def test_the_header_names_its_function_and_an_importable_twin(file: str) -> None
     assert header is not None, f"{file}: expected a header with use, domain, twin, cite in this order"
     names = header["names"].split(", ")
     body = text[header.end() :]
-    defined = re.findall(r"^(?:float|vec\d|int|void|mat\d|Srbf\w+)\s+(\w+)\(", body, re.MULTILINE)
+    defined = re.findall(r"^(?:float|i?vec\d|int|void|mat\d|Srbf\w+)\s+(\w+)\(", body, re.MULTILINE)
     assert defined == names
     for name in names:
         assert f" {name}(" in header["use"]

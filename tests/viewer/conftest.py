@@ -98,8 +98,8 @@ def serve(built: Path) -> Iterator[Callable[..., str]]:
     """Serve an asset's folder as `srbf view` does; its URL."""
     servers: list[ViewerServer] = []
 
-    def start(folder: Path | list[Path], capture: Path | None = None, mesh: Path | None = None) -> str:
-        server = ViewerServer(contents_of(folder if isinstance(folder, list) else [folder], capture, mesh))
+    def start(folder: Path | list[Path], capture: Path | None = None, mesh: Path | None = None, probes: Path | None = None) -> str:
+        server = ViewerServer(contents_of(folder if isinstance(folder, list) else [folder], capture, mesh, probes))
         Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True).start()
         servers.append(server)
         return server.url

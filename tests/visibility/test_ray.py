@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closed_forms import quad
 
 from srbf.errors import InputError
 from srbf.io.scene_glb import KNOTS
@@ -113,8 +114,28 @@ def test_a_spot_is_a_point_times_its_cone(plane) -> None:
     np.testing.assert_allclose(found[radius < np.tan(0.3) - 0.05], point[radius < np.tan(0.3) - 0.05], rtol=1e-3)
 
 
-def test_an_environment_adds_nothing(plane) -> None:
-    assert (RayTracer(plane()).response([EnvironmentLight(np.ones((4, 8, 3), np.float32))]) == 0).all()
+def test_an_even_environment_adds_pi_times_its_radiance(plane) -> None:
+    """To an open plane; beside an endless wall half of it."""
+    environment = EnvironmentLight(np.full((4, 8, 3), 0.5, np.float32), color=(2.0, 1.0, 0.0))
+    found = RayTracer(plane(size=8)).response([environment])
+    np.testing.assert_allclose(found, np.broadcast_to([np.pi, np.pi / 2, 0], found.shape), rtol=0.04)
+    np.testing.assert_allclose(found.mean(axis=(0, 1)), [np.pi, np.pi / 2, 0], rtol=0.004)
+    wall = quad([1, -90, 0], [1, 90, 0], [1, 90, 90], [1, -90, 90])
+    assert RayTracer(plane(wall, size=8)).response([environment])[:, -1, 0].mean() == pytest.approx(np.pi / 2, rel=0.02)
+
+
+def test_a_small_bright_sun_in_a_map_is_found(plane) -> None:
+    """As a directional light of its irradiance, with the shadow of a roof."""
+    image = np.full((90, 180, 3), 1e-4, np.float32)
+    image[10, 60] = 1000.0
+    elevation, azimuth = np.pi / 2 - 10.5 * np.pi / 90, (0.5 - 60.5 / 180) * 2 * np.pi
+    toward = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
+    sun = DirectionalLight(toward, (1000.0 * (np.pi / 90) ** 2 * np.cos(elevation),) * 3)
+    tracer = RayTracer(plane(quad([0, -9, 0.2], [9, -9, 0.2], [9, 9, 0.2], [0, 9, 0.2]), size=16))
+    found, expected = tracer.response([EnvironmentLight(image)])[..., 0], tracer.response([sun])[..., 0]
+    sharp = np.abs(np.diff(expected, axis=1, append=expected[:, -1:])) + np.abs(np.diff(expected, axis=1, prepend=expected[:, :1])) < 0.01
+    np.testing.assert_allclose(found[sharp], expected[sharp], atol=0.02 * expected.max())
+    assert expected.min() == 0 < expected.max()
 
 
 def test_many_lights_add_up_and_runs_repeat(plane, sphere) -> None:

@@ -73,8 +73,8 @@ def test_light_adds_up(operator: TransferOperator) -> None:
     np.testing.assert_allclose(found @ weights, (operator.receivers @ bounces.radiosity((lights @ weights)[:, None]))[:, 0], rtol=1e-4)
 
 
-def test_a_black_room_that_emits_radiance_1_is_as_bright_as_a_sky(capture: Capture) -> None:
-    """Irradiance pi, by form factors to points of what emits where that is far, and by rays where it is near."""
+def test_a_black_room_that_emits_radiance_1_gives_irradiance_pi(capture: Capture) -> None:
+    """By form factors to points of what emits where that is far, and by rays where it is near."""
     corners = divided(BOX.corners, 0.3)
     black, light = np.zeros((len(corners), 3), np.float32), np.ones((2, len(corners), 3), np.float32)
     numbers = np.zeros(len(corners), np.int64)

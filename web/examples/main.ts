@@ -1,10 +1,11 @@
 /**
  * An asset in three.js. In the page's address: `asset`, the folder with asset.json. For a lightmap also `mesh`, a .glb of the scene, `object`, the name
- * of the mesh that the asset lights, and `channel`, its lightmap's UV set. `pointLight`: first position of the point light, x,y,z in three's world.
+ * of the mesh that the asset lights, and `channel`, its lightmap's UV set. `pointLight`: first position of the point light, x,y,z in three's world. `probes`, the
+ * folder of an asset of probes, adds a white sphere at `sphere` that they light; a drag moves the light, or with shift the sphere.
  */
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { SrbfRelightingMap } from "srbf/three";
+import { SrbfProbes, SrbfRelightingMap } from "srbf/three";
 
 const query = new URLSearchParams(location.search);
 const renderer = new THREE.WebGLRenderer({ antialias: true });
@@ -16,6 +17,14 @@ const pointLight = new THREE.PointLight(0xffffff, Number(query.get("intensity") 
 pointLight.position.fromArray((query.get("pointLight") ?? "0.4,1,0.3").split(",").map(Number));
 scene.add(pointLight);
 map.follow(pointLight);
+
+const probes = query.has("probes") ? await SrbfProbes.load(query.get("probes") as string, { lightsOf: map }) : undefined;
+const sphere = new THREE.Mesh(new THREE.SphereGeometry(Number(query.get("radius") ?? 0.1), 48, 32), new THREE.MeshLambertMaterial());
+sphere.position.fromArray((query.get("sphere") ?? "0,0.5,0").split(",").map(Number));
+if (probes) {
+  probes.apply(sphere.material);
+  scene.add(sphere);
+}
 
 const camera = query.has("mesh") ? await lightmap() : view();
 
@@ -48,10 +57,12 @@ addEventListener("resize", resize);
 resize();
 
 renderer.domElement.addEventListener("pointermove", (event) => {
-  if (event.buttons) pointLight.position.add(new THREE.Vector3(event.movementX, 0, event.movementY).multiplyScalar(0.005));
+  const moved = event.shiftKey ? sphere : pointLight;
+  if (event.buttons) moved.position.add(new THREE.Vector3(event.movementX, 0, event.movementY).multiplyScalar(0.005));
 });
 
 renderer.setAnimationLoop(() => {
   map.update(renderer);
+  probes?.update(renderer);
   renderer.render(scene, camera);
 });

@@ -10,6 +10,7 @@ import { checkManifest, isPicture, type LayerEntry, layersOf, type Manifest, met
 import { IDENTITY, type Matrix4 } from "./matrix";
 import type { Method, ReadOptions, Tables } from "./methods/method";
 import { decodePng } from "./png";
+import { type Probes, readProbes } from "./probes";
 
 export interface Asset {
   readonly manifest: Manifest;
@@ -25,6 +26,8 @@ export interface Asset {
   readonly ambient?: FloatImage;
   /** Coverage of a view that does not fill its picture, 0 to 1, (H, W). Layers hold straight colors, not multiplied by it. */
   readonly alpha?: FloatImage;
+  /** Where they are, of an asset whose receivers are probes. */
+  readonly probes?: Probes;
   readonly assetFromWorld: Matrix4;
 }
 
@@ -55,12 +58,13 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
   const method = methodOf(manifest);
   const files = new AssetFiles(folder, fetcher, manifest, options.verify ?? false);
   const entries = layersOf(manifest);
-  const [layers, tables, position, ambient, alpha] = await Promise.all([
+  const [layers, tables, position, ambient, alpha, probes] = await Promise.all([
     readLayers(files, manifest, entries),
     method.read(files, manifest, options),
     readImage(files, manifest, manifest.position),
     readImage(files, manifest, manifest.ambient),
     readAlpha(files, manifest),
+    readProbes(files, manifest),
   ]);
   return {
     manifest,
@@ -72,6 +76,7 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
     position,
     ambient,
     alpha,
+    probes,
     assetFromWorld: manifest.asset_from_world ?? IDENTITY,
   };
 }

@@ -1,6 +1,6 @@
 /** Direct light on an indirect asset by shadow maps, with the shader pack's stages; environments and named lights add none. */
-import { Color, type DataTexture, FloatType, type Object3D, RGBAFormat, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
-import { type Asset, type FloatImage, type Light, moved, SrbfError } from "../src";
+import { Color, type DataTexture, FloatType, type Object3D, RGBAFormat, SphereGeometry, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import { type Asset, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
 import { type DirectReceivers, directReceivers } from "./direct_points";
 import { PointShadows } from "./point_shadows";
 import { shadowCasters } from "./shadow_casters";
@@ -16,33 +16,88 @@ export interface DirectInputs {
   scene: Object3D;
 }
 
+/** Where light is added: the size of its picture, and what a texel makes of irradiance, RGBA. */
+interface Surface {
+  width: number;
+  height: number;
+  reflectance: Float32Array;
+}
+
+const [SIDES, RINGS] = [32, 16]; // of a ball that casts shadows
+
 export class DirectLight {
-  private readonly receivers: DirectReceivers;
   private readonly lit: LitTexels;
+  private readonly ball = new SphereGeometry(1, SIDES, RINGS);
   private readonly sum: WebGLRenderTarget;
   private readonly suns: () => SunShadows;
   private readonly points: () => PointShadows;
   private drawn = "";
+  private cast = "";
 
-  /** @throws SrbfError where the GPU cannot blend floats. */
-  constructor(
+  /** Of an asset's texels. @throws SrbfError where the GPU cannot blend floats. */
+  static ofAsset(asset: Asset, inputs: DirectInputs, renderer: WebGLRenderer): DirectLight {
+    const { width, height, direct } = asset.manifest;
+    const receivers = directReceivers(asset, asset.position as FloatImage, inputs.normal, inputs.coverage, direct?.footprint ?? 1);
+    return new DirectLight(asset, receivers, { width, height, reflectance: reflectance(asset, inputs.albedo) }, inputs.scene, renderer);
+  }
+
+  /** Of `width` x `height` white points that move, in the frame of `asset`: put them somewhere first. @throws as `ofAsset`. */
+  static ofPoints(asset: Asset, width: number, height: number, scene: Object3D, renderer: WebGLRenderer): DirectLight {
+    const [points, normals] = [0, 1].map(() => new Float32Array(4 * width * height));
+    const receivers = { center: [0, 0, 0] as [number, number, number], corners: [{ points, normals }], bounds: new Float32Array(3 * width * height) };
+    return new DirectLight(asset, receivers, { width, height, reflectance: new Float32Array(4 * width * height).fill(1) }, scene, renderer);
+  }
+
+  private constructor(
     private readonly asset: Asset,
-    inputs: DirectInputs,
+    private readonly receivers: DirectReceivers,
+    surface: Surface,
+    scene: Object3D,
     private readonly renderer: WebGLRenderer,
   ) {
     if (!renderer.extensions.has("EXT_color_buffer_float") || !renderer.extensions.has("EXT_float_blend")) {
       throw new SrbfError("expected a GPU that blends floats for direct light, found one without: only the indirect light is shown");
     }
-    const { width, height, direct } = asset.manifest;
-    this.receivers = directReceivers(asset, asset.position as FloatImage, inputs.normal, inputs.coverage, direct?.footprint ?? 1);
+    const { width, height } = surface;
     const texture = (data: Float32Array): DataTexture => floatTexture(data, width, height);
     const corners = this.receivers.corners.map(({ points, normals }) => ({ points: texture(points), normals: texture(normals) }));
-    this.lit = { corners, reflectance: texture(reflectance(asset, inputs.albedo)) };
+    this.lit = { corners, reflectance: texture(surface.reflectance) };
     this.sum = renderTarget(width, height, RGBAFormat, FloatType);
     const { bounds, center } = this.receivers;
-    const casters = shadowCasters(inputs.scene, center);
-    this.suns = once(() => new SunShadows(renderer, this.lit, casters, bounds, direct?.sun_angle ?? 0));
+    this.ball.setAttribute("corner", this.ball.getAttribute("position").clone());
+    this.ball.setAttribute("cornerNormal", this.ball.getAttribute("position"));
+    this.ball.setDrawRange(0, 0);
+    const casters = [...shadowCasters(scene, center), { geometry: this.ball }];
+    this.suns = once(() => new SunShadows(renderer, this.lit, casters, bounds, asset.manifest.direct?.sun_angle ?? 0));
     this.points = once(() => new PointShadows(renderer, this.lit, casters, center));
+  }
+
+  /** Put the points of `ofPoints` there, in the asset's frame. */
+  move(points: readonly Triple[], normals: readonly Triple[]): void {
+    const [own] = this.receivers.corners;
+    const [textures] = this.lit.corners;
+    points.forEach((point, i) => {
+      own.points.set(point, 4 * i);
+      own.normals.set(normals[i], 4 * i);
+      this.receivers.bounds.set(point, 3 * i);
+    });
+    textures.points.needsUpdate = textures.normals.needsUpdate = true;
+    this.drawn = "";
+  }
+
+  /** Let a ball in the asset's frame cast shadows, or none. */
+  setBall(ball?: { position: Triple; size: number }): void {
+    const state = JSON.stringify(ball);
+    if (state === this.cast) return;
+    this.cast = state;
+    this.drawn = "";
+    this.ball.setDrawRange(0, ball ? Infinity : 0);
+    if (!ball) return;
+    const [unit, corner] = [this.ball.getAttribute("position"), this.ball.getAttribute("corner")];
+    for (let i = 0; i < unit.count; ++i) {
+      for (let k = 0; k < 3; ++k) corner.setComponent(i, k, ball.position[k] - this.receivers.center[k] + ball.size * unit.getComponent(i, k));
+    }
+    corner.needsUpdate = true;
   }
 
   /** The direct light of `lights`, in the asset's quantity, redrawn where they have changed. */

@@ -26,6 +26,8 @@ export interface Facts {
   kind: "view" | "lightmap";
   mesh: string | null;
   capture: string | null;
+  /** Folder of an asset of probes. */
+  probes: string | null;
   camera: FittedCamera | null;
   notes: string[];
 }
@@ -44,6 +46,8 @@ export interface Loaded {
   first: LoadedAsset;
   model?: Object3D;
   references?: References;
+  /** What lights the sphere that moves. */
+  probes?: Asset;
   notes: string[];
 }
 
@@ -59,13 +63,14 @@ export async function loadFacts(): Promise<Facts> {
 /** @throws SrbfError in one line where a file is missing or damaged. */
 export async function load(facts: Facts, index: number, progress: (done: number, what: string) => void): Promise<Loaded> {
   const notes = [...facts.notes];
-  const [first, model, references] = await Promise.all([
+  const [first, model, references, probes] = await Promise.all([
     loadOne(facts.assets[index], progress),
     facts.mesh ? readModel(facts.mesh, notes) : undefined,
     facts.capture ? References.load(facts.capture) : undefined,
+    facts.probes ? loadAsset(facts.probes, { verify: globalThis.isSecureContext, exact: true }) : undefined,
   ]);
   progress(1, "");
-  return { facts, first, model, references, notes };
+  return { facts, first, model, references, probes, notes };
 }
 
 /** One of the assets. @throws SrbfError as `load`. */

@@ -3,6 +3,7 @@ import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
 import { areaState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, sphereState, spotState } from "./light_state";
 import type { AddedKind } from "./asset_lights";
+import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
 import { Mixer } from "./mixer";
 import { type Changed, COMPARES, firstPath, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
@@ -40,6 +41,8 @@ export interface PanelFacts {
   /** Objects that can emit, and whether they can be repainted. */
   objects: readonly string[];
   paintable: boolean;
+  /** Where the moving sphere may be; undefined without probes. */
+  room?: Box;
 }
 
 const KINDS = { directional: "Directional", point: "Point", spot: "Spot", sphere: "Sphere", area: "Area", environment: "Environment" } as const satisfies Record<AddedKind, string>;
@@ -77,6 +80,7 @@ export class Panel {
     if (!this.facts.named) this.light();
     const { objects, paintable } = this.facts;
     if (objects.length) surfaceControls(this.gui, this.state, objects, paintable, this.actions.changed);
+    if (this.facts.room) this.ball(this.facts.room);
     this.picture();
     if (this.facts.hasCapture) this.compare();
     this.path();
@@ -225,6 +229,25 @@ export class Panel {
         light.inner = Math.min(light.inner, light.outer);
         this.relight();
       });
+  }
+
+  private ball({ least, most }: Box): void {
+    const { ball } = this.state;
+    if (!ball || !this.gui) return;
+    const folder = this.gui.addFolder("Moving sphere");
+    folder.add(ball, "on").name("Shown").onChange(this.relight);
+    ["x", "y", "z"].forEach((axis, c) => {
+      const proxy = {
+        get place() {
+          return ball.position[c];
+        },
+        set place(value: number) {
+          ball.position = rounded(ball.position.map((x, i) => (i === c ? value : x)) as unknown as Triple);
+        },
+      };
+      folder.add(proxy, "place", least[c], most[c], 0.01).name(`Sphere ${axis} (m)`).onChange(this.relight);
+    });
+    folder.add(ball, "size", 0.01, Math.max(0.02, 0.25 * this.facts.bounds.radius), 0.01).name("Sphere radius (m)").onChange(this.relight);
   }
 
   private picture(): void {

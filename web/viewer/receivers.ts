@@ -59,7 +59,7 @@ export class Receivers {
 const SAMPLES = 65_536;
 
 /** Inverse of a rigid motion and uniform scale. */
-function inverse(m: Matrix4): Matrix4 {
+export function inverse(m: Matrix4): Matrix4 {
   const scale = m[0][0] ** 2 + m[1][0] ** 2 + m[2][0] ** 2;
   const turn = [0, 1, 2].map((r) => [0, 1, 2].map((c) => m[c][r] / scale));
   const rows = turn.map((row) => [...row, -(row[0] * m[0][3] + row[1] * m[1][3] + row[2] * m[2][3])]);

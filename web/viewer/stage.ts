@@ -7,6 +7,7 @@ import {
   Mesh,
   type Object3D,
   PerspectiveCamera,
+  Plane,
   PlaneGeometry,
   Raycaster,
   Scene,
@@ -18,6 +19,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Light, Triple } from "../src";
+import type { Ball } from "./ball";
 import { type FittedCamera, fromThree, toThree, viewCamera } from "./frames";
 import { PointLightGizmos } from "./point_light_gizmos";
 import { rounded } from "./light_state";
@@ -42,6 +44,7 @@ export class Stage {
   private readonly developedFrom: { value: Texture | null } = { value: null };
   private surroundings?: Surroundings;
   private readonly lit: Mesh[] = [];
+  private ball?: { ball: Ball; meshes: Mesh[] };
 
   constructor(
     readonly renderer: WebGLRenderer,
@@ -93,6 +96,57 @@ export class Stage {
   private get inScene(): boolean {
     const { value, color } = this.uniforms;
     return this.canShowScene && this.state.view === "scene" && value.value === VALUES.picture && color.value !== COLORS.negative;
+  }
+
+  /** Show a sphere in the room, where the state has it. */
+  setBall(ball: Ball, quantity: "irradiance" | "radiance"): void {
+    const meshes = [ball.mesh];
+    this.scene.add(ball.mesh);
+    if (this.surroundings) {
+      const own = new Mesh(ball.geometry);
+      this.surroundings.add(own, { ...this.uniforms, relit: { value: ball.texture } }, quantity);
+      meshes.push(own);
+    }
+    this.ball = { ball, meshes };
+  }
+
+  /** Whether a place of the canvas (CSS pixels) shows the sphere, with no handle over it. */
+  ballAt(x: number, y: number): boolean {
+    if (!this.ball || !this.showsBall || this.gizmos.dragging) return false;
+    const caster = this.sight(x, y);
+    const hit = caster.intersectObject(this.ball.ball.mesh)[0];
+    return hit !== undefined && !(caster.intersectObjects(this.lit)[0]?.distance < hit.distance);
+  }
+
+  /** The place under (x, y) of the plane through `through` that faces the eye, in the asset's world. */
+  onPlane(x: number, y: number, through: Triple): Triple | undefined {
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.orbitCamera.getWorldDirection(new Vector3()), toThree(through));
+    const found = this.sight(x, y).ray.intersectPlane(plane, new Vector3());
+    return found ? fromThree(found) : undefined;
+  }
+
+  /** Whether the sphere is seen: in the picture, on a mesh. */
+  private get showsBall(): boolean {
+    const { value, color } = this.uniforms;
+    return this.hasMesh && this.state.ball?.on === true && value.value === VALUES.picture && color.value !== COLORS.negative && this.state.compare === "off";
+  }
+
+  private placeBall(): void {
+    const { ball } = this.state;
+    if (!this.ball || !ball) return;
+    for (const mesh of this.ball.meshes) {
+      const before = JSON.stringify([mesh.visible, mesh.matrixWorld]);
+      mesh.visible = this.showsBall;
+      this.ball.ball.place(mesh, ball);
+      if (JSON.stringify([mesh.visible, mesh.matrixWorld]) !== before) this.surroundings?.moved();
+    }
+  }
+
+  private sight(x: number, y: number): Raycaster {
+    const { clientWidth, clientHeight } = this.renderer.domElement;
+    const caster = new Raycaster();
+    caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.orbitCamera);
+    return caster;
   }
 
   /** Turn the orbit camera about its target by `angle` (rad). */
@@ -181,6 +235,7 @@ export class Stage {
     const behind = BACKGROUND.clone().multiplyScalar(1 / this.uniforms.toneMappingExposure.value); // so that exposure leaves it unchanged
     for (const mesh of this.lit) (mesh.material as Material).side = this.state.cut ? FrontSide : DoubleSide;
     this.surroundings?.cut(this.state.cut);
+    this.placeBall();
     const whole = this.inScene ? (this.surroundings as Surroundings).draw(this.orbitCamera, lights, behind, width, height) : undefined;
     this.developedFrom.value = whole ?? null;
     renderer.autoClear = true;
@@ -191,10 +246,7 @@ export class Stage {
   /** What is seen at a place of the canvas (CSS pixels), in the asset's world. */
   pick(x: number, y: number): Triple | undefined {
     if (this.hasMesh) {
-      const { clientWidth, clientHeight } = this.renderer.domElement;
-      const caster = new Raycaster();
-      caster.setFromCamera(new Vector2((2 * x) / clientWidth - 1, 1 - (2 * y) / clientHeight), this.orbitCamera);
-      const hit = caster.intersectObjects(this.lit)[0];
+      const hit = this.sight(x, y).intersectObjects(this.lit)[0];
       return hit && fromThree(hit.point);
     }
     const { left, top, wide, high } = this.spread();

@@ -1,6 +1,7 @@
 /** The page's state, and its URL: `#` followed by the state as JSON. */
 import { SrbfError, type Triple } from "../src";
 import { checkLight, directionalState, isDesigned, type LightState, round, rounded } from "./light_state";
+import { type BallState, checkBall } from "./ball_state";
 import { checkSurfaces, type SurfaceState } from "./surface_state";
 
 export const TONES = ["linear", "agx", "aces"] as const;
@@ -48,6 +49,8 @@ export interface State {
   playing: boolean;
   /** Whether the camera orbits while the path plays, with twice its period. */
   turntable: boolean;
+  /** The sphere that probes light; undefined without probes. */
+  ball?: BallState;
 }
 
 /** What the page shows of an asset at first; `own`: lights that it has in place of a sun. */
@@ -136,6 +139,7 @@ export function decodeState(hash: string, plain: State): State {
     state.lights = fitting(given.lights.map(checkLight), plain.lights);
   }
   if (given.surfaces !== undefined) state.surfaces = checkSurfaces(given.surfaces);
+  if (given.ball !== undefined && plain.ball !== undefined) state.ball = checkBall(given.ball);
   one("surface", (value: unknown) => typeof value === "string");
   one("selected", number(-1, state.lights.length - 1));
   state.selected = Math.min(state.selected, state.lights.length - 1);

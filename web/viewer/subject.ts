@@ -1,7 +1,9 @@
 /** The assets that the page can switch between, each loaded when it is first chosen; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
 import type { Asset, FloatImage, Light, Triple } from "../src";
+import { carried } from "../src/matrix";
 import { alphaTexture } from "../src/three/textures";
+import type { BallState } from "./ball_state";
 import { DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
 import { lineOf, say } from "./messages";
@@ -22,12 +24,12 @@ export class Subject {
     this.facts = loaded.facts;
     this.asset = loaded.asset;
     this.coverage = loaded.coverage;
-    const floats = renderer.extensions.has("OES_texture_float_linear") && renderer.extensions.has("EXT_color_buffer_float");
-    this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear", weights: floats && loaded.asset.tables.surfels ? "gpu" : "cpu" });
+    const floats = drawsFloats(renderer);
+    this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear", weights: weightsFor(loaded.asset, renderer) });
     this.alpha = this.relighting.textures.alpha ?? alphaTexture({ kind: "float", width: 1, height: 1, channels: 1, data: new Float32Array([1]) });
     if (!loaded.direct) return;
     try {
-      this.direct = new DirectLight(loaded.asset, loaded.direct, renderer);
+      this.direct = DirectLight.ofAsset(loaded.asset, loaded.direct, renderer);
     } catch (error) {
       say(lineOf(error), "hint");
     }
@@ -53,13 +55,23 @@ export class Subject {
     return tables.centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // some light functions lie past the horizon
   }
 
-  /** Draw the lightmap under `lights`. */
-  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer): void {
+  /** Draw the lightmap under `lights`, with the direct shadow of a sphere. */
+  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState): void {
     this.relighting.set(lights);
+    this.direct?.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
     const wanted = this.direct && terms !== "indirect" ? this.direct.draw(lights) : undefined;
     this.relighting.add(wanted, terms === "direct" && wanted !== undefined);
     this.relighting.update(renderer);
   }
+}
+
+/** Where an asset's weights are computed. */
+export function weightsFor({ tables }: Asset, renderer: WebGLRenderer): "gpu" | "cpu" {
+  return drawsFloats(renderer) && tables.surfels ? "gpu" : "cpu";
+}
+
+function drawsFloats({ extensions }: WebGLRenderer): boolean {
+  return extensions.has("OES_texture_float_linear") && extensions.has("EXT_color_buffer_float");
 }
 
 /** Loads each asset when it is first chosen. */

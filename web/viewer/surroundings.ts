@@ -87,6 +87,18 @@ export class Surroundings {
     this.daylight = this.pmrem.fromScene(daylight(), 0.02).texture;
   }
 
+  /** A mesh with `lightmapUv` of white surface, whose light `uniforms` hold; it casts shadows. */
+  add(mesh: Mesh, uniforms: ScreenUniforms, quantity: "irradiance" | "radiance"): void {
+    mesh.material = receiverMaterial(mesh, uniforms, quantity);
+    mesh.castShadow = true;
+    this.scene.add(mesh);
+  }
+
+  /** Draw the shadows again: something has moved. */
+  moved(): void {
+    this.drawn = "";
+  }
+
   /** Whether a file holds meshes besides the receivers. */
   static in(model: Object3D): boolean {
     const [receivers, others] = [0, 0].map(() => [] as Object3D[]);

@@ -1,7 +1,11 @@
 /** The page: its state, lights, picture, comparison, and what it saves. */
 import { NoToneMapping, type Vector4, WebGLRenderer } from "three";
-import { type Light, lightDomainOf, SrbfError, type Triple } from "../src";
+import { type Asset, type Light, lightDomainOf, SrbfError, type Triple } from "../src";
+import { SrbfProbes } from "../src/three";
 import { capturedPlaces, firstLights, inside, kindsOf, middleOf, outsideLine } from "./asset_lights";
+import { Ball } from "./ball";
+import { dragBall } from "./ball_drag";
+import { firstBall, roomOf } from "./ball_state";
 import { bearing, legend, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
@@ -23,7 +27,7 @@ import { type DirectionPoint, DirectionWidget } from "./direction_widget";
 import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, encodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
-import { type Subject, Subjects } from "./subject";
+import { type Subject, Subjects, weightsFor } from "./subject";
 import { emitting, emittingStates, paint, surfaceFacts } from "./surface_state";
 import { Surroundings } from "./surroundings";
 
@@ -48,6 +52,7 @@ export class Viewer {
   private readonly copy: Copy;
   private readonly comparison: Comparison;
   private readonly spectrum: SpectrumPlot;
+  private readonly ball?: Ball;
   private keyframes?: Keyframes;
   private outside = "";
   private shining: Light[] = [];
@@ -94,6 +99,12 @@ export class Viewer {
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
     if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
+    const { probes } = loaded;
+    if (probes && this.stage.canShowMesh) {
+      this.ball = new Ball(renderer, new SrbfProbes(probes, { weights: weightsFor(probes, renderer) }), this.uniforms, asset, loaded.first.direct?.scene);
+      this.stage.setBall(this.ball, quantity);
+      dragBall(renderer.domElement, this.stage, this.state, roomOf(probes), changed);
+    }
     this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, this.directionPoints(), changed);
     this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
       changed,
@@ -149,6 +160,7 @@ export class Viewer {
       named: this.named,
       hasFrames: this.keyframes !== undefined,
       ...surfaceFacts(this.subject.asset),
+      room: this.ball && roomOf(this.loaded.probes as Asset),
     };
   }
 
@@ -189,7 +201,11 @@ export class Viewer {
 
   private firstState(): State {
     const { manifest } = this.subject.asset;
-    return firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", firstLights(this.subject.asset, this.receivers.bounds));
+    const lights = firstLights(this.subject.asset, this.receivers.bounds);
+    const state = firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
+    const { probes } = this.loaded;
+    if (probes) state.ball = firstBall(probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
+    return state;
   }
 
   private readUrl(hash: string): void {
@@ -285,7 +301,10 @@ export class Viewer {
       this.subject.relight(negated(this.shining), terms, this.renderer);
       this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
     }
-    this.subject.relight(this.shining, terms, this.renderer);
+    const { ball } = this.state;
+    const shown = this.ball && ball?.on && !comparing ? ball : undefined;
+    this.subject.relight(this.shining, terms, this.renderer, shown);
+    if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
     const light = this.comparable();
     if (comparing && light && this.comparison.compared >= 0) this.comparison.measure(this.subject, light, this.renderer);

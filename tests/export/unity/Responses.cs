@@ -57,6 +57,7 @@ static class Responses
     static void Weighted(string folder, SrbfManifest manifest, string[] arguments)
     {
         double[] n = Array.ConvertAll(arguments, text => { double value; return double.TryParse(text, NumberStyles.Float, CultureInfo.InvariantCulture, out value) ? value : 0; });
+        if (manifest.Surfels != null && n.Length == 4) { Surfels(manifest.SurfelPasses(folder), n); return; }
         var places = new List<Vector>();
         var colors = new List<Vector>();
         SrbfLightTable table = manifest.LightTable(folder);
@@ -78,6 +79,22 @@ static class Responses
         Print("weights", manifest.PositionTable(folder).Weights(places, colors, out outside));
         Print("outside", outside);
     }
+
+    /// <summary>What passes need; three numbers: the radiance of the asset's second object.</summary>
+    static void Surfels(SrbfSurfels surfels, double[] n)
+    {
+        Print("surfels", surfels.patches, surfels.triangles, surfels.reach, surfels.lift, surfels.middle[0], surfels.middle[1], surfels.middle[2]);
+        foreach (SrbfSurfelTable table in surfels.tables) Print("table", table.rows, table.columns, table.channels, table.scale, table.Blocks);
+        for (int face = 0; face < 6; face++) Axes("face", SrbfSurfels.Face(face));
+        Axes("frame", SrbfSurfels.Frame(new Vector(0.48, -0.6, 0.64)));
+        Axes("frame", SrbfSurfels.Frame(new Vector(0, 0, 1)));
+        var radiance = new KeyValuePair<string, Vector>(surfels.objects[1], new Vector(n[1], n[2], n[3]));
+        Print("added", surfels.Emitted(new[] { radiance }));
+        try { surfels.Emitted(new[] { new KeyValuePair<string, Vector>("none", new Vector()) }); }
+        catch (ArgumentException error) { Console.WriteLine("told " + error.Message.Length); }
+    }
+
+    static void Axes(string name, Vector[] axes) { Print(name, axes[0].X, axes[0].Y, axes[0].Z, axes[1].X, axes[1].Y, axes[1].Z, axes[2].X, axes[2].Y, axes[2].Z); }
 
     static void Show(string name, SrbfImage image)
     {

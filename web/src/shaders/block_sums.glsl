@@ -4,6 +4,8 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 
+#include "surfels/block_sum.glsl"
+
 uniform sampler2D parts;
 uniform sampler2D added;
 uniform int blocks;
@@ -13,10 +15,5 @@ out vec4 sum;
 
 void main() {
     int index = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
-    int partsWidth = textureSize(parts, 0).x;
-    vec3 total = texelFetch(added, ivec2(gl_FragCoord.xy), 0).rgb;
-    for (int i = index * blocks; i < (index + 1) * blocks; ++i) {
-        total += texelFetch(parts, ivec2(i % partsWidth, i / partsWidth), 0).rgb;
-    }
-    sum = vec4(total, 1.0);
+    sum = vec4(srbfBlockSum(parts, blocks, index) + texelFetch(added, ivec2(gl_FragCoord.xy), 0).rgb, 1.0);
 }

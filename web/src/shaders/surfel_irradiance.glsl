@@ -9,10 +9,9 @@ precision highp samplerCube;
 precision highp sampler2DShadow;
 precision highp samplerCubeShadow;
 
-#include "lights/attenuation.glsl"
-#include "lights/spot_cone.glsl"
-#include "lights/versine.glsl"
-#include "shadow/cube_face.glsl"
+#include "surfels/cell_irradiance.glsl"
+#include "surfels/cell_on_cube.glsl"
+#include "surfels/cell_on_map.glsl"
 
 uniform sampler2D places;   // less the middle of all cells, meters; area
 uniform sampler2D normals;  // unit; share of the patch's area
@@ -29,7 +28,7 @@ uniform float versineOuter;
 uniform float lambertian;
 #if SRBF_SHADOW == 1
 uniform sampler2D nearness;  // six faces of a cube, or one map of a directional light
-uniform float reach;         // tangent of a face's half-angle; meters of half a directional map's side
+uniform float reach;         // meters of half a directional map's side
 uniform vec3 across;
 uniform vec3 up;
 #elif SRBF_SHADOW > 1
@@ -54,50 +53,12 @@ uniform sampler2D shadowMap;
 
 out vec4 irradiance;
 
-const float NEAR = 8.0;  // sides of a cell, closer than which it is measured by PARTS x PARTS points
-const int PARTS = 4;
-const float TILT = 0.25; // of the nearness of a cell: how much the depth of its plane may vary within one texel of a shadow map
-const float SLACK = 1e-4;
-
-float falling(vec3 lightVector, vec3 normal, float least) {
-    float dist = length(lightVector);
-    vec3 toLight = lightVector / max(dist, 1e-15);
-    float cosine = dot(toLight, normal);
-    if (cosine <= 0.0) {
-        return 0.0;
-    }
-    float cone = srbfSpotCone(srbfVersine(-toLight, axis), versineInner, versineOuter);
-    float shining = mix(1.0, max(dot(-toLight, axis), 0.0), lambertian);
-    return cosine * cone * shining * srbfAttenuation(dist, a0, max(radius, sqrt(least)), falloff);
-}
-
-// [Duff2017]
-void frame(vec3 n, out vec3 tangent, out vec3 bitangent) {
-    float side = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (side + n.z);
-    float b = n.x * n.y * a;
-    tangent = vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x);
-    bitangent = vec3(b, side + n.y * n.y * a, -n.y);
-}
-
 float unshadowed(vec4 cell, vec3 normal) {
 #ifdef SRBF_DISTANT
     return max(dot(normal, light), 0.0);
 #else
-    vec3 lightVector = light - cell.xyz;
-    float least = cell.w / 6.283185307179586;
-    if (dot(lightVector, lightVector) >= NEAR * NEAR * cell.w) {
-        return falling(lightVector, normal, least);
-    }
-    vec3 tangent;
-    vec3 bitangent;
-    frame(normal, tangent, bitangent);
-    float total = 0.0;
-    for (int part = 0; part < PARTS * PARTS; ++part) {
-        vec2 at = sqrt(cell.w) * ((vec2(part / PARTS, part % PARTS) + 0.5) / float(PARTS) - 0.5);
-        total += falling(lightVector - at.x * tangent - at.y * bitangent, normal, least / float(PARTS * PARTS));
-    }
-    return total / float(PARTS * PARTS);
+    SrbfPointLight pointLight = SrbfPointLight(light, vec3(0.0), color, axis, a0, radius, versineInner, versineOuter, falloff);
+    return srbfCellIrradiance(cell, normal, pointLight, lambertian);
 #endif
 }
 
@@ -106,27 +67,14 @@ float unshadowed(vec4 cell, vec3 normal) {
 float visibility(vec3 place, vec3 normal) {
     ivec2 size = textureSize(nearness, 0);
 #ifdef SRBF_DISTANT
-    vec2 flat_ = vec2(dot(place, across), dot(place, up));
-    ivec2 texel = clamp(ivec2((flat_ / reach * 0.5 + 0.5) * vec2(size)), ivec2(0), size - 1);
-    vec2 middle = ((vec2(texel) + 0.5) / vec2(size) * 2.0 - 1.0) * reach;
-    float own = dot(place, light);
-    float plane = (dot(normal, place) - dot(vec2(dot(normal, across), dot(normal, up)), middle)) / dot(normal, light);
-    plane = clamp(plane, own - TILT, own + TILT);
-    return texelFetch(nearness, texel, 0).r > plane + 2.0 * reach ? 0.0 : 1.0;
+    ivec2 texel;
+    float height = srbfCellOnMap(place, normal, light, across, up, reach, size.x, texel);
+    return texelFetch(nearness, texel, 0).r > height ? 0.0 : 1.0;
 #else
-    vec3 fromLight = place - light;
-    int face = srbfCubeFace(fromLight);
-    int k = face / 2;
-    float side = face % 2 == 0 ? 1.0 : -1.0;
-    vec3 turned = k == 0 ? fromLight.yzx : k == 1 ? fromLight.zxy : fromLight;
-    vec3 plane = k == 0 ? normal.yzx : k == 1 ? normal.zxy : normal;
-    float depth = turned.z * side;
     int width = size.y / 2;
-    ivec2 texel = clamp(ivec2((turned.xy / (depth * reach) * 0.5 + 0.5) * float(width)), ivec2(0), ivec2(width - 1));
-    vec2 tangents = ((vec2(texel) + 0.5) / float(width) * 2.0 - 1.0) * reach;
-    float own = dot(plane, vec3(tangents, side)) / dot(normal, fromLight);
-    own = clamp(own, (1.0 - TILT) / depth, (1.0 + TILT) / depth);
-    return texelFetch(nearness, ivec2(face % 3, face / 3) * width + texel, 0).r > own * (1.0 + SLACK) ? 0.0 : 1.0;
+    ivec3 texel;
+    float own = srbfCellOnCube(place - light, normal, width, texel);
+    return texelFetch(nearness, ivec2(texel.z % 3, texel.z / 3) * width + texel.xy, 0).r > own ? 0.0 : 1.0;
 #endif
 }
 #elif SRBF_SHADOW > 1

@@ -33,6 +33,24 @@ const LIT = ["MeshStandardMaterial", "MeshPhysicalMaterial", "MeshLambertMateria
 
 const CUT_OUT: [string, string] = ["#include <opaque_fragment>", "diffuseColor.a *= textureLod(srbfAlpha, vSrbfUv, 0.0).r;\n#include <opaque_fragment>"];
 
+/** @throws SrbfError on a material that has no diffuse light by normals: none of three's Standard, Physical or Lambert. */
+export function checkLit(material: Material): void {
+  if (!LIT.includes(material.type)) throw new SrbfError(`expected a material of ${LIT.join(", ")} for probes, found ${material.type}; use PROBE_SHADER in it yourself`);
+}
+
+/** Call `patch` when `material` is compiled, after what its own onBeforeCompile does; `key` is the same for patches that give the same shader. */
+export function onCompile<M extends Material>(material: M, key: string | (() => string), patch: (shader: WebGLProgramParametersWithUniforms) => void): M {
+  const before = material.onBeforeCompile;
+  const keyBefore = material.customProgramCacheKey;
+  material.onBeforeCompile = (shader, renderer) => {
+    before.call(material, shader, renderer);
+    patch(shader);
+  };
+  material.customProgramCacheKey = () => `${keyBefore.call(material)} ${typeof key === "string" ? key : key()}`;
+  material.needsUpdate = true;
+  return material;
+}
+
 /** @throws SrbfError on a material that is none of three's Standard, Physical, Lambert or Basic. */
 export function checkMaterial(material: Material): void {
   if (![...LIT, "MeshBasicMaterial"].includes(material.type)) {
@@ -98,7 +116,8 @@ function receiver(options: Required<MaterialOptions>): string {
   return "texelFetch(srbfPositions, clamp(ivec2(vSrbfUv * vec2(textureSize(srbfPositions, 0))), ivec2(0), textureSize(srbfPositions, 0) - 1), 0).xyz";
 }
 
-function replaced(text: string, pairs: [string, string][]): string {
+/** Every first of the pairs in its place by the second. @throws SrbfError where three's shader lacks one. */
+export function replaced(text: string, pairs: [string, string][]): string {
   return pairs.reduce((out, [chunk, by]) => {
     if (!out.includes(chunk)) throw new SrbfError(`expected ${chunk} in three's shader, found none; this release of three.js is not supported`);
     return out.replace(chunk, () => by);

@@ -7,7 +7,7 @@ import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { needPositions, NO_WEIGHTS, uniformVectors } from "../shader";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
-import { checkMaterial, type MaterialOptions, type Patch, patchKey, patchShader } from "./material";
+import { checkMaterial, type MaterialOptions, onCompile, type Patch, patchKey, patchShader } from "./material";
 import { SceneAsset, sourceOf } from "./scene_asset";
 import { SurfelWeights } from "./surfel_weights";
 import { SrbfTextures } from "./textures";
@@ -26,6 +26,8 @@ export interface RelightingMapOptions extends TargetOptions {
   weights?: "cpu" | "gpu";
   /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`. */
   shadowSize?: number;
+  /** An asset whose lights shine on this one, too: what is followed, set or moved there counts here. */
+  lightsOf?: SceneAsset;
 }
 
 const EXTENSIONS = { bc7: "EXT_texture_compression_bptc", bc1: "WEBGL_compressed_texture_s3tc" };
@@ -43,13 +45,15 @@ export class SrbfRelightingMap extends SceneAsset {
   private readonly patched = new Map<Material, Patch>();
   private room = 1;
   private readonly gpu?: SurfelWeights;
+  /** How often the lightmap was drawn. */
+  protected drawings = 0;
   private drawn = "";
   private weighed = "";
   private added: Added | undefined;
 
   /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingMapOptions = {}) {
-    super(asset);
+    super(asset, options.lightsOf);
     this.source = sourceOf(asset, options.source);
     this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
     this.uniforms = assetUniforms(asset, this.textures);
@@ -66,6 +70,11 @@ export class SrbfRelightingMap extends SceneAsset {
   /** Fetch the asset at `url` (a folder with asset.json). @throws what `loadAsset` and the constructor throw. */
   static async load(url: string, options: RelightingMapOptions & LoadOptions = {}): Promise<SrbfRelightingMap> {
     return new SrbfRelightingMap(await loadAsset(url, options), options);
+  }
+
+  /** The lightmap of an asset that always has one. */
+  protected get facets(): Texture {
+    return this.lightmap as Texture;
   }
 
   /** The lightmap that `update` draws (v downwards), for your own shaders; only with `source: "lightmap"`. */
@@ -97,21 +106,13 @@ export class SrbfRelightingMap extends SceneAsset {
         channel: options.channel ?? 1,
         uvOrigin: options.uvOrigin ?? "top",
         receivers: options.receivers ?? receiversFrom(manifest),
-        direct: options.direct ?? (manifest.transport === "indirect" ? "engine" : "asset"),
+        direct: this.directOf(options),
       },
     };
     if (patch.options.receivers === "map") needPositions(this.asset, 1);
     this.patched.set(material, patch);
     if (this.asset.alpha) material.transparent = true;
-    const before = material.onBeforeCompile;
-    const keyBefore = material.customProgramCacheKey;
-    material.onBeforeCompile = (shader, renderer) => {
-      before.call(material, shader, renderer);
-      patchShader(shader, material, patch);
-    };
-    material.customProgramCacheKey = () => `${keyBefore.call(material)} ${patchKey(patch)}`;
-    material.needsUpdate = true;
-    return material;
+    return onCompile(material, () => patchKey(patch), (shader) => patchShader(shader, material, patch));
   }
 
   /**
@@ -156,6 +157,7 @@ export class SrbfRelightingMap extends SceneAsset {
     if (!renderer) throw new SrbfError("expected a renderer to draw the lightmap with, found none; call update(renderer)");
     if (state && state === this.drawn) return;
     this.pass?.draw(renderer, this.added);
+    ++this.drawings;
     this.drawn = state;
   }
 

@@ -16,13 +16,19 @@ import { checkKind, lightOf, type SceneLight } from "./scene_lights";
 /** An asset, and the lights that shine on it: three's own by `follow`, in three's world, and those of the library in `lights`. */
 export class SceneAsset {
   /** Lights of the library besides the followed ones, in the asset's world: Blender's, z up, meters. */
-  readonly lights: Light[] = [];
+  readonly lights: Light[];
   /** Blender's z-up world from three's y-up one; compose it with the inverse of a group that moves the asset's objects. */
-  readonly worldFromScene: Matrix4 = threeMatrix(Z_UP_FROM_Y_UP);
-  private readonly followed = new Set<SceneLight>();
+  readonly worldFromScene: Matrix4;
+  private readonly followed: Set<SceneLight>;
 
-  constructor(readonly asset: Asset) {
-    this.lights.push(...asDesigned(asset));
+  /** `lightsOf`: the asset that has the lights and the place in the scene of this one. */
+  constructor(
+    readonly asset: Asset,
+    lightsOf?: SceneAsset,
+  ) {
+    this.lights = lightsOf?.lights ?? [...asDesigned(asset)];
+    this.followed = lightsOf?.followed ?? new Set();
+    this.worldFromScene = lightsOf?.worldFromScene ?? threeMatrix(Z_UP_FROM_Y_UP);
   }
 
   /**
@@ -101,6 +107,11 @@ export class SceneAsset {
   /** The current lights' numbers for shaders. */
   protected frame(): FrameValues {
     return frameValues(this.asset, this.currentLights());
+  }
+
+  /** Who adds the direct diffuse light of the scene's lights, unless a material says. */
+  protected directOf({ direct }: { direct?: "asset" | "engine" }): "asset" | "engine" {
+    return direct ?? (this.asset.manifest.transport === "indirect" ? "engine" : "asset");
   }
 
   /** From three's world to the asset's frame, meters. */

@@ -88,7 +88,7 @@ export function alphaTexture({ data, width, height }: FloatImage): DataTexture {
   return finished(plain(halves, width, height, RedFormat, HalfFloatType), "linear");
 }
 
-function tableTexture({ data, width, height, kind, channels }: FloatImage | HalfImage | ByteImage): DataTexture {
+export function tableTexture({ data, width, height, kind, channels }: FloatImage | HalfImage | ByteImage): DataTexture {
   return plain(data, width, height, channels === 1 ? RedFormat : RGBAFormat, TYPES[kind]);
 }
 

@@ -3,8 +3,8 @@ import { babylonMaterial } from "./babylon";
 import { host, layers, load } from "./host";
 import type { Job } from "./job";
 import { playcanvasMaterial } from "./playcanvas";
-import { nodesLightmap, nodesMaterial, nodesShadows } from "./three_nodes";
-import { threeGltf, threeLightmap, threeMaterial, threeShadows } from "./three_webgl";
+import { nodesLightmap, nodesMaterial, nodesProbes, nodesShadows } from "./three_nodes";
+import { threeGltf, threeLightmap, threeMaterial, threeProbes, threeShadows } from "./three_webgl";
 
 const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "babylon-material": babylonMaterial,
@@ -14,10 +14,12 @@ const RUNS: Record<string, (job: Job) => Promise<unknown>> = {
   "playcanvas-material": playcanvasMaterial,
   "nodes-lightmap": nodesLightmap,
   "nodes-material": nodesMaterial,
+  "nodes-probes": nodesProbes,
   "nodes-shadows": nodesShadows,
   "three-gltf": threeGltf,
   "three-lightmap": threeLightmap,
   "three-material": threeMaterial,
+  "three-probes": threeProbes,
   "three-shadows": threeShadows,
 };
 

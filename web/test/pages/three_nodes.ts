@@ -1,10 +1,11 @@
 /** Jobs for three.js' WebGPURenderer, on WebGPU or forced on WebGL2. */
 import * as THREE from "three";
 import { MeshBasicNodeMaterial, MeshLambertNodeMaterial, MeshStandardNodeMaterial, RectAreaLightNode, RenderTarget, WebGPURenderer } from "three/webgpu";
+import { attribute, vec4 } from "three/tsl";
 import { RectAreaLightTexturesLib } from "three/addons/lights/RectAreaLightTexturesLib.js";
-import { SrbfRelightingNodes } from "../../src/three/tsl";
+import { SrbfProbeNodes, SrbfRelightingNodes } from "../../src/three/tsl";
 import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
-import { addLights, facingCamera, quad, shadowScene } from "./three_scene";
+import { addLights, facingCamera, placesMesh, quad, shadowScene } from "./three_scene";
 
 const MATERIALS = { MeshStandardMaterial: MeshStandardNodeMaterial, MeshLambertMaterial: MeshLambertNodeMaterial, MeshBasicMaterial: MeshBasicNodeMaterial };
 RectAreaLightNode.setLTC(RectAreaLightTexturesLib.init()); // as three.js asks of pages with area lights
@@ -61,6 +62,31 @@ export async function nodesShadows(job: Job) {
   }
   renderer.shadowMap.enabled = false;
   seen.dispose();
+  return { pictures };
+}
+
+/** `threeProbes` of the WebGL page, by nodes. */
+export async function nodesProbes(job: Job) {
+  const renderer = await rendererOf(job);
+  const map = await SrbfRelightingNodes.load(job.beside as string);
+  const probes = await SrbfProbeNodes.load(job.asset, { target: job.target, weights: job.weights as "gpu", exact: job.exact === true, lightsOf: map });
+  const material = new MeshLambertNodeMaterial();
+  material.vertexNode = vec4(attribute("pixel", "vec2") as never, 0, 1);
+  const scene = new THREE.Scene();
+  scene.add(placesMesh(job, probes.apply(material)));
+  const count = (job.places as unknown[]).length;
+  const target = new RenderTarget(count, 1, { type: THREE.FloatType });
+  const pictures = [];
+  for (const lights of job.lightSets) {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    probes.update(renderer);
+    renderer.setRenderTarget(target);
+    await renderer.renderAsync(scene, facingCamera(job));
+    renderer.setRenderTarget(null);
+    pictures.push(picture(count, 1, await read(renderer, target, count, 1)));
+  }
+  target.dispose();
+  for (const one of [map, probes, material]) one.dispose();
   return { pictures };
 }
 

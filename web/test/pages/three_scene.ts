@@ -66,3 +66,34 @@ export function shadowScene(job: Job, map: Followed, follow: Record<string, unkn
   light.shadow.camera.updateProjectionMatrix();
   return { scene, light, geometry };
 }
+
+/**
+ * A pixel, in a row of `job.places`, of each place x, y, z, nx, ny, nz of the asset's world: a quad all of whose corners are there, on a mesh that was moved.
+ * `pixel` of a vertex is where it is on the screen.
+ */
+export function placesMesh<M extends THREE.Material>(job: Job, material: M): THREE.Mesh<THREE.BufferGeometry, M> {
+  const places = job.places as number[][];
+  const mesh = new THREE.Mesh(new THREE.BufferGeometry(), material);
+  mesh.position.set(0.3, -0.2, 0.5);
+  mesh.rotation.set(0.1, 0.7, -0.3);
+  mesh.updateMatrixWorld(true);
+  const local = mesh.matrixWorld.clone().invert();
+  const [position, normal, pixel, index] = [[], [], [], []] as number[][];
+  places.forEach(([x, y, z, nx, ny, nz], i) => {
+    const at = new THREE.Vector3(x, z, -y).applyMatrix4(local);
+    const facing = new THREE.Vector3(nx, nz, -ny).transformDirection(local);
+    const [left, right] = [i, i + 1].map((edge) => (2 * edge) / places.length - 1);
+    for (const corner of [[left, -1], [right, -1], [left, 1], [right, 1]]) {
+      position.push(...at.toArray());
+      normal.push(...facing.toArray());
+      pixel.push(...corner);
+    }
+    index.push(...[0, 1, 2, 2, 1, 3].map((k) => 4 * i + k));
+  });
+  mesh.geometry.setAttribute("position", new THREE.Float32BufferAttribute(position, 3));
+  mesh.geometry.setAttribute("normal", new THREE.Float32BufferAttribute(normal, 3));
+  mesh.geometry.setAttribute("pixel", new THREE.Float32BufferAttribute(pixel, 2));
+  mesh.geometry.setIndex(index);
+  mesh.frustumCulled = false;
+  return mesh;
+}

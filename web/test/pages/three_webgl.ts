@@ -1,9 +1,9 @@
 /** Jobs for three.js' WebGLRenderer. */
 import * as THREE from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { relightGltf, SrbfRelightingMap } from "../../src/three";
+import { relightGltf, SrbfProbes, SrbfRelightingMap } from "../../src/three";
 import { change, type Job, lightOfJson, picture, upsideDown } from "./job";
-import { addLights, facingCamera, quad, shadowScene } from "./three_scene";
+import { addLights, facingCamera, placesMesh, quad, shadowScene } from "./three_scene";
 
 let renderer: THREE.WebGLRenderer | undefined;
 
@@ -98,6 +98,31 @@ export async function threeMaterial(job: Job) {
   map.dispose();
   material.lightMap?.dispose();
   return { ...first, pictures, textures: shared().info.memory.textures, programs: shared().info.programs?.length };
+}
+
+/** White Lambert at `job.places` under one set of lights after the other, set on a lightmap asset whose lights the probes have; E / pi. */
+export async function threeProbes(job: Job) {
+  const map = await SrbfRelightingMap.load(job.beside as string);
+  const probes = await SrbfProbes.load(job.asset, { target: job.target, weights: job.weights as "gpu", exact: job.exact === true, lightsOf: map });
+  const material = new THREE.MeshLambertMaterial();
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = `attribute vec2 pixel;\n${shader.vertexShader.replace("#include <fog_vertex>", "gl_Position = vec4(pixel, 0.0, 1.0);")}`;
+  };
+  const scene = new THREE.Scene();
+  scene.add(placesMesh(job, probes.apply(material)));
+  const count = (job.places as unknown[]).length;
+  const target = new THREE.WebGLRenderTarget(count, 1, { type: THREE.FloatType });
+  const pictures = job.lightSets.map((lights) => {
+    map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
+    probes.update(shared());
+    shared().setRenderTarget(target);
+    shared().render(scene, facingCamera(job));
+    shared().setRenderTarget(null);
+    return picture(count, 1, read(target, count, 1));
+  });
+  target.dispose();
+  for (const one of [map, probes, material]) one.dispose();
+  return { pictures };
 }
 
 /** A model of `srbf export --target gltf` as GLTFLoader reads it, lit by the asset that it names, from above. */

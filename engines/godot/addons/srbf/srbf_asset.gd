@@ -42,8 +42,11 @@ extends Resource
 @export var cluster_index: Image
 ## Of light mixing: the scene's own lights by name.
 @export var light_table: SrbfLightTable
-## Of a light cloud: weights of point lights by their place.
+## Of lights inside a scene: weights of point lights by their place, and the surfels that any lights are measured by.
 @export var position_table: SrbfPositionTable
+@export var surfels: SrbfSurfels
+## Where the probes are, of an asset of probes: its pictures are of their facets.
+@export var probes: SrbfProbeGrid
 
 var _textures := {}
 var _table := PackedFloat32Array()  # red, green, blue of w_table
@@ -64,6 +67,8 @@ static func read(manifest_path: String) -> SrbfAsset:
 	var receiver := _receiver_kind(manifest)
 	asset.is_view = receiver == "view"
 	asset.is_picture = receiver in ["view", ""]
+	if receiver == "probes":
+		asset.probes = SrbfProbeGrid.read(folder, manifest.receiver)
 	asset.width = int(manifest.width)
 	asset.height = int(manifest.height)
 	asset.asset_from_world = _transform(manifest.get("asset_from_world"))
@@ -89,8 +94,9 @@ static func read(manifest_path: String) -> SrbfAsset:
 		asset.cluster_index = image(folder, manifest.cluster_index.file)
 		asset.cluster_index.convert(Image.FORMAT_R8)
 	if asset.is_weighted():
-		if asset.method == "light-cloud":
+		if asset.method in ["light-cloud", "transfer"]:
 			asset.position_table = SrbfPositionTable.read(folder, manifest)
+			asset.surfels = SrbfSurfels.read(folder, manifest)
 		else:
 			asset.light_table = SrbfLightTable.read(folder, manifest)
 	elif asset.method == "relighting-map":
@@ -131,7 +137,7 @@ func texture(name: StringName) -> ImageTexture:
 
 ## Whether every light enters through the weights of a frame: named lights, and lights of a cloud. A texel's cost is that of one sun.
 func is_weighted() -> bool:
-	return method in ["light-mix", "named-maps", "light-cloud"]
+	return method in ["light-mix", "named-maps", "light-cloud", "transfer"]
 
 
 ## The first lines of a shader for this asset.

@@ -6,15 +6,13 @@ extends Node3D
 ## The node marks the asset's origin, rotation and scale. A light of energy 1 lights a white diffuse surface as Godot's
 ## own light does: π times its linear color as irradiance, at 1 m from an omni or spot light.
 ##
-## An asset of named lights has its own: `set_light` dims, recolors and switches them, and Godot's lights do nothing. A light cloud follows
-## omni and spot lights, with the bounces of inverse-square light, omni_attenuation 2, over any range. A spot's bounces are
-## a rough approximation: those of a point light at its place with the share of the flux that is inside the cone. In a small room they
-## are off by 0.4 for a half-angle of 45°, by 0.6 for 20° (relative rms), where a point light's are off by 0.03.
+## An asset of named lights has its own: `set_light` dims, recolors and switches them, and Godot's lights do nothing.
+##
+## An asset of lights inside a scene follows whatever lights the scene's surfaces, by Godot's own shadows: see `by_surfels`.
 
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
 const RADIUS := 1e-4  # meters: least distance of a receiver from a light, as in Godot
 const SKY_WIDTH := 32
-const NO_CONE := Vector2(3.0, 4.0)  # above every 1 - cos: a point light
 
 @export var asset: SrbfAsset
 ## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children by default.
@@ -32,8 +30,22 @@ const NO_CONE := Vector2(3.0, 4.0)  # above every 1 - cos: a point light
 @export var intensities := {}
 ## Named lights: colors by name, as of Godot's lights, on top of the scene's own; white where a name is missing.
 @export var colors := {}
+## Lights inside a scene: draw the direct light of all of Godot's lights, with their shadows, on surfels of the scene. Off: omni and spot lights by a table
+## of places, on the CPU, with the bounces of inverse-square light, omni_attenuation 2, over any range. A spot's bounces are then a rough
+## approximation: those of a point light at its place with the share of the flux that is inside the cone. In a small room they
+## are off by 0.4 for a half-angle of 45°, by 0.6 for 20° (relative rms), where a point light's are off by 0.03.
+@export var by_surfels := true
+## Draw the surfels in every frame, since objects move; off: when a light or the asset has moved or changed.
+@export var surfels_every_frame := true
+## So many by so many pixels are drawn of each surfel.
+@export_enum("1:1", "2 x 2:2", "4 x 4:4") var surfel_parts := 2
+## Of the surfels' own shadow maps of omni and spot lights, pixels.
+@export_range(256, 8192, 256) var surfel_shadow_size := 2048
 ## For canvas items, in stops.
 @export var exposure := 0.0
+
+## The passes of `by_surfels`, where there are any.
+var surfel_weights: SrbfSurfelWeights
 
 var _materials: Array[ShaderMaterial] = []
 var _weights: ImageTexture
@@ -53,6 +65,17 @@ func apply() -> void:
 	_materials.clear()
 	_last = []
 	_weights = null
+	if surfel_weights:
+		surfel_weights.queue_free()
+		surfel_weights = null
+	_make_materials()
+	if asset.surfels and by_surfels:
+		surfel_weights = SrbfSurfelWeights.of(asset, surfel_parts, surfel_shadow_size)
+		add_child(surfel_weights, false, INTERNAL_MODE_FRONT)
+		_give("srbf_weights", surfel_weights.weights)
+
+
+func _make_materials() -> void:
 	var made := {}
 	for surface in surfaces if surfaces else get_children():
 		if surface is CanvasItem:
@@ -84,7 +107,7 @@ func materials() -> Array[ShaderMaterial]:
 func _process(_delta: float) -> void:
 	if _materials.is_empty():
 		return
-	var found: Array[Light3D] = lights
+	var found: Array[Light3D] = lights.duplicate()
 	if lights.is_empty():
 		found.assign(get_tree().root.find_children("*", "Light3D", true, false))
 	found = found.filter(func(light: Light3D) -> bool: return light.is_visible_in_tree())
@@ -93,15 +116,22 @@ func _process(_delta: float) -> void:
 	for light in found:
 		now.append_array([light.global_transform, light.light_color, light.light_energy, light.light_negative])
 		if not light is DirectionalLight3D:
-			now.append(_cone_of(light))
-			now.append(_decay(light))
+			now.append(SrbfGodotLight.cone(light))
+			now.append(SrbfGodotLight.decay(light))
+		if surfel_weights:
+			now.append_array([light.shadow_enabled, light.light_cull_mask])
+			now.append_array([] if light is DirectionalLight3D else [light.get_param(Light3D.PARAM_RANGE)])
 	if asset.light_table:
 		now.append_array([intensities.duplicate(), colors.duplicate()])
+	if surfel_weights and (surfels_every_frame or now != _last):
+		surfel_weights.draw(asset_from_godot)
 	if now == _last:
 		return
 	_last = now
 	if asset.light_table:
 		_give_weights(asset.light_table.weights(_mix()))
+	elif surfel_weights:
+		_check_lights(found)
 	elif asset.position_table:
 		_give_weights(_cloud_weights(found, asset_from_godot))
 	else:
@@ -119,7 +149,7 @@ func _set_distant_lights(found: Array[Light3D], asset_from_godot: Transform3D) -
 	for light in found:
 		if light is DirectionalLight3D:
 			directions.append((asset_from_godot.basis * light.global_basis.z).normalized())
-			colors.append(irradiance(light))
+			colors.append(SrbfGodotLight.irradiance(light))
 	var sums := asset.weights(directions, colors, suns_by_table)
 	if sky:
 		_update_environment(asset_from_godot)
@@ -155,6 +185,15 @@ func _mix() -> PackedVector3Array:
 	return mix
 
 
+## What surfels cannot follow.
+func _check_lights(found: Array[Light3D]) -> void:
+	if not lights.is_empty():
+		_warn("expected no list of lights with by_surfels, found one: all lights count that light_cull_mask does not keep from layer 21")
+	for light in found:
+		if not light.shadow_enabled:
+			_warn("expected shadow_enabled at %s, found none: its bounces are those of light that passes walls" % light.name)
+
+
 ## Omni and spot lights by the table of places. The asset has bounces alone; Godot's light itself, range and shadows included, comes on top.
 func _cloud_weights(found: Array[Light3D], asset_from_godot: Transform3D) -> PackedVector4Array:
 	var places := PackedVector3Array()
@@ -164,20 +203,14 @@ func _cloud_weights(found: Array[Light3D], asset_from_godot: Transform3D) -> Pac
 		if light is DirectionalLight3D:
 			_warn("expected omni and spot lights for a light cloud, found %s; it adds no indirect light" % light.name)
 			continue
-		if absf(_decay(light) - 2.0) > 0.01:
-			_warn("expected attenuation 2 for a light cloud, found %g at %s; its bounces are those of 2" % [_decay(light), light.name])
+		if absf(SrbfGodotLight.decay(light) - 2.0) > 0.01:
+			_warn("expected attenuation 2 for a light cloud, found %g at %s; its bounces are those of 2" % [SrbfGodotLight.decay(light), light.name])
 		var place := asset_from_godot * light.global_position
 		if not asset.position_table.sees(place):
 			_warn("expected %s in the free space that was captured, found it elsewhere; its bounces are those of the places around" % light.name)
 		places.append(place)
-		strengths.append(irradiance(light) * (unit * unit * _flux_share(light)))
+		strengths.append(SrbfGodotLight.irradiance(light) * (unit * unit * SrbfGodotLight.flux_share(light)))
 	return asset.position_table.weights(places, strengths)
-
-
-## How much of a point light's flux a spot sends out: 1 of an omni light. The smooth step between its half-angles lets half through.
-static func _flux_share(light: Light3D) -> float:
-	var cone := _cone_of(light)
-	return (cone.x + cone.y) / 4.0 if light is SpotLight3D else 1.0
 
 
 ## Once for each text, since lights may move in every frame.
@@ -216,11 +249,11 @@ func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> 
 		if point_lights.size() == 4 * most_point_lights:
 			push_warning("expected at most %d omni and spot lights, found more; raise most_point_lights" % most_point_lights)
 			break
-		var squared := _decay(light) >= 1.5
+		var squared := SrbfGodotLight.decay(light) >= 1.5
 		var place := asset_from_godot * light.global_position
-		var color := irradiance(light) * (unit * unit if squared else unit)
+		var color := SrbfGodotLight.irradiance(light) * (unit * unit if squared else unit)
 		var axis := -(asset_from_godot.basis * light.global_basis.z).normalized()
-		var cone := _cone_of(light)
+		var cone := SrbfGodotLight.cone(light)
 		point_lights.append(Vector4(place.x, place.y, place.z, RADIUS * unit))
 		point_lights.append(Vector4(0.0, 0.0, 0.0, 1.0 if squared else 0.0))
 		point_lights.append(Vector4(color.x, color.y, color.z, cone.x))
@@ -228,27 +261,6 @@ func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> 
 	_give("srbf_point_light_count", point_lights.size() / 4)
 	point_lights.resize(4 * most_point_lights)
 	_give("srbf_point_lights", point_lights)
-
-
-## A light's irradiance on a surface that faces it, at 1 m from an omni or spot light: linear, Godot's unit times π.
-static func irradiance(light: Light3D) -> Vector3:
-	var color := light.light_color.srgb_to_linear()
-	var sign := -1.0 if light.light_negative else 1.0
-	return Vector3(color.r, color.g, color.b) * (sign * light.light_energy * PI)
-
-
-## 1 - cos of a spot's inner and outer half-angles. Godot's 1 - t^a, t = (1 - cos) / (1 - cos outer), and the smooth step are ½ at one angle.
-static func _cone_of(light: Light3D) -> Vector2:
-	if not light is SpotLight3D:
-		return NO_CONE
-	var half_sine := sin(deg_to_rad(light.spot_angle) / 2.0)
-	var outer := 2.0 * half_sine * half_sine
-	var inner := outer * maxf(0.0, 2.0 * pow(0.5, 1.0 / maxf(light.spot_angle_attenuation, 1e-3)) - 1.0)
-	return Vector2(inner, outer)
-
-
-static func _decay(light: Light3D) -> float:
-	return light.spot_attenuation if light is SpotLight3D else (light as OmniLight3D).omni_attenuation
 
 
 func _material(type: String, file: String) -> ShaderMaterial:

@@ -9,7 +9,7 @@ namespace Srbf
     /// Imports an exported asset by its .srbf file, which lies beside asset.json and the images. It reads the images itself instead of Unity's
     /// texture importer, so that nothing is resized, compressed, flipped or treated as sRGB.
     /// </summary>
-    [ScriptedImporter(1, "srbf")]
+    [ScriptedImporter(2, "srbf")]
     public sealed class SrbfImporter : ScriptedImporter
     {
         public override void OnImportAsset(AssetImportContext context)
@@ -31,6 +31,7 @@ namespace Srbf
             asset.layers = Add(context, "layers", Layers(manifest, folder));
             asset.lightTable = manifest.LightTable(folder);
             asset.positionTable = manifest.PositionTable(folder);
+            if (manifest.Surfels != null) ReadSurfels(context, asset, manifest, folder);
             if (!manifest.IsWeighted) ReadFunctions(context, asset, manifest, folder);
             if (manifest.ClusterFile != null)
                 asset.clusters = Add(context, "clusters", Texture(SrbfImage.Read(Path.Combine(folder, manifest.ClusterFile)), TextureFormat.R8, FilterMode.Point));
@@ -52,6 +53,20 @@ namespace Srbf
             }
             asset.table = Add(context, "table", Texture(table, asset.IsMaps ? TextureFormat.RGFloat : TextureFormat.RGBAHalf, FilterMode.Point));
             if (!asset.IsMaps) asset.lightCoefficients = SrbfImage.Read(Path.Combine(folder, manifest.CoefficientsFile)).Values;
+        }
+
+        /// <summary>What the passes of SrbfSurfelPasses look up.</summary>
+        static void ReadSurfels(AssetImportContext context, SrbfAsset asset, SrbfManifest manifest, string folder)
+        {
+            SrbfSurfels surfels = asset.surfels = manifest.SurfelPasses(folder);
+            System.Func<string, string, TextureFormat, Texture2D> read = (name, file, format) =>
+                Add(context, name, Texture(SrbfImage.Read(Path.Combine(folder, file)), format, FilterMode.Point));
+            asset.places = read("places", surfels.placesFile, TextureFormat.RGBAFloat);
+            asset.normals = read("normals", surfels.normalsFile, TextureFormat.RGBAFloat);
+            asset.ranges = read("ranges", surfels.rangesFile, TextureFormat.RGBAFloat);
+            asset.corners = read("corners", surfels.cornersFile, TextureFormat.RGBAFloat);
+            asset.surfelTables = System.Array.ConvertAll(surfels.tables, table =>
+                read(Path.GetFileNameWithoutExtension(table.file), table.file, table.channels == 1 ? TextureFormat.RHalf : TextureFormat.RGBAHalf));
         }
 
         static Texture2DArray Layers(SrbfManifest manifest, string folder)
@@ -90,6 +105,8 @@ namespace Srbf
         {
             var texture = new Texture2D(image.Width, image.Height, format, false, true) { filterMode = filter, wrapMode = TextureWrapMode.Clamp };
             if (format == TextureFormat.RGFloat) texture.SetPixelData(image.Values, 0);
+            else if (format == TextureFormat.RGBAFloat) texture.SetPixelData(image.Rgba(), 0);
+            else if (format == TextureFormat.RHalf) texture.SetPixelData(Halves(image.Values), 0);
             else if (format == TextureFormat.R8) texture.SetPixelData(System.Array.ConvertAll(image.Values, value => (byte)value), 0);
             else texture.SetPixelData(Halves(image.Rgba()), 0);
             texture.Apply(false);

@@ -16,12 +16,18 @@ namespace Srbf
         public float[] rTable, lightCoefficients;
         public SrbfLightTable lightTable;        // of named lights
         public SrbfPositionTable positionTable;  // of a light cloud
+        public SrbfSurfels surfels;              // of lights that passes measure: its textures are
+        public Texture2D places, normals, ranges, corners;
+        public Texture2D[] surfelTables;
 
         public bool IsMaps { get { return method == "relighting-map"; } }
 
         public bool IsNamed { get { return lightTable != null && lightTable.names != null && lightTable.names.Length > 0; } }
 
         public bool IsCloud { get { return positionTable != null && positionTable.rank > 0; } }
+
+        /// <summary>Whether passes can measure lights, by shadows of the asset's own triangles.</summary>
+        public bool HasSurfels { get { return surfels != null && surfels.tables != null && surfels.tables.Length > 0; } }
 
         /// <summary>Texels in a row of weights: of a cluster the mean's and each component's, or one per map.</summary>
         public int WeightColumns { get { return scalars > 0 ? scalars + 1 : layers.depth; } }

@@ -19,6 +19,7 @@ namespace Srbf
         public double ValuesScale;
         public SrbfPositionTable Positions;  // of a light cloud, still without what its files hold
         public string NodesFile, BasisFile, VisibilityFile;
+        public SrbfSurfels Surfels;        // of lights inside a scene, still without emission; null where no passes measure them
 
         /// <summary>Whether every light enters through the weights of a frame: named lights, and lights of a cloud.</summary>
         public bool IsWeighted { get { return Names != null || Positions != null; } }
@@ -73,8 +74,9 @@ namespace Srbf
                 ValuesFile = Text(Member(json["light_values"]), "file");
                 ValuesScale = Number(Member(json["light_values"]), "scale");
             }
-            else if (domain == "cloud")
+            else if (domain == "cloud" || domain == "surfels")
             {
+                if (json.ContainsKey("surfel_passes")) ReadSurfels(Member(json["surfel_passes"]));
                 var table = Member(json["position_table"]);
                 Positions = new SrbfPositionTable
                 {
@@ -89,6 +91,44 @@ namespace Srbf
                 VisibilityFile = Text(Member(json["position_visibility"]), "file");
             }
             return IsWeighted;
+        }
+
+        void ReadSurfels(Dictionary<string, object> told)
+        {
+            Surfels = new SrbfSurfels
+            {
+                placesFile = Text(told, "places"),
+                normalsFile = Text(told, "normals"),
+                rangesFile = Text(told, "ranges"),
+                cornersFile = Text(told, "corners"),
+                emissionFile = told.ContainsKey("emission") ? Text(told, "emission") : null,
+                middle = Numbers(told["middle"]),
+                reach = Number(told, "reach"),
+                lift = Number(told, "lift"),
+                patches = (int)Number(told, "patches"),
+                triangles = (int)Number(told, "triangles"),
+                objects = told.ContainsKey("objects") ? ((List<object>)told["objects"]).ConvertAll(name => (string)name).ToArray() : new string[0],
+                tables = ((List<object>)told["tables"]).ConvertAll(table => SurfelTable(Member(table))).ToArray(),
+            };
+        }
+
+        static SrbfSurfelTable SurfelTable(Dictionary<string, object> told)
+        {
+            return new SrbfSurfelTable
+            {
+                file = Text(told, "file"),
+                rows = (int)Number(told, "rows"),
+                columns = (int)Number(told, "columns"),
+                channels = (int)Number(told, "channels"),
+                scale = Number(told, "scale"),
+            };
+        }
+
+        /// <summary>What passes need, from `folder`; null of another asset.</summary>
+        public SrbfSurfels SurfelPasses(string folder)
+        {
+            if (Surfels != null) Surfels.emission = Surfels.emissionFile == null ? new float[0] : SrbfImage.Read(System.IO.Path.Combine(folder, Surfels.emissionFile)).Values;
+            return Surfels;
         }
 
         /// <summary>The table of named lights, from `folder`; null of another asset.</summary>

@@ -17,8 +17,9 @@ namespace Srbf
     /// <summary>
     /// Follows Unity's lights and sets the frame's weights in a renderer's material. All directional lights together cost one weight per map;
     /// each of the first eight point and spot lights costs one weight per map and pixel. Area lights, cookies, ranges and skies are ignored.
-    /// An asset of named lights has its own, see SetLight. A light cloud follows point and spot lights, any number at the cost of one, as
-    /// inverse-square light; a spot's bounces are approximate, see SrbfMath.FluxShare; directional lights add none.
+    /// An asset of named lights has its own, see SetLight. Lights inside a scene are followed in any number at the cost of one: point, spot and
+    /// directional lights by passes that light surfels, see SrbfSurfelPasses, or, where the asset has none, point and spot lights by a table
+    /// of places, where a spot's bounces are approximate, see SrbfMath.FluxShare, and directional lights add none.
     /// </summary>
     [ExecuteAlways]
     [RequireComponent(typeof(Renderer))]
@@ -41,6 +42,15 @@ namespace Srbf
         [Tooltip("Named lights: those that are not as the scene has them set.")]
         public List<SrbfNamedLight> mix = new List<SrbfNamedLight>();
 
+        [Tooltip("Lights inside a scene: measured on surfels by passes of the GPU; otherwise by the table of places.")]
+        public bool bySurfels = true;
+        [Tooltip("Texels per side of a face of the shadow maps that light surfels.")]
+        public int shadowSize = 512;
+        [Tooltip("Objects of an editable asset that emit: intensity times color is their radiance.")]
+        public List<SrbfNamedLight> emission = new List<SrbfNamedLight>();
+
+        readonly List<SrbfLook> looks = new List<SrbfLook>();
+        SrbfSurfelPasses passes;
         readonly List<DistantLight> far = new List<DistantLight>();
         readonly List<DistantLight> known = new List<DistantLight>();
         readonly Vector4[] pointLights = new Vector4[4 * MostPointLights];
@@ -59,34 +69,50 @@ namespace Srbf
             found.color = color;
         }
 
+        /// <summary>Let an object of an editable asset emit; ArgumentException, at the next frame, where the asset has none of that name.</summary>
+        public void SetEmission(string objectName, float intensity, Color color)
+        {
+            SrbfNamedLight found = emission.Find(entry => entry.name == objectName);
+            if (found == null) emission.Add(found = new SrbfNamedLight { name = objectName });
+            found.intensity = intensity;
+            found.color = color;
+        }
+
         void LateUpdate()
         {
             if (asset == null) return;
             if (block == null) block = new MaterialPropertyBlock();
             Matrix4x4 assetFromUnity = AssetFromUnity();
             far.Clear();
+            looks.Clear();
             int count = 0;
+            SrbfUrpLights urp = GetComponent<SrbfUrpLights>();
+            Texture ready = urp != null && urp.isActiveAndEnabled ? urp.Weights : null;
+            bool measured = ready == null && bySurfels && asset.HasSurfels && SrbfSurfelPasses.IsSupported;
             if (asset.IsNamed) AddNamed();
-            foreach (Light pointLight in asset.IsNamed ? new Light[0] : lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
+            foreach (Light pointLight in asset.IsNamed || ready != null ? new Light[0] : lights != null && lights.Length > 0 ? lights : FindObjectsOfType<Light>())
             {
                 if (pointLight == null || !pointLight.isActiveAndEnabled) continue;
                 Color color = pointLight.color.linear * pointLight.intensity;
                 if (pointLight.useColorTemperature) color *= Mathf.CorrelatedColorTemperatureToRGB(pointLight.colorTemperature);
                 bool local = pointLight.type == LightType.Point || pointLight.type == LightType.Spot;
-                if (asset.IsCloud && local) far.Add(Inside(assetFromUnity, pointLight, color));
+                if (measured && (local || pointLight.type == LightType.Directional)) looks.Add(Look(assetFromUnity, pointLight, color));
+                else if (asset.IsCloud && local) far.Add(Inside(assetFromUnity, pointLight, color));
                 else if (asset.IsCloud) continue;
                 else if (pointLight.type == LightType.Directional) far.Add(Far(assetFromUnity, pointLight, color));
                 else if (local && count < MostPointLights) SetPointLight(assetFromUnity, pointLight, color, count++);
             }
             if (weighed != asset) GetComponent<Renderer>().SetPropertyBlock(null);  // arrays of a block never grow
-            if (weighed != asset || Changed()) Weigh();
+            if (measured) Measure();
+            else if (ready != null) weighed = asset;
+            else if (weighed != asset || (rows == null && !asset.IsMaps) || Changed()) Weigh();
             GetComponent<Renderer>().GetPropertyBlock(block);
             block.SetTexture("_SrbfLayers", asset.layers);
             if (asset.table != null) block.SetTexture("_SrbfTable", asset.table);
             block.SetTexture("_SrbfAmbient", asset.ambient);
             if (asset.clusters != null) block.SetTexture("_SrbfClusters", asset.clusters);
             if (asset.IsMaps) block.SetVectorArray("_SrbfWeights", weights);
-            else block.SetTexture("_SrbfWeightRows", rows);
+            else block.SetTexture("_SrbfWeightRows", ready != null ? ready : measured ? passes.Weights : rows);
             block.SetMatrix("_SrbfAssetFromWorld", assetFromUnity);
             block.SetFloat("_SrbfPointLightCount", count);
             block.SetVectorArray("_SrbfPointLights", pointLights);
@@ -96,6 +122,8 @@ namespace Srbf
         void OnDisable()
         {
             if (rows != null) DestroyImmediate(rows);
+            if (passes != null) passes.Dispose();
+            passes = null;
             weighed = null;
         }
 
@@ -127,6 +155,47 @@ namespace Srbf
             return new DistantLight { ToLight = new Vector(place.x, place.y, place.z), Color = new Vector(color.r * strength, color.g * strength, color.b * strength) };
         }
 
+        /// <summary>A light as passes look at it.</summary>
+        SrbfLook Look(Matrix4x4 assetFromUnity, Light pointLight, Color color)
+        {
+            bool distant = pointLight.type == LightType.Directional, spot = pointLight.type == LightType.Spot;
+            Vector3 forward = assetFromUnity.MultiplyVector(pointLight.transform.forward).normalized;
+            Vector3 at = distant ? -forward : assetFromUnity.MultiplyPoint3x4(pointLight.transform.position);
+            var place = new Vector(at.x, at.y, at.z);
+            return new SrbfLook
+            {
+                Distant = distant,
+                Place = distant ? place : asset.surfels.LessMiddle(place),
+                Color = new Vector(color.r, color.g, color.b),
+                Axis = new Vector(forward.x, forward.y, forward.z),
+                A0 = falloffDistance,
+                Radius = Mathf.Max(pointLightRadius, 1e-4f),
+                VersineInner = spot ? SrbfMath.Versine(pointLight.innerSpotAngle * 0.5 * Math.PI / 180) : SrbfSurfels.NoCone[0],
+                VersineOuter = spot ? SrbfMath.Versine(pointLight.spotAngle * 0.5 * Math.PI / 180) : SrbfSurfels.NoCone[1],
+                Linear = linearFalloff,
+            };
+        }
+
+        /// <summary>Weights by passes, where a light or an emission has changed.</summary>
+        void Measure()
+        {
+            if (passes != null && (weighed != asset || passes.ShadowSize != shadowSize)) passes.Dispose();
+            if (passes == null || passes.IsDisposed) passes = new SrbfSurfelPasses(asset, shadowSize);
+            weighed = asset;
+            passes.Draw(looks, Radiances());
+        }
+
+        /// <summary>Of objects that emit; in Blender's units, as ambient light is.</summary>
+        public List<KeyValuePair<string, Vector>> Radiances()
+        {
+            return emission.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, InBlendersUnits(entry.color.linear * entry.intensity)));
+        }
+
+        /// <summary>From the asset's frame to Unity's world.</summary>
+        public Matrix4x4 UnityFromAsset() { return AssetFromUnity().inverse; }
+
+        static Vector InBlendersUnits(Color color) { return new Vector(color.r / Math.PI, color.g / Math.PI, color.b / Math.PI); }
+
         /// <summary>The colors of all named lights, in order. Like ambient light they are in Blender's units, an irradiance over pi.</summary>
         void AddNamed()
         {
@@ -134,7 +203,7 @@ namespace Srbf
             {
                 SrbfNamedLight found = mix.Find(light => light.name == lightName);
                 Color color = found == null ? Color.white : found.color.linear * found.intensity;
-                far.Add(new DistantLight { Color = new Vector(color.r / Math.PI, color.g / Math.PI, color.b / Math.PI) });
+                far.Add(new DistantLight { Color = InBlendersUnits(color) });
             }
         }
 

@@ -25,6 +25,7 @@ export interface RelightingNodesOptions extends TargetOptions {
   /** As in `SrbfRelightingMap`. */
   weights?: "cpu" | "gpu";
   shadowSize?: number;
+  lightsOf?: SceneAsset;
 }
 
 /** `SrbfRelightingMap` as nodes: lights as there, `light` or `apply` for materials, `update` once per frame. */
@@ -33,7 +34,9 @@ export class SrbfRelightingNodes extends SceneAsset {
   readonly source: "maps" | "lightmap";
   /** The lightmap that `update` draws; only with `source: "lightmap"`. */
   readonly target?: RenderTarget;
-  private readonly inputs: NodeInputs;
+  /** How often the lightmap was drawn. */
+  protected drawings = 0;
+  protected readonly inputs: NodeInputs;
   private readonly quad?: QuadMesh;
   private readonly gpu?: SurfelNodes;
   private drawn = "";
@@ -41,7 +44,7 @@ export class SrbfRelightingNodes extends SceneAsset {
 
   /** @throws SrbfError on `source: "maps"` for a method whose layers must not be filtered. */
   constructor(asset: Asset, options: RelightingNodesOptions = {}) {
-    super(asset);
+    super(asset, options.lightsOf);
     this.source = sourceOf(asset, options.source);
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
@@ -74,9 +77,7 @@ export class SrbfRelightingNodes extends SceneAsset {
 
   /** Light a node material by this asset; a view that does not fill its picture makes it transparent. @throws SrbfError on a material that takes no light. */
   apply<M extends NodeMaterial>(material: M, options: MaterialOptions = {}): M {
-    const { quantity, transport } = this.asset.manifest;
-    const direct = options.direct ?? (transport === "indirect" ? "engine" : "asset");
-    applyLight(material, this.light(options), quantity, direct === "asset", this.alpha(options));
+    applyLight(material, this.light(options), this.asset.manifest.quantity, this.directOf(options) === "asset", this.alpha(options));
     return material;
   }
 
@@ -100,6 +101,7 @@ export class SrbfRelightingNodes extends SceneAsset {
     this.quad.render(renderer);
     renderer.setRenderTarget(kept);
     this.drawn = state;
+    ++this.drawings;
   }
 
   dispose(): void {

@@ -1,7 +1,7 @@
 /** `SurfelWeights` for WebGPURenderer, on WebGPU and on its WebGL2 backend. */
-import { Color, type DataTexture, type DepthTexture, FloatType, NearestFilter, NoBlending, RenderTarget, type Texture } from "three";
+import { Color, type DataTexture, type DepthTexture, FloatType, NearestFilter, RenderTarget, type Texture } from "three";
 import * as tsl from "three/tsl";
-import { NodeMaterial, QuadMesh, type Renderer } from "three/webgpu";
+import type { Renderer } from "three/webgpu";
 import type { Asset } from "../../asset";
 import type { LightValues } from "../../light_values";
 import type { NamedLight } from "../../lights";
@@ -17,14 +17,10 @@ import { depthsOf, seenInMap, setShadow, shadowUniforms } from "./engine_shadow_
 import { each } from "./inputs";
 import type { N } from "./nodes";
 import { OccluderNodes } from "./occluder_nodes";
+import { disposeOf, type Pass, pass, render } from "./passes";
 import { type CellTextures, irradianceNode, lookUniforms, seenFromFar, seenFromPlace, type Visibility } from "./surfel_irradiance";
 
 const { float, Fn, int, ivec2, min, screenCoordinate, textureLoad, vec3, vec4 } = tsl as Record<string, N>;
-
-interface Pass {
-  quad: QuadMesh;
-  target: RenderTarget;
-}
 
 interface Shadowed {
   passes: [Pass, Pass];
@@ -166,10 +162,6 @@ export class SurfelNodes {
   }
 }
 
-function disposeOf(passes: readonly Pass[]): void {
-  for (const { quad } of passes) (quad.material as NodeMaterial).dispose();
-}
-
 const here = (): N => ivec2(screenCoordinate);
 const folded = (index: N, width: number): N => ivec2(index.mod(width), index.div(width));
 
@@ -215,20 +207,6 @@ function wholeNode(parts: RenderTarget, added: Texture, blocks: number, width: n
     each(blocks, "i", (i) => total.addAssign(textureLoad(parts.texture, folded(first.add(i), parts.width)).rgb));
     return vec4(total, 1);
   })();
-}
-
-function pass(fragment: N, drawn: RenderTarget): Pass {
-  const material = new NodeMaterial();
-  material.fragmentNode = fragment;
-  material.depthTest = false;
-  material.depthWrite = false;
-  material.blending = NoBlending;
-  return { quad: new QuadMesh(material), target: drawn };
-}
-
-function render(renderer: Renderer, { quad, target: drawn }: Pass): void {
-  renderer.setRenderTarget(drawn);
-  quad.render(renderer);
 }
 
 function target(width: number, height: number): RenderTarget {

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Passes of SrbfSurfelPasses, by number. In a folder Resources, so that builds have it.
+Shader "Hidden/Srbf/Surfels"
+{
+    SubShader
+    {
+        Cull Off
+        ZWrite Off
+        ZTest Always
+
+        HLSLINCLUDE
+        #pragma target 3.5
+        #include "../Shaders/SrbfSurfels.hlsl"
+        ENDHLSL
+
+        Pass
+        {
+            Name "Occluders on a cube"
+            BlendOp Max
+            Blend One One
+            HLSLPROGRAM
+            #pragma vertex SrbfOccluderOnCube
+            #pragma fragment SrbfNearness
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Occluders on a map"
+            BlendOp Max
+            Blend One One
+            HLSLPROGRAM
+            #pragma vertex SrbfOccluderOnMap
+            #pragma fragment SrbfHeight
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Irradiance by cube"
+            Blend One One
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfIrradianceByCube
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Irradiance by map"
+            Blend One One
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfIrradianceByMap
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Means"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfMeans
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Table parts"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfTableParts
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Table sums"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfTableSums
+            ENDHLSL
+        }
+    }
+}

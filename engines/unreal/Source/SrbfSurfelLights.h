@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// A component that lights surfels by the level's lights, in materials drawn into render targets, and hands the weights to an actor's materials.
+#pragma once
+
+#include "CoreMinimal.h"
+#include "Components/ActorComponent.h"
+#include "SrbfSurfels.h"
+#include "SrbfSurfelLights.generated.h"
+
+class ULightComponent;
+class UMaterialInstanceDynamic;
+class USceneCaptureComponent2D;
+class UTexture;
+class UTextureRenderTarget2D;
+
+/**
+ * Add it to the actor whose mesh has the material Relit, in place of SrbfRelit. It follows the level's point and spot lights, in candelas, and its directional
+ * lights, in lux, any number at the cost of one per texel. Shadows are those of the asset's compressed depths, or else of captures of the scene's
+ * depth: six per point or spot light, one per directional light, whenever a light has changed. Nothing is read back.
+ */
+UCLASS(ClassGroup = (Srbf), meta = (BlueprintSpawnableComponent))
+class USrbfSurfelLights : public UActorComponent
+{
+    GENERATED_BODY()
+
+public:
+    USrbfSurfelLights();
+
+    /** /Game/Srbf/Srbf_…, where the import script puts the materials; list /Game/Srbf in "Additional Asset Directories to Cook" of a package. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    FString Folder;
+
+    /** Srbf/Srbf_…_surfels.bin, which the import script puts below Content; list Srbf in "Additional Non-Asset Directories to Copy" of a package. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    FString Surfels;
+
+    /** Texels per side of a capture; a quarter of those of a directional light's. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    int32 ShadowSize = 256;
+
+    /** Draw at every tick, for shadows of what moves; otherwise when a light has changed. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    bool bEveryTick = false;
+
+    virtual void BeginPlay() override;
+    virtual void TickComponent(float DeltaTime, ELevelTick TickType, FActorComponentTickFunction* ThisTickFunction) override;
+
+private:
+    struct FLook
+    {
+        FLinearColor Light, Color, Axis, Shape;
+        FVector Place, ToLight;
+
+        bool operator==(const FLook& Other) const { return Light == Other.Light && Color == Other.Color && Axis == Other.Axis && Shape == Other.Shape; }
+    };
+
+    SrbfSurfels Known;
+    std::vector<FLook> Last;
+    bool bDrawn = false;
+
+    UPROPERTY(Transient)
+    TArray<UTextureRenderTarget2D*> Targets;  // irradiance, the former one, means, then parts and sums of each table, six faces, a directional map
+
+    UPROPERTY(Transient)
+    TArray<UMaterialInstanceDynamic*> Materials;  // irradiance, means, then parts and sums of each table
+
+    UPROPERTY(Transient)
+    USceneCaptureComponent2D* Capture = nullptr;
+
+    UTextureRenderTarget2D* MakeTarget(int Width, int Height, bool bDepth);
+    bool MakeMaterial(const FString& Name);
+    std::vector<FLook> Looks() const;
+    void AddLook(const FLook& Look);
+    void CaptureFaces(const FLook& Look);
+    void Draw(int Target, int Material);
+};

@@ -1,0 +1,197 @@
+"""The light set of a deep framebuffer: no train lights; what a view gathers is traced once the view is known."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import zipfile
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64, Int
+from srbf.bake.light_sets import PLACES, PlacedLight
+from srbf.bake.point_lights import Box, parse_box
+from srbf.capture import Capture
+from srbf.errors import InputError
+from srbf.io import files
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
+from srbf.visibility.gather_pool import MOST_POOL, pool_of
+from srbf.visibility.pixel_points import PixelPoints
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.surface_cells import Fragments
+from srbf.visibility.view_clusters import MOST_CLUSTERS
+
+POOL = 32_768  # surfels
+FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
+LEAST_POOL = 16
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FoundSurfaces:
+    """What a scene has for a view's gather: opaque triangles (T, 3, 3) with albedo and object, what casts shadows, free places, m.
+
+    `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow.
+    """
+
+    corners: Float32[ndarray, "T 3 3"]
+    albedo: Float32[ndarray, "T 3"]
+    objects: Int[ndarray, " T"]
+    occluders: Float32[ndarray, "O 3 3"]
+    random: Float64[ndarray, "H 3"]
+    free: Float64[ndarray, "F 3"]
+    box: Float64[ndarray, " 6"]
+    bounces: Int[ndarray, ""]
+
+    @functools.cached_property
+    def checksum(self) -> str:
+        """Of all arrays."""
+        digest = hashlib.sha256()
+        for array in self.arrays().values():
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
+
+    def arrays(self) -> dict[str, ndarray]:
+        """As a file holds them."""
+        return {entry.name: np.asarray(getattr(self, entry.name)) for entry in fields(self)}
+
+    @staticmethod
+    def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
+        """From `arrays`."""
+        return FoundSurfaces(*(stored[entry.name] for entry in fields(FoundSurfaces)))
+
+    @staticmethod
+    def of_facts(facts: dict[str, Any]) -> FoundSurfaces:
+        """From the facts of a scene; InputError where no surface of it reflects light."""
+        arrays, places = facts["arrays"], facts["places"]
+        opaque = arrays["transparent"] < 0.5
+        if not (arrays["albedo"][opaque] > 0).any():
+            raise InputError("expected opaque surfaces that reflect light, found none; make some diffuse")
+        random, free = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("random", "places"))
+        return FoundSurfaces(
+            arrays["corners"][opaque],
+            arrays["albedo"][opaque],
+            arrays["object"][opaque].astype(np.int64),
+            arrays["occluders"],
+            random,
+            free,
+            np.array(places["box"], np.float64),
+            np.array(facts["bounces"]),
+        )
+
+
+@dataclass(frozen=True)
+class GatherSet:
+    """Links from `clusters` parts of a view (None: by its size) to a pool of `count` surfels; held-out lights are point lights."""
+
+    kind: ClassVar[str] = "gather"
+    count: int = POOL
+    clusters: int | None = None
+    box: Box | None = None
+    found: FoundSurfaces | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if not LEAST_POOL <= self.count <= MOST_POOL:
+            raise InputError(f"expected a `pool` of {LEAST_POOL} to {MOST_POOL} surfels, found {self.count}")
+        if self.clusters is not None and not 1 <= self.clusters <= MOST_CLUSTERS:
+            raise InputError(f"expected `view_clusters` auto or 1 to {MOST_CLUSTERS}, found {self.clusters}")
+
+    @staticmethod
+    def parse(pool: int | None, clusters: int | str | None, light_bounds: str | None) -> GatherSet:
+        """From the command line's flags."""
+        return GatherSet(POOL if pool is None else pool, clusters if isinstance(clusters, int) else None, parse_box(light_bounds))
+
+    @property
+    def is_known(self) -> bool:
+        return self.found is not None
+
+    @property
+    def _known(self) -> FoundSurfaces:
+        if self.found is None:
+            raise InputError("expected the surfaces of a known scene, found none; call with_light_set first")
+        return self.found
+
+    def train(self) -> list[PlacedLight]:
+        """None."""
+        return []
+
+    def tested(self, count: int) -> list[PlacedLight]:
+        """The first `count` random point lights."""
+        return [PlacedLight("point", tuple(place)) for place in self._known.random[:count].tolist()]
+
+    def question(self, tested: int, seed: int) -> dict[str, Any]:
+        """What the scene is asked."""
+        return {
+            "places": {"box": self.box, "count": 0, "spacing": None, "random": tested, "places": PLACES, "seed": seed},
+            "surfaces": {"cells": FRAGMENTS * self.count, "spacing": None, "gloss": True},
+        }
+
+    def with_facts(self, facts: dict[str, Any], say: Callable[[str], None]) -> GatherSet:
+        """The set with the facts of the scene."""
+        found = FoundSurfaces.of_facts(facts)
+        x0, y0, z0, x1, y1, z1 = found.box.tolist()
+        skipped = facts["places"]["skipped"]
+        say(
+            f"{len(found.corners)} fragments of surfaces; lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
+            f"{skipped} places are in or near geometry"
+        )
+        return replace(self, found=found)
+
+    def record(self) -> dict[str, Any]:
+        """JSON for the manifest, with a checksum of what was found of the scene."""
+        found = self._known
+        return {"kind": self.kind, "pool": self.count, "view_clusters": self.clusters, "box": found.box.tolist(), "places": found.checksum}
+
+    def manifest(self) -> dict[str, Any]:
+        """Keys of capture.json beside the lights."""
+        found = self._known
+        return {
+            "gather": {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)},
+            "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
+        }
+
+    def key(self, scene_sha256: str, tested: int, seed: int, scene: str | None = None) -> str:
+        """What the surfaces and places found depend on; `scene`: which one of the .blend."""
+        return json.dumps([scene_sha256, scene, self.question(tested, seed)])
+
+    def write(self, path: Path, key: str = "") -> None:
+        """For a bake that is resumed: `key` tells the bake that it is of."""
+        with files.atomic_path(path) as temporary, open(temporary, "wb") as file:
+            np.savez(file, key=np.array(key), **self._known.arrays())
+
+    def read(self, path: Path, key: str) -> GatherSet:
+        """With what a file holds that `write` wrote; unchanged where there is none, or one of another bake or damaged."""
+        with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(path) as stored:
+            if str(stored["key"]) == key:
+                return replace(self, found=FoundSurfaces.of_arrays(stored))
+        return self
+
+    def trace(self, receivers: Capture, seed: int, progress: Progress) -> None:
+        """Pool and links into the folder of `receivers`, a capture without lights; nothing where they are there already.
+
+        InputError where the view shows no surface, or no surface that it gathers from reflects light.
+        """
+        found = self._known
+        key = f"{found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
+        if is_gathered(receivers.folder, key):
+            return
+        progress(0, 1, "surfels")
+        occluders = EmbreeTriangles(found.occluders)
+        pixels = PixelPoints.of_view(Receivers.of(receivers))
+        if not len(pixels.points):
+            raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
+        surfaces = Fragments(found.corners, found.albedo)
+        pool = pool_of(surfaces, found.objects, occluders, found.free, pixels.points, pixels.normals, self.count, seed)
+        if not pool.count:
+            raise InputError("expected surfaces that light in free space can reach, found none; choose another `light_bounds`")
+        clusters = cluster_count(self.clusters, len(np.unique(pixels.pixels)))
+        operator = GatherOperator.traced(pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"))
+        operator.write(receivers.folder, key)

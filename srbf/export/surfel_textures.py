@@ -1,0 +1,130 @@
+"""What an engine's own passes need to light surfels: cells of the surfaces as textures, what casts shadows, the asset's tables.
+
+The textures are float EXRs beside the asset's own files, and the key `surfel_passes` of the exported asset.json says what they hold. The
+tables are the asset's: a row of the file is a row of the table, so that entry i of row r is texel (i, r).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64, Int
+from srbf.asset import Asset
+from srbf.errors import InputError
+from srbf.io.image import write_image
+from srbf.io.scene_glb import read_triangles
+from srbf.methods.surface_changes import KEY, Surfaces
+from srbf.visibility.surface_cells import OFFSET, Cells
+
+PASSES = "surfel_passes"
+LARGEST = 16384  # texels per side of a texture, as Direct3D 11 has them
+CORNERS_PER_ROW = 3 * 1024
+
+
+@dataclass(frozen=True, eq=False)
+class SurfelTextures:
+    """Cells in the order of their patches, and corners of triangles, as rows of texels.
+
+    `places`: place less `middle` (m), area (square meters); `normals`: unit normal, the cell's share of its patch's area; `ranges`: of
+    every patch its first cell and how many there are; `corners` less `middle`, three texels per triangle. `reach` (m): what holds all
+    of them, about the middle; `lift` (m): of a cell above its surface, where its shadow is looked up; `order`: the cells' numbers in
+    the asset.
+    """
+
+    places: Float32[ndarray, "h w 4"]
+    normals: Float32[ndarray, "h w 4"]
+    ranges: Float32[ndarray, "a b 4"]
+    corners: Float32[ndarray, "c d 3"]
+    middle: Float64[ndarray, " 3"]
+    reach: float
+    lift: float
+    patches: int
+    triangles: int
+    order: Int[ndarray, " N"]
+
+
+def has_surfels(asset: Asset) -> bool:
+    """Whether passes can measure lights on the asset's surfels."""
+    return asset.scene is not None and asset.manifest.get("interpolation", {}).get("kind") in ("patches", "surfels")
+
+
+def surfel_textures(asset: Asset) -> SurfelTextures:
+    """Of an asset that `has_surfels`."""
+    assert asset.scene is not None
+    triangles = read_triangles(asset.scene)
+    corners = triangles.corners[triangles.occluders].reshape(-1, 3).astype(np.float64)
+    cells = Cells.of_image(asset.tables["cells"])
+    count = cells.patch_count
+    order = np.argsort(cells.patches, kind="stable")
+    places = cells.places.astype(np.float64)
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    area = np.maximum(np.bincount(cells.patches, cells.areas.astype(np.float64), count), 1e-30)
+    having = np.bincount(cells.patches, minlength=count)
+    ranges = np.zeros((count, 4))
+    ranges[:, 0], ranges[:, 1] = np.cumsum(having) - having, having
+    share = cells.areas / area[cells.patches]
+    farthest = max(float(np.linalg.norm(points - middle, axis=1).max(initial=0)) for points in (places, corners))
+    return SurfelTextures(
+        folded(np.column_stack([places - middle, cells.areas])[order]),
+        folded(np.column_stack([cells.normals, share])[order]),
+        folded(ranges),
+        folded(corners - middle, CORNERS_PER_ROW),
+        middle,
+        farthest,
+        OFFSET * float(np.ptp(cells.places, axis=0).max()),
+        count,
+        len(corners) // 3,
+        order,
+    )
+
+
+def folded(values: ndarray, width: int | None = None) -> Float32[ndarray, "h w c"]:
+    """Rows of values (n, c) as texels, 0 behind the last; about as high as wide without a `width`."""
+    count = max(1, len(values))
+    width = min(width or int(np.ceil(np.sqrt(count))), count)
+    height = -(-count // width)
+    out = np.zeros((height * width, values.shape[1]), np.float32)
+    out[: len(values)] = values
+    return out.reshape(height, width, -1)
+
+
+def write_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
+    """Write the textures below `folder`/`data`; returns what `surfel_passes` of the manifest holds.
+
+    `tables` take the mean irradiance of the patches, one after the other, to the asset's weights: `rows` of `columns` entries, times
+    `scale`. `emission`: a row of weights per object, for a radiance of 1, to be added after the first table. InputError where a table
+    is larger than textures can be.
+    """
+    made = surfel_textures(asset)
+    tables = [name for name in ("surfel_transfer", "light_values") if name in asset.tables]
+    for table in tables:
+        rows, columns = asset.tables[table].shape[:2]
+        if max(rows, columns) > LARGEST:
+            raise InputError(f"expected {table} of at most {LARGEST} rows and columns, found {rows} x {columns}; fit with fewer `clusters`")
+    images = {"places": made.places, "normals": made.normals, "ranges": made.ranges, "corners": made.corners}
+    if KEY in asset.manifest:
+        surfaces = Surfaces.of(asset)
+        images["emission"] = np.stack([surfaces.emitted(name, np.ones(3)) for name in surfaces.names]).astype(np.float32)
+    for name, pixels in images.items():
+        write_image(folder / data / f"surfel_{name}.exr", pixels, "float")
+    return {
+        **{name: f"{data}/surfel_{name}.exr" for name in images},
+        **({"objects": list(Surfaces.of(asset).names)} if "emission" in images else {}),
+        "middle": made.middle.tolist(),
+        "reach": made.reach,
+        "lift": made.lift,
+        "patches": made.patches,
+        "triangles": made.triangles,
+        "tables": [_table(asset, name, data) for name in tables],
+    }
+
+
+def _table(asset: Asset, name: str, data: str) -> dict[str, Any]:
+    rows, columns, channels = asset.tables[name].shape
+    told = asset.manifest[name]
+    return {"file": f"{data}/{told['file']}", "rows": rows, "columns": columns, "channels": channels, "scale": told["scale"]}

@@ -1,0 +1,123 @@
+"""What an Unreal export has for surfels: textures, the passes as Custom nodes, and numbers for the component that draws them."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srbf.asset import Asset
+from srbf.export.engine_folder import engine_root
+from srbf.export.hlsl import include as pack_include
+from srbf.export.light_tables import weights_shape
+from srbf.export.surfel_textures import folded, surfel_textures, write_surfels
+from srbf.io import files
+from srbf.io.image import read_image, write_image
+from srbf.methods.kept_visibility import kept_visibility
+from srbf.visibility.pca_textures import pca_textures
+from srbf.visibility.pca_visibility import PcaVisibility
+from srbf.visibility.surface_cells import Cells
+
+MAGIC = b"SRBFSRF1"
+NUMBERS = "SrbfSurfels.bin"
+SOURCES = ("SrbfSurfels.h", "SrbfSurfelLights.h", "SrbfSurfelLights.cpp")
+PACK = [
+    *(f"surfels/{name}.glsl" for name in ("cell_irradiance", "cell_on_cube", "cell_on_map", "patch_mean", "table_part", "block_sum")),
+    "shadow/hemisphere_place.glsl",
+    "shadow/pca_visibility.glsl",
+]
+LIGHT = ["Light", "Color", "Axis", "Shape", "Space"]
+FACES = [f"Face{face}" for face in range(6)]
+DEPTHS = ["Coefficients", "Bases", "Clusters"]
+_CELL = """int3 Texel = SrbfTexel(UV, Size);
+float4 Cell = Places.Load(Texel);
+float3 Normal = Normals.Load(Texel).xyz;
+float3 Sum = Former.Load(Texel).rgb;
+float Amount = SrbfOnCell(Cell, Normal, Light, Axis, Shape);
+if (Amount <= 0.0) return Sum;
+"""
+BY_DEPTHS = _CELL + (
+    "float Seen = SrbfSeenByDepths(Coefficients, Bases, Clusters.Load(Texel).r, SrbfIndex(Texel, Size), Cell, Normal, Light, Space);\n"
+    "return Sum + Seen * Amount * Color.rgb;"
+)
+BY_FACES = _CELL + (
+    f"float Seen = SrbfSeenByFaces({', '.join(FACES)}, Cell, Normal, Light, Across, Up, Space);\nreturn Sum + Seen * Amount * Color.rgb;"
+)
+MEANS = "return srbfPatchMean(Irradiance, Normals, Ranges, SrbfTexel(UV, Size).xy);"
+PARTS = """int4 Sizes = int4(Entries + 0.5);
+return srbfTablePart(Table, Numbers, Sizes.x, Sizes.y, Sizes.z, false, SrbfIndex(SrbfTexel(UV, Size), Size)) * Entries.w;"""
+SUMS = "return srbfBlockSum(Parts, int(Entries.z + 0.5), SrbfIndex(SrbfTexel(UV, Size), Size));"
+
+
+def write_unreal_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
+    """Write textures below `folder`/`data`, `Shaders/SrbfSurfels_*.ush`, `SrbfSurfels.bin` and the component's source; returns the passes.
+
+    `materials`: of each pass its `inputs` in order, of which `vectors` are parameters and `textures` have a file each, the others being
+    set at run time, and `code`. Shadows are those of compressed depths where the asset has them, otherwise of captures of the scene.
+    """
+    told = write_surfels(asset, folder, data)
+    text = pack_include(PACK) + "\n" + (engine_root("unreal") / "SrbfSurfels.ush").read_text(encoding="utf-8")
+    name = f"SrbfSurfels_{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+    files.make_folder(folder / "Shaders")
+    files.write_text(folder / "Shaders" / f"{name}.ush", text)
+    places, groups, far = {key: told[key] for key in ("places", "normals")}, 0, 0.0
+    shadows, code, vectors = FACES, BY_FACES, [*LIGHT, "Across", "Up"]
+    if "surfel_visibility" in asset.manifest:
+        depths, groups, far = _depths(asset, folder, data)
+        places |= depths
+        shadows, code, vectors = DEPTHS, BY_DEPTHS, LIGHT
+    materials = {
+        "SurfelIrradiance": _material(["Former", *shadows], vectors, code, {key.capitalize(): file for key, file in places.items()}),
+        "SurfelMeans": _material(["Irradiance"], [], MEANS, {"Normals": told["normals"], "Ranges": told["ranges"]}),
+    }
+    for i, table in enumerate(told["tables"]):
+        file = _in_color(folder, data, i, table)
+        materials[f"SurfelParts{i}"] = _material(["Numbers"], ["Entries"], PARTS, {"Table": file})
+        materials[f"SurfelSums{i}"] = _material(["Parts"], ["Entries"], SUMS, {})
+    (folder / NUMBERS).write_bytes(_numbers(asset, told, folder, groups, far))
+    files.make_folder(folder / "Source")
+    for source in SOURCES:
+        shutil.copyfile(engine_root("unreal") / "Source" / source, folder / "Source" / source)
+    return {"include": f"/Project/{name}.ush", "materials": materials}
+
+
+def _material(targets: list[str], vectors: list[str], code: str, textures: dict[str, str]) -> dict[str, Any]:
+    inputs = ["UV", "Size", *textures, *(name for name in targets if name not in textures), *vectors]
+    return {"inputs": inputs, "vectors": ["Size", *vectors], "textures": textures, "code": code}
+
+
+def _in_color(folder: Path, data: str, i: int, table: dict[str, Any]) -> str:
+    """The file of a table with three channels: Unreal's importer is not asked for images of one."""
+    if table["channels"] == 3:
+        return str(table["file"])
+    file = f"{data}/surfel_table_{i}.exr"
+    write_image(folder / file, np.repeat(read_image(folder / table["file"]), 3, axis=2), "half")
+    return file
+
+
+def _depths(asset: Asset, folder: Path, data: str) -> tuple[dict[str, str], int, float]:
+    """(textures of compressed depths in the order of the cells' texels, texels per cell, the farthest distance)."""
+    order = surfel_textures(asset).order
+    kept = kept_visibility(asset, "surfel_visibility", Cells.of_image(asset.tables["cells"]).normals)
+    sorted_ = PcaVisibility(kept.normals[order], kept.clusters[order], kept.coefficients[order], kept.bases, kept.low, kept.span, kept.far)
+    coefficients, bases, groups = pca_textures(sorted_)
+    images = {"coefficients": coefficients, "bases": bases, "clusters": np.repeat(folded(sorted_.clusters[:, None]), 3, axis=2)}
+    for key, pixels in images.items():
+        write_image(folder / data / f"surfel_{key}.exr", pixels, "float")
+    return {key: f"{data}/surfel_{key}.exr" for key in images}, groups, kept.far
+
+
+def _numbers(asset: Asset, told: dict[str, Any], folder: Path, groups: int, far: float) -> bytes:
+    """Little-endian: MAGIC; float64 asset_from_world (4, 4), middle (3), reach, lift, far; int32 width and height of the cells, of the
+    patches and of the weights, texels per cell of compressed depths, tables; of each int32 rows, columns, float64 scale.
+    """
+    (height, width), (rows, columns) = (read_image(folder / told[key]).shape[:2] for key in ("places", "ranges"))
+    weights = weights_shape(asset)
+    head = np.concatenate([asset.asset_from_world.ravel(), told["middle"], [told["reach"], told["lift"], far]]).astype("<f8").tobytes()
+    sizes = struct.pack("<8i", width, height, columns, rows, weights[1], weights[0], groups, len(told["tables"]))
+    tables = b"".join(struct.pack("<iid", table["rows"], table["columns"], table["scale"]) for table in told["tables"])
+    return MAGIC + head + sizes + tables

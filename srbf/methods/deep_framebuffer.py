@@ -1,0 +1,305 @@
+"""The deep framebuffer: a view under any lights with all bounces, gathered from a pool of surfels by sparse links."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64
+from srbf.asset import Asset, layer_entries
+from srbf.asset_reader import AssetReader
+from srbf.capture import Capture
+from srbf.encode.dilation import dilate, nearest_covered
+from srbf.errors import ImageError, InputError
+from srbf.light_domain import domain_of_capture
+from srbf.lights import Light, NamedLight, PointLight
+from srbf.methods.carried import carried_images, carried_scene, common_manifest
+from srbf.methods.protocol import QUIET, FitRun, Method, setting
+from srbf.visibility.gather_operator import GatherOperator
+from srbf.visibility.packed_links import COLUMNS, LINK_BYTES, link_count, packed, share_within, unpacked
+from srbf.visibility.received import ReceivedLight, occluders_of
+from srbf.visibility.sparse_links import SparseLinks, radiosity_of
+from srbf.visibility.surface_cells import Cells
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+MEGABYTE = 1e6
+MOST_NEAREST = 10
+LEAST_SHARE = 1 / 32  # of the rays, that a budget leaves
+NEIGHBOR_BYTES = 3  # of a pixel, for each of its clusters
+POOL_FILE, VIEW = "pool.exr", "view_links"
+FILES = {
+    "pool": POOL_FILE,
+    "view_links": "view_links.png",
+    "view_rows": "view_rows.png",
+    "exchange_links": "exchange_links.png",
+    "exchange_rows": "exchange_rows.png",
+}
+KEPT = 2  # assets whose links are ready
+
+
+@dataclass(frozen=True)
+class DeepFramebuffer(Method):
+    """A view under any lights: I(p) = sum_j c_j(p) E_j, E = W B, B = sum_k (rho F)^k rho e     [Hasan2005, eq. 3, with all bounces]
+
+    e is the direct irradiance that the lights lay on a pool of surfels; F are links of these to each other, W those of view clusters to
+    them, by rays; a pixel mixes the clusters nearest to it in place and normal. The paper's gather samples belong to one cluster each and
+    have one bounce.
+
+    Parameters
+    ----------
+    nearest
+        Clusters that a pixel mixes, 1 to 10.
+    budget
+        Megabytes (10^6) that pool, links and pixels take at most, before PNG packs them: fewer rays are kept. None: all of them.
+    seed
+        Of which rays are kept.
+
+    Raises
+    ------
+    InputError
+        On a value out of range.
+
+    Examples
+    --------
+    >>> DeepFramebuffer(budget=20).nearest
+    10
+    """
+
+    name: ClassVar[str] = "deep-framebuffer"
+    order: ClassVar[int] = 9
+    layers: ClassVar[str] = "neighbors"
+    tables: ClassVar[dict[str, str]] = FILES
+    domains: ClassVar[tuple[str, ...]] = ("pool",)
+    receivers: ClassVar[tuple[str, ...]] = ("view",)
+    has_shader: ClassVar[bool] = False
+    filterable: ClassVar[bool] = False
+
+    nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")
+    budget: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.nearest <= MOST_NEAREST:
+            raise InputError(f"expected 1 to {MOST_NEAREST} `nearest` clusters, found {self.nearest}")
+        if self.budget is not None and self.budget < 1:
+            raise InputError(f"expected a `budget` of 1 megabyte or more, found {self.budget}")
+
+    @classmethod
+    def is_made_for(cls, capture: Capture) -> bool:
+        return capture.kind in cls.domains
+
+    def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
+        """Links as bytes, as many as the budget has room for, and the clusters of every pixel.
+
+        Parameters
+        ----------
+        capture
+            Of a gather.
+        run
+            Nothing of it is used: no image is read.
+
+        Returns
+        -------
+        Asset
+            In memory.
+
+        Raises
+        ------
+        InputError
+            Where the budget has no room, or the capture lacks its scene.
+        ImageError
+            Where its links cannot be read.
+
+        Examples
+        --------
+        >>> DeepFramebuffer().encode(view).manifest["gather"]["clusters"]  # doctest: +SKIP
+        20000
+        """
+        operator = GatherOperator.read(capture.folder)
+        scene = carried_scene(capture)
+        if scene is None:
+            raise InputError(f"expected scene.glb in {capture.folder}, found none: lights need what casts shadows; bake again")
+        pixels = capture.width * capture.height
+        if len(operator.nearest) != pixels:
+            raise ImageError(f"expected clusters of {pixels} pixels in {capture.folder}, found {len(operator.nearest)}; bake again")
+        most = min(self.nearest, operator.nearest.shape[1])
+        view = self._within(operator, most, pixels)
+        nearest = nearest_covered(capture.coverage())
+        stored = np.stack(
+            [
+                np.round(dilate(layer.reshape(capture.height, capture.width, 3).astype(np.float32), nearest)).astype(np.uint8)
+                for layer in _neighbors(operator.nearest[:, :most], operator.weights[:, :most])
+            ]
+        )
+        scale, bias = np.ones((most, 3), np.float32), np.zeros((most, 3), np.float32)
+        images = carried_images(capture, nearest)
+        manifest = common_manifest(capture, self.name, domain_of_capture(capture), images, asdict(self), {})
+        manifest |= {name: {"file": file} for name, file in FILES.items()}
+        manifest[self.layers] = layer_entries("neighbor", "uint8", scale, bias)
+        bounces = capture.manifest["gather"].get("bounces")
+        manifest["gather"] = {
+            "surfels": len(operator.cells.places),
+            "clusters": view.rows,
+            "view_rays": view.rays,
+            "exchange_rays": operator.exchange.rays,
+            **({} if bounces is None else {"bounces": bounces}),
+        }
+        tables = {"pool": np.concatenate([operator.cells.image(), np.pad(operator.cells.albedo, ((0, 0), (0, 1)))[None]])}
+        for name, links in (("view", view), ("exchange", operator.exchange)):
+            tables[f"{name}_links"], tables[f"{name}_rows"] = packed(links)
+        return Asset(manifest, stored, scale, bias, tables, images, scene)
+
+    def _within(self, operator: GatherOperator, nearest: int, pixels: int) -> SparseLinks:
+        """The view's links within the budget."""
+        if self.budget is None:
+            return operator.view
+        fixed = 48 * len(operator.cells.places) + NEIGHBOR_BYTES * nearest * pixels + LINK_BYTES * link_count(operator.exchange)
+        share = share_within(operator.view, (self.budget * MEGABYTE - fixed) / LINK_BYTES)
+        if share < LEAST_SHARE:
+            least = int(np.ceil((fixed + LINK_BYTES * link_count(operator.view, LEAST_SHARE)) / MEGABYTE))
+            raise InputError(f"expected a `budget` of {least} megabytes or more for this view, found {self.budget}")
+        return operator.view.thinned(share, self.seed)
+
+    @classmethod
+    def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[DeepFramebuffer]:
+        """Bytes per texel say little of it."""
+        yield cls()
+
+    @classmethod
+    def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
+        told = reader.manifest["gather"]
+        tables = {"pool": reader.table("pool", (3, told["surfels"]), 4)}
+        for name in ("view", "exchange"):
+            for part in ("links", "rows"):
+                pixels = reader.pixels(reader.manifest[f"{name}_{part}"]["file"], 3)
+                if pixels.shape[1] != COLUMNS:
+                    raise ImageError(f"expected {COLUMNS} columns of {name}_{part} in {reader.folder}, found {pixels.shape[1]}; fit again")
+                tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
+        return tables
+
+    @classmethod
+    def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        return cls.weighted(asset, cls.projected_weights(asset, lights)[None])[0]
+
+    @classmethod
+    def responses(cls, asset: Asset, coordinates: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        lights = (PointLight((float(x), float(y), float(z)), falloff="inverse-square") for x, y, z in coordinates)
+        return np.stack([cls.linear_response(asset, [light]) for light in lights])
+
+    @classmethod
+    def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "C 3"]:
+        """The irradiance of every view cluster, all bounces included, under all lights together."""
+        if any(isinstance(light, NamedLight) for light in lights):
+            raise InputError(
+                f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
+            )
+        if not lights:
+            return np.zeros((asset.manifest["gather"]["clusters"], 3))
+        ready = _ready(asset)
+        irradiance = np.sum([ready.received.irradiance(light) for light in lights], axis=0).astype(np.float32)
+        bounced = radiosity_of(ready.exchange, ready.albedo, irradiance, asset.manifest["gather"].get("bounces"))
+        return (ready.view @ bounced).astype(np.float64)
+
+    @classmethod
+    def weighted(cls, asset: Asset, weights: Float64[ndarray, "b C 3"]) -> Float32[ndarray, "b H W 3"]:
+        """b pictures from the irradiance of the view clusters."""
+        light = weights.transpose(1, 0, 2).astype(np.float32)  # (C, b, 3)
+        total = np.zeros((asset.height, asset.width, *light.shape[1:]), np.float32)
+        share = np.zeros((asset.height, asset.width, 1, 1), np.float32)
+        for layer in asset.stored:
+            cluster = layer[:, :, 0].astype(np.int64) + 256 * layer[:, :, 1].astype(np.int64)
+            own = layer[:, :, 2, None, None].astype(np.float32)
+            total += own * light[cluster]
+            share += own
+        pictures = (total / np.maximum(share, 1)).transpose(2, 0, 1, 3)
+        if asset.quantity == "radiance":
+            pictures = pictures * (cls._albedo(asset) / np.float32(np.pi))
+        return np.ascontiguousarray(pictures)
+
+    @classmethod
+    def _albedo(cls, asset: Asset) -> Float32[ndarray, "H W 3"]:
+        if "albedo" not in asset.images:
+            raise InputError("expected the albedo of the pixels in the asset, found none; relight all of it")
+        return asset.images["albedo"]
+
+    @classmethod
+    def local_lights(cls, lights: Sequence[Light]) -> list[PointLight]:
+        return []
+
+    @classmethod
+    def numbers_per_texel(cls, asset: Asset) -> int:
+        return len(asset.stored)
+
+    @classmethod
+    def label(cls, asset: Asset) -> str:
+        return f"{asset.manifest['gather']['clusters']} clusters"
+
+    @classmethod
+    def summary(cls, asset: Asset) -> str:
+        told = asset.manifest["gather"]
+        return (
+            f"{told['surfels']} surfels, {told['clusters']} view clusters of {told['view_rays']} rays, {cls.size(asset) / MEGABYTE:.1f} MB"
+        )
+
+    @classmethod
+    def describe(cls, asset: Asset) -> Mapping[str, Any]:
+        return {**asset.manifest["gather"], "nearest": len(asset.stored), "gather_bytes": cls.size(asset)}
+
+    @classmethod
+    def size(cls, asset: Asset) -> int:
+        """Bytes of pool, links and pixels."""
+        return sum(table.nbytes for table in asset.tables.values()) + asset.stored.nbytes
+
+
+@dataclass(frozen=True, eq=False)
+class _Ready:
+    """What relighting needs of an asset's tables."""
+
+    tables: dict[str, ndarray]
+    scene: bytes
+    view: csr_array
+    exchange: csr_array
+    albedo: Float32[ndarray, "S 3"]
+    received: ReceivedLight
+
+
+_kept: OrderedDict[tuple[int, int], _Ready] = OrderedDict()
+
+
+def _ready(asset: Asset) -> _Ready:
+    """Made once for an asset, and for those of some of its pixels."""
+    if asset.scene is None:
+        raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
+    key = (id(asset.tables["view_links"]), id(asset.scene))
+    found = _kept.get(key)
+    if found is None or found.tables["view_links"] is not asset.tables["view_links"] or found.scene is not asset.scene:
+        told, tables = asset.manifest["gather"], asset.tables
+        cells = replace(Cells.of_image(tables["pool"][:2]), albedo=np.ascontiguousarray(tables["pool"][2, :, :3]))
+        try:
+            view, exchange = (
+                unpacked(tables[f"{name}_links"], tables[f"{name}_rows"], rows, told[f"{name}_rays"], told["surfels"]).matrix()
+                for name, rows in (("view", told["clusters"]), ("exchange", told["surfels"]))
+            )
+        except ValueError as error:
+            raise ImageError(f"{error}; fit again") from error
+        found = _Ready(tables, asset.scene, view, exchange, cells.albedo, ReceivedLight(cells, occluders_of(asset.scene)))
+        _kept[key] = found
+        while len(_kept) > KEPT:
+            _kept.popitem(last=False)
+    return found
+
+
+def _neighbors(clusters: ndarray, weights: ndarray) -> ndarray:
+    """(K, P, 3) bytes: low and high byte of the cluster, weight by the pixel's largest."""
+    share = weights / np.maximum(weights.max(axis=1, keepdims=True), 1e-30)
+    return np.stack([clusters & 255, clusters >> 8, np.round(255 * share)], axis=2).astype(np.uint8).transpose(1, 0, 2)
+
+
+METHOD = DeepFramebuffer

@@ -1,0 +1,128 @@
+"""A deep framebuffer: what each part of a view gathers from a pool of surfels, and these from each other, traced once, for any light.
+
+The paper stores gather samples for each pixel [Hasan2005]; here all pixels share one pool, in which later bounces live as well.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Int
+from srbf.errors import ImageError
+from srbf.io import files
+from srbf.io.image import read_image, write_image
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.pixel_points import PixelPoints
+from srbf.visibility.sparse_links import SparseLinks
+from srbf.visibility.surface_cells import Cells
+from srbf.visibility.surfels import Surfels
+from srbf.visibility.view_clusters import ViewClusters
+
+POOL_FILE = "pool.exr"
+GATHER_FILE = "gather.npz"
+VIEW_RAYS, MOST_VIEW_RAYS = 512, 2048  # of a view cluster: more where there are fewer than DEFAULT_CLUSTERS
+SURFEL_RAYS = 64
+SURFEL_POINTS = 4  # of a surfel, that its rays start from
+ROWS = 1 << 12  # traced between two reports of progress
+DEFAULT_CLUSTERS = 20_000  # of a view with more pixels
+Progress = Callable[[int, int], None]  # (rows done, of how many)
+
+
+@dataclass(frozen=True, eq=False)
+class GatherOperator:
+    """Links from C view clusters to a pool of S surfels, and between surfels; `nearest` (P, K) clusters of every pixel, `weights` of each.
+
+    Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters.
+    """
+
+    cells: Cells
+    view: SparseLinks
+    exchange: SparseLinks
+    nearest: Int[ndarray, "P K"]
+    weights: Float32[ndarray, "P K"]
+
+    @staticmethod
+    def traced(
+        pool: Surfels,
+        pixels: PixelPoints,
+        occluders: EmbreeTriangles,
+        clusters: int,
+        seed: int = 0,
+        progress: Progress = lambda done, total: None,
+    ) -> GatherOperator:
+        """By cosine rays from every cluster and surfel."""
+        extent = float(np.ptp(pool.cells.places, axis=0).max(initial=0))
+        found = ViewClusters.of_points(pixels.points, pixels.normals, clusters, extent)
+        nearest, weights = pixels.gathered(*found.mixed(pixels.points, pixels.normals, occluders))
+        total = len(found.places) + pool.count
+        rays = int(np.clip(VIEW_RAYS * DEFAULT_CLUSTERS // max(1, len(found.places)), VIEW_RAYS, MOST_VIEW_RAYS))
+        view = _traced(pool, RayOrigins.even(found.places[:, None], found.normals[:, None]), rays, seed, lambda n: progress(n, total))
+        origins = RayOrigins.even(*pool.spread(SURFEL_POINTS, seed))
+        own = _traced(pool, origins, SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total))
+        return GatherOperator(pool.cells, view, own, nearest, weights)
+
+    def write(self, folder: Path, key: str) -> None:
+        """pool.exr, three rows (x, y, z, area), (normal, 0), (albedo, 0), and gather.npz; `key` tells what they are of."""
+        image = np.concatenate([self.cells.image(), np.pad(self.cells.albedo, ((0, 0), (0, 1)))[None]]).astype(np.float32)
+        write_image(folder / POOL_FILE, image, "float")
+        arrays = {
+            **self.view.arrays("view"),
+            **self.exchange.arrays("exchange"),
+            "nearest": self.nearest.astype(np.uint16),
+            "weights": self.weights.astype(np.float16),
+        }
+        with files.atomic_path(folder / GATHER_FILE) as temporary, open(temporary, "wb") as file:
+            np.savez_compressed(file, key=np.array(key), **arrays)
+
+    @staticmethod
+    def read(folder: Path) -> GatherOperator:
+        """ImageError where the files are missing, damaged, or not of one bake."""
+        path = folder / GATHER_FILE
+        image = read_image(folder / POOL_FILE, 4)
+        if len(image) != 3:
+            raise ImageError(f"expected 3 rows in {folder / POOL_FILE}, found {len(image)}; bake again with `force=True`")
+        count = image.shape[1]
+        try:
+            with np.load(path) as stored:
+                arrays = {name: stored[name] for name in stored.files}
+            view, own = (SparseLinks.of_arrays(arrays, name, count) for name in ("view", "exchange"))
+            nearest, weights = arrays["nearest"].astype(np.int64), arrays["weights"].astype(np.float32)
+            if own.rows != count or int(nearest.max(initial=0)) >= view.rows or nearest.shape != weights.shape:
+                raise ValueError("rows that fit each other")
+        except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
+            raise ImageError(f"expected links of a view in {path}, found none to read; bake again with `force=True`") from error
+        cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
+        return GatherOperator(cells, view, own, nearest, weights)
+
+
+def is_gathered(folder: Path, key: str) -> bool:
+    """Whether a folder has the links of this `key`."""
+    try:
+        with np.load(folder / GATHER_FILE) as stored:
+            return (folder / POOL_FILE).is_file() and str(stored["key"]) == key
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        return False
+
+
+def cluster_count(asked: int | None, pixels: int) -> int:
+    """How many view clusters: those asked for, or one a pixel up to DEFAULT_CLUSTERS."""
+    return min(pixels, DEFAULT_CLUSTERS if asked is None else asked)
+
+
+def _traced(pool: Surfels, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None]) -> SparseLinks:
+    from scipy.sparse import csr_array, vstack
+
+    parts = [csr_array((0, pool.count), dtype=np.float32)]
+    for start in range(0, len(origins.points), ROWS):
+        part = slice(start, start + ROWS)
+        own = RayOrigins(origins.points[part], origins.normals[part], origins.weights[part])
+        parts.append(form_factors(pool, own, rays // own.weights.shape[1], (seed * 0x9E3779B1 + start * 0x85EBCA77) & 0x7FFFFFFF))
+        progress(min(start + ROWS, len(origins.points)))
+    return SparseLinks.of_shares(vstack(parts, format="csr"), rays)

@@ -1,0 +1,60 @@
+"""Bakes of deep framebuffers: what a capture holds, bounces and direct light against Cycles, a bake that is resumed, wrong input."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from light_set_commands import done, refused, scenes_in
+
+from srbf.capture import Capture
+from srbf.visibility.gather_operator import GATHER_FILE, GatherOperator
+
+pytestmark = pytest.mark.blender
+
+VIEW = ["--receiver", "view", "--size", "24x24", "--light-set", "gather", "--pool", "600", "--view-clusters", "200", "--seed", "77"]
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    return scenes_in(tmp_path_factory.mktemp("scenes"))
+
+
+def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
+    folder, asset = tmp_path / "capture", tmp_path / "asset"
+    assert "pool of surfels" in done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0", "--dry-run").output
+    done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
+    made = (folder / GATHER_FILE).stat().st_mtime_ns
+    done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
+    assert (folder / GATHER_FILE).stat().st_mtime_ns == made and not Capture.open(folder).lights
+    done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "2", "--holdout-samples", "256", "--force")
+    capture, operator = Capture.open(folder), GatherOperator.read(folder)
+    assert capture.kind == "pool" and capture.transport == "indirect" and capture.quantity == "radiance"
+    assert [(light.role, light.kind, light.direct is not None) for light in capture.lights] == [("holdout", "point", True)] * 2
+    assert operator.view.rows == 200 and 500 < len(operator.cells.places) <= 600 and capture.manifest["gather"]["bounces"] == 4
+    done("fit", folder, "-o", asset)
+    for direct, most in (("none", 0.2), ("ray", 0.1), ("shadow-map", 0.15)):
+        errors = json.loads(done("evaluate", asset, folder, "--direct", direct, "--json").stdout)
+        assert errors["holdout"]["relative_rmse"] < most, (direct, errors["holdout"])  # most of it the noise of 256 samples
+    frames = {"frames": [{"lights": [{"kind": "point", "position": [1.5, 1, 1.2]}]}, {"lights": []}]}
+    (tmp_path / "frames.json").write_text(json.dumps(frames))
+    done("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "shown", "--direct", "ray")
+    assert len(list((tmp_path / "shown").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "flags", "status", "words"),
+    [
+        ("open_air", [], 1, "camera"),
+        ("unlit", ["--pool", "3"], 2, "16 to 65536"),
+        ("unlit", ["--transport", "combined"], 2, "indirect"),
+        ("unlit", ["--receiver", "lightmap:Floor"], 2, "view"),
+        ("unlit", ["--quantity", "irradiance"], 2, "radiance"),
+        ("black", [], 1, "reflect light"),
+    ],
+)
+def test_wrong_input_is_one_line(scene, tmp_path: Path, name: str, flags: list[str], status: int, words: str) -> None:
+    assert words in refused(["bake", scene(name), "-o", tmp_path / "no", *VIEW, *flags, "--holdout", "0"], status)
+    assert not (tmp_path / "no").exists()

@@ -1,0 +1,89 @@
+"""Passes of translated shaders, one after the other: programs of HLSL through SPIR-V, textures and targets of floats."""
+
+from __future__ import annotations
+
+import re
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+from pixels import corner_shader, shared_context
+
+from srbf.export import spirv
+
+
+class Passes:
+    """Draws in the context that all pictures share; everything made is released at the end of the `with`."""
+
+    def __enter__(self) -> Passes:
+        self._made = ExitStack()
+        self._context = shared_context()
+        self._made.enter_context(self._context)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._made.close()
+
+    def kept(self, resource: Any) -> Any:
+        self._made.callback(resource.release)
+        return resource
+
+    def program(self, fragment: str, entry: str, vertex: str | None = None) -> Any:
+        """Of HLSL: a fragment entry, and a vertex entry of the same text; without, a triangle over the whole target."""
+        shaders = [spirv.cross_compile(spirv.compile_hlsl(fragment, "frag", entry), "glsl")]
+        shaders.append(corner_shader() if vertex is None else spirv.cross_compile(spirv.compile_hlsl(fragment, "vert", vertex), "glsl"))
+        if vertex is not None:  # names of what passes between them are each compiler's own
+            shaders = [_renamed(shaders[0], "in"), _renamed(shaders[1], "out")]
+        return self.kept(self._context.program(fragment_shader=shaders[0], vertex_shader=shaders[1]))
+
+    def texture(self, values: np.ndarray) -> Any:
+        pixels = np.ascontiguousarray(np.atleast_3d(values), np.float32)
+        if pixels.ndim == 4:
+            made = self._context.texture_array((pixels.shape[2], pixels.shape[1], len(pixels)), pixels.shape[3], pixels, dtype="f4")
+        else:
+            made = self._context.texture((pixels.shape[1], pixels.shape[0]), pixels.shape[2], pixels, dtype="f4")
+        made.filter = (self._context.NEAREST, self._context.NEAREST)
+        return self.kept(made)
+
+    def draw(
+        self,
+        program: Any,
+        target: Any,
+        images: dict[str, Any],
+        uniforms: dict[str, Any],
+        vertices: int = 3,
+        blend: str | None = None,
+    ) -> None:
+        """Into a texture of floats."""
+        context = self._context
+        samplers = [name for name in program if "Combined" in name or name in images]
+        for unit, sampler in enumerate(samplers):
+            name = next(name for name in sorted(images, key=len, reverse=True) if name in sampler)
+            images[name].use(unit)
+            program[sampler].value = unit
+        for name, value in uniforms.items():
+            for member in (member for member in program if member == name or member.endswith(f".{name}")):
+                program[member].write(np.ascontiguousarray(value, np.float32))
+        framebuffer = self.kept(context.framebuffer([target]))
+        framebuffer.use()
+        context.enable_only(context.NOTHING if blend is None else context.BLEND)
+        context.blend_func = context.ONE, context.ONE
+        context.blend_equation = context.MAX if blend == "max" else context.FUNC_ADD
+        if "corner" in program:
+            corners = self.kept(context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32)))
+            triangle = self.kept(context.vertex_array(program, [(corners, "2f", "corner")]))
+        else:
+            triangle = self.kept(context.vertex_array(program, []))
+        triangle.render(vertices=vertices)
+        context.enable_only(context.NOTHING)
+
+    @staticmethod
+    def read(target: Any) -> np.ndarray:
+        width, height = target.size
+        return np.frombuffer(target.read(), np.float32).reshape(height, width, -1).copy()
+
+
+def _renamed(text: str, side: str) -> str:
+    """The one number that a vertex hands to its pixels, under one name."""
+    found = re.search(rf"^(?:layout\(location = 0\) )?{side} float (\w+);", text, re.MULTILINE)
+    return re.sub(rf"\b{found[1]}\b", "passedOn", text) if found else text

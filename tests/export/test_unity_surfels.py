@@ -1,0 +1,299 @@
+"""Unity's passes that light surfels: the HLSL, drawn one pass after the other, and the C# that prepares them, beside numpy and rays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from closed_forms import glb
+from made_surfels import DOOR, LIGHTS, WALL, irradiance_of, made_asset, weights_of
+from passes import Passes
+from test_unity import ask, needs_mono, needs_spirv  # noqa: F401
+
+from srbf.asset import Asset
+from srbf.export import spirv, unity
+from srbf.export.surfel_textures import PASSES, surfel_textures
+from srbf.gl.uniforms import NO_CONE, versine
+from srbf.io import files
+from srbf.io.image import read_image
+from srbf.lights import DirectionalLight, Light, NamedLight, PointLight, SpotLight
+from srbf.visibility.surface_cells import Cells, frames
+
+pytestmark = pytest.mark.engines
+pytest.importorskip("embreex")
+
+SHADOWS = 256  # texels of a face
+CLOSE = 5e-6  # of the largest: sums of floats
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("surfels")
+    (place / "out").mkdir()
+    unity.write(made_asset(), place / "out")
+    return place / "out"
+
+
+@pytest.fixture(scope="module")
+def asset(folder: Path) -> Asset:
+    return Asset.open(folder)
+
+
+@pytest.fixture(scope="module")
+def told(folder: Path) -> dict[str, Any]:
+    return files.read_json(folder / "asset.json")[PASSES]
+
+
+def shader_of(folder: Path, name: str) -> str:
+    """An include of Shaders/ with the pack in place, for OpenGL, whose rows run upwards."""
+    line = '#include "SrbfSurfelPack.hlsl"\n'
+    text = (folder / "Srbf/Shaders" / name).read_text()
+    assert text.count(line) == 1
+    return "#define SHADER_API_GLCORE\n" + text.replace(line, (folder / "Srbf/Shaders/SrbfSurfelPack.hlsl").read_text())
+
+
+class Unity:
+    """The passes of SrbfSurfelPasses.cs, in its order and with its uniforms."""
+
+    def __init__(self, passes: Passes, folder: Path, told: dict[str, Any], asset: Asset) -> None:
+        text = shader_of(folder, "SrbfSurfels.hlsl")
+        names: dict[str, tuple[str, ...]] = {"onCube": ("SrbfNearness", "SrbfOccluderOnCube"), "onMap": ("SrbfHeight", "SrbfOccluderOnMap")}
+        names |= {"byCube": ("SrbfIrradianceByCube",), "byMap": ("SrbfIrradianceByMap",), "means": ("SrbfMeans",)}
+        names |= {"parts": ("SrbfTableParts",), "sums": ("SrbfTableSums",)}
+        self.programs = {name: passes.program(text, *entries) for name, entries in names.items()}
+        self.passes, self.told, self.asset, self.folder = passes, told, asset, folder
+        files_of = {name: read_image(folder / told[name]) for name in ("places", "normals", "ranges", "corners")}
+        self.images = {f"_Srbf{name.capitalize()}": passes.texture(pixels) for name, pixels in files_of.items()}
+
+    def target(self, height: int, width: int, channels: int = 4) -> Any:
+        return self.passes.texture(np.zeros((height, width, channels)))
+
+    def irradiance(self, lights: list[Light]) -> Any:
+        sum_ = self.target(*read_image(self.folder / self.told["places"]).shape[:2])
+        for light in lights:
+            distant = isinstance(light, DirectionalLight)
+            size = 4 * SHADOWS if distant else SHADOWS
+            values = self.values(light)
+            slices = []
+            for face in range(1 if distant else 6):
+                axes = frame_of(np.array(light.direction)) if isinstance(light, DirectionalLight) else face_axes(face)
+                values |= {f"_Srbf{name}": (*axis, 0) for name, axis in zip(("Across", "Up", "Ahead"), axes, strict=True)}
+                slices.append(self.target(size, size, 1))
+                program = self.programs["onMap" if distant else "onCube"]
+                self.passes.draw(program, slices[-1], self.images, values, 3 * self.told["triangles"], "max")
+            nearness = self.passes.texture(np.stack([self.passes.read(face) for face in slices]))
+            self.passes.draw(
+                self.programs["byMap" if distant else "byCube"], sum_, self.images | {"_SrbfNearness": nearness}, values, 3, "add"
+            )
+        return sum_
+
+    def values(self, light: Light) -> dict[str, Any]:
+        common = {"_SrbfReach": [self.told["reach"]], "_SrbfLift": [self.told["lift"]], "_SrbfLightColor": (*light.color, 0)}  # type: ignore[union-attr]
+        if isinstance(light, DirectionalLight):
+            return common | {"_SrbfLightPlace": (*light.direction, 0), "_SrbfLightAxis": (0, 0, 1, 1), "_SrbfLightShape": (1, 1, 3, 4)}
+        assert isinstance(light, PointLight)
+        spot = isinstance(light, SpotLight)
+        cone = (versine(light.inner), versine(light.outer)) if isinstance(light, SpotLight) else NO_CONE
+        place = np.array(light.position) - self.told["middle"]
+        axis = light.direction if isinstance(light, SpotLight) else (0, 0, 1)
+        assert spot or cone == NO_CONE
+        return common | {
+            "_SrbfLightPlace": (*place, 0),
+            "_SrbfLightAxis": (*axis, float(light.falloff == "inverse-square")),
+            "_SrbfLightShape": (light.a0, light.radius, *cone),
+        }
+
+    def weights(self, irradiance: Any, added: np.ndarray | None = None) -> np.ndarray:
+        numbers = self.target(*read_image(self.folder / self.told["ranges"]).shape[:2])
+        self.passes.draw(self.programs["means"], numbers, self.images | {"_SrbfIrradiance": irradiance}, {})
+        for i, table in enumerate(self.told["tables"]):
+            rows, columns = table["rows"], table["columns"]
+            blocks = -(-columns // 64)
+            last = i == len(self.told["tables"]) - 1
+            side = math.ceil(math.sqrt(rows))
+            shape = (self.asset.clusters, self.asset.components + 1) if last else (-(-rows // side), side)
+            width = math.ceil(math.sqrt(rows * blocks))
+            parts, target = self.target(-(-rows * blocks // width), width), self.target(*shape)
+            values = {"_SrbfTable": (rows, columns, blocks, table["channels"] == 1), "_SrbfScale": [table["scale"]]}
+            entries = self.passes.texture(read_image(self.folder / table["file"]))
+            self.passes.draw(
+                self.programs["parts"], parts, {"_SrbfEntries": entries, "_SrbfNumbers": numbers}, values | {"_SrbfTargetWidth": [width]}
+            )
+            more = np.zeros((shape[0] * shape[1], 4))
+            if added is not None and i == 0:
+                more[:rows, :3] = added
+            images = {"_SrbfParts": parts, "_SrbfAdded": self.passes.texture(more.reshape(*shape, 4))}
+            self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[1]]})
+            numbers = target
+        return self.passes.read(numbers)[..., :3]
+
+
+def face_axes(face: int) -> list[np.ndarray]:
+    """Columns, rows and the way that a face of a cube looks."""
+    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
+    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
+
+
+def frame_of(toward: np.ndarray) -> list[np.ndarray]:
+    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
+    across /= np.linalg.norm(across)
+    return [across, np.cross(toward, across), toward]
+
+
+@pytest.fixture(scope="module")
+def drawn(folder: Path, told: dict[str, Any], asset: Asset) -> Iterator[Unity]:
+    with Passes() as passes:
+        yield Unity(passes, folder, told, asset)
+
+
+@needs_spirv
+@pytest.mark.parametrize("name", LIGHTS)
+def test_passes_measure_what_rays_do(drawn: Unity, asset: Asset, name: str) -> None:
+    """Irradiance of every cell, none of which is at the edge of a shadow; then the weights of the light."""
+    light = LIGHTS[name]
+    sum_ = drawn.irradiance([light])
+    order = surfel_textures(asset).order
+    found = drawn.passes.read(sum_).reshape(-1, 4)[: len(order), :3]
+    expected = irradiance_of(asset, light)[order]
+    np.testing.assert_allclose(found, expected, atol=CLOSE * expected.max())
+    facing = irradiance_of(replace(asset, scene=glb(np.zeros((1, 3, 3), np.float32))), light)[order]
+    assert ((expected == 0) & (facing > 0.01 * facing.max())).any(axis=1).mean() > 0.03, "the wall hides some"
+    weights = weights_of(asset, [light])
+    np.testing.assert_allclose(drawn.weights(sum_), weights, atol=CLOSE * np.abs(weights).max())
+
+
+@needs_spirv
+def test_tables_give_numpys_weights(drawn: Unity, asset: Asset, folder: Path, told: dict[str, Any]) -> None:
+    """Of all lights and of an object that emits, from the irradiance of rays."""
+    lights = [*LIGHTS.values()]
+    order = surfel_textures(asset).order
+    shape = read_image(folder / told["places"]).shape[:2]
+    rays = np.zeros((shape[0] * shape[1], 4))
+    rays[: len(order), :3] = np.sum([irradiance_of(asset, light) for light in lights], axis=0)[order]
+    name, radiance = told["objects"][1], np.array([0.5, 2.0, 1.0])
+    added = read_image(folder / told["emission"])[1] * radiance
+    found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), added)
+    expected = weights_of(asset, [*lights, NamedLight(name, tuple(radiance))])
+    np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
+
+
+@needs_spirv
+def test_lights_add_up(drawn: Unity) -> None:
+    pair = [LIGHTS["point"], LIGHTS["spot"]]
+    read = drawn.passes.read
+    np.testing.assert_allclose(
+        read(drawn.irradiance(pair))[..., :3], sum(read(drawn.irradiance([light]))[..., :3] for light in pair), rtol=1e-6, atol=1e-6
+    )
+    assert not read(drawn.irradiance([])).any()
+
+
+URP = """
+struct Light { half3 direction; half3 color; float distanceAttenuation; half shadowAttenuation; uint layerMask; };
+float4 lightPlace, lightColor, sunPlace, sunColor, wall;
+
+// Whether the wall is not between; in Unity's axes its plane is at -x.
+float open(float3 from, float3 toward)
+{
+    float t = (-wall.x - from.x) / toward.x;
+    float3 through = from + t * toward;
+    return t > 0.0 && t < 1.0 && -through.z < wall.z && -through.z > wall.y ? 1.0 : t <= 0.0 || t >= 1.0 ? 1.0 : 0.0;
+}
+float4 TransformWorldToShadowCoord(float3 place) { return float4(place, 1.0); }
+Light GetMainLight(float4 at)
+{
+    Light light = { half3(sunPlace.xyz), half3(sunColor.rgb), 1.0, half(open(at.xyz, 1e3 * sunPlace.xyz)), 0u };
+    return light;
+}
+int GetAdditionalLightsCount() { return 1; }
+Light GetAdditionalLight(uint i, float3 place, half4 mask)
+{
+    float3 toward = lightPlace.xyz - place;
+    Light light = { half3(normalize(toward)), half3(lightColor.rgb), 1.0 / dot(toward, toward), half(open(place, toward)), 0u };
+    return light;
+}
+"""
+
+
+@needs_spirv
+def test_urps_lights_fall_on_cells(folder: Path, told: dict[str, Any], asset: Asset) -> None:
+    """By a stand-in for URP's functions, with the shadow of the wall: the mean over 16 points of every cell, in Unity's axes."""
+    light = PointLight((-0.29, 0.03, 1.37), (1.0, 0.5, 2.0), falloff="inverse-square")
+    sun = LIGHTS["directional"]
+    assert isinstance(sun, DirectionalLight)
+    axes = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], float)  # of the asset from Unity's
+    turned = np.eye(4)
+    turned[:3, :3], turned[:3, 3] = axes.T, axes.T @ told["middle"]
+    toward = axes.T @ sun.direction
+    place = axes.T @ light.position
+    values: dict[str, Any] = {
+        "lightPlace": (*place, 1),
+        "lightColor": (*light.color, 1),
+        "sunPlace": (*toward, 0),
+        "sunColor": (*sun.color, 1),
+    }
+    values |= {"wall": (WALL, *DOOR, 0), "_SrbfWorldFromCell": turned, "_SrbfLift": [told["lift"]]}
+    with Passes() as passes:
+        program = passes.program(URP + shader_of(folder, "SrbfUrpIrradiance.hlsl"), "SrbfUrpIrradiance")
+        images = {f"_Srbf{name.capitalize()}": passes.texture(read_image(folder / told[name])) for name in ("places", "normals")}
+        shape = read_image(folder / told["places"]).shape[:2]
+        target = passes.texture(np.zeros((*shape, 4)))
+        passes.draw(program, target, images, values)
+        found = passes.read(target).reshape(-1, 4)[:, :3]
+    order = surfel_textures(asset).order
+    expected = by_points(Cells.of_image(asset.tables["cells"]), light, sun, told["lift"])[order]
+    assert not found[len(order) :].any()
+    np.testing.assert_allclose(found[: len(order)], expected, atol=5 * CLOSE * expected.max())
+    assert 0.05 < (expected[:, 0] == 0).mean() < 0.5
+
+
+def by_points(cells: Cells, light: PointLight, sun: DirectionalLight, lift: float) -> np.ndarray:
+    normals = cells.normals.astype(np.float64)
+    tangent, bitangent = frames(normals)
+    steps = (np.arange(4) + 0.5) / 4 - 0.5
+    total = np.zeros((len(normals), 3))
+    for s in steps:
+        for t in steps:
+            there = cells.places + np.sqrt(cells.areas)[:, None] * (s * tangent + t * bitangent) + lift * normals
+            vector = np.array(light.position) - there
+            squared = (vector**2).sum(axis=1)
+            cosine = np.maximum((vector * normals).sum(axis=1), 0) / np.sqrt(squared)
+            amount = cosine * np.minimum(1 / squared, 32 * np.pi / cells.areas) * seen(there, vector)
+            distant = np.broadcast_to(1e3 * np.array(sun.direction), vector.shape)
+            total += amount[:, None] * light.color + (np.maximum(normals @ sun.direction, 0) * seen(there, distant))[:, None] * sun.color
+    return total / 16
+
+
+def seen(start: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (WALL - start[:, 0]) / toward[:, 0]
+        y = start[:, 1] + t * toward[:, 1]
+    return ~((t > 0) & (t < 1) & ((y <= DOOR[0]) | (y >= DOOR[1])))
+
+
+@needs_spirv
+def test_every_entry_compiles_for_direct3d_too(folder: Path) -> None:
+    text = shader_of(folder, "SrbfSurfels.hlsl").replace("#define SHADER_API_GLCORE\n", "")
+    shader = (folder / "Srbf/Resources/SrbfSurfels.shader").read_text()
+    entries = {line.split()[-1] for line in shader.splitlines() if "#pragma vertex" in line}
+    assert all(spirv.compile_hlsl(text, "vert", entry) for entry in entries) and len(entries) == 3
+    for entry in (line.split()[-1] for line in shader.splitlines() if "#pragma fragment" in line):
+        assert spirv.compile_hlsl(text, "frag", entry)
+
+
+@needs_mono
+def test_c_sharp_reads_what_passes_need(folder: Path, told: dict[str, Any], ask: Callable[..., Any]) -> None:  # noqa: F811
+    said = ask(folder, [0.5, 2.0, 1.0])
+    assert said["surfels"] == [[told["patches"], told["triangles"], told["reach"], told["lift"], *told["middle"]]]
+    assert said["table"] == [[t["rows"], t["columns"], t["channels"], t["scale"], -(-t["columns"] // 64)] for t in told["tables"]]
+    np.testing.assert_array_equal(said["face"], [np.ravel(face_axes(face)) for face in range(6)])
+    np.testing.assert_allclose(said["frame"][0], np.ravel(frame_of(np.array([0.48, -0.6, 0.64]))), atol=1e-12)
+    np.testing.assert_allclose(said["frame"][1], np.ravel(frame_of(np.array([0.0, 0.0, 1.0]))), atol=1e-12)
+    emission = read_image(folder / told["emission"])
+    added = np.array(said["added"]).reshape(-1, 4)[:, :3]
+    np.testing.assert_allclose(added, emission[1] * [0.5, 2.0, 1.0], rtol=1e-6, atol=1e-7)
+    assert said["told"][0][0] > 50

@@ -1,0 +1,49 @@
+"""Captures of deep framebuffers without Blender: the cells of a made room are the pixels of its view."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from made_rooms import Room, divided, write_room
+
+from srbf.bake.gather_set import FoundSurfaces, GatherSet
+from srbf.capture import Capture
+from srbf.io import files
+from srbf.io.image import write_image
+
+
+def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
+    """As a bake finds them."""
+    corners = divided(room.corners, longest)
+    red = corners[:, :, 0].max(axis=1) < 1e-6
+    albedo = np.where(red[:, None], room.albedo[room.places[:, 0] < 1e-6][0], room.albedo[room.places[:, 0] > 1e-6][0])
+    box = np.concatenate([room.corners.reshape(-1, 3).min(axis=0), room.corners.reshape(-1, 3).max(axis=0)]).astype(np.float64)
+    return FoundSurfaces(
+        corners, albedo.astype(np.float32), red.astype(np.int64), room.corners, room.free[-12:], room.free, box, np.array(bounces)
+    )
+
+
+def view_of_room(
+    folder: Path, room: Room, pool: int, clusters: int | None = None, longest: float = 0.12, tested: int = 6, bounces: int = 64
+) -> Capture:
+    """The radiance of a view of all cells of a room, under point lights that are held out."""
+    transport = room.transport()
+    lights, images = [], []
+    for place in room.free[-tested:] if tested else []:
+        lights.append({"kind": "point", "position": place.tolist(), "role": "holdout"})
+        images.append(np.einsum("ijc,j->ic", transport, room.direct(place)) * room.albedo / np.pi)
+    light_set = GatherSet(pool, clusters, None, surfaces_of(room, longest, bounces))
+    keys = {"quantity": "radiance", "receiver": {"kind": "view"}, "albedo": "albedo.exr", **light_set.manifest()}
+    capture = write_room(folder, room, lights, images, np.zeros(len(room.places), np.int64), **keys)
+    albedo = np.zeros((capture.width * capture.height, 3), np.float32)
+    albedo[: len(room.places)] = room.albedo
+    write_image(folder / "albedo.exr", albedo.reshape(capture.height, capture.width, 3), "float")
+    coverage = np.zeros(capture.width * capture.height, np.float32)
+    coverage[: len(room.places)] = 1
+    write_image(folder / "coverage.exr", coverage.reshape(capture.height, capture.width, 1), "float")
+    manifest = {key: told for key, told in capture.manifest.items() if key != "patches"}
+    files.write_json(folder / "capture.json", manifest)
+    capture = Capture.open(folder)
+    light_set.trace(capture, 7, lambda done, total, what: None)
+    return Capture.open(folder)
