@@ -132,6 +132,7 @@ class FoundPlaces:
             "surfel_objects": surfels.objects.astype(np.int32),
             "surfel_albedo": surfels.cells.albedo,
             "surfel_emission": surfels.emission,
+            "surfel_hidden": surfels.hidden,
             "object_names": np.array(json.dumps(list(self.objects))),
             "bounces": np.array(-1 if self.bounces is None else self.bounces),
         }
@@ -146,7 +147,7 @@ class FoundPlaces:
             return found
         cells = replace(patches.cells, albedo=stored["surfel_albedo"])
         owners, objects = (stored[f"surfel_{name}"].astype(np.int64) for name in ("owners", "objects"))
-        surfels = Surfels(cells, stored["surfel_corners"], owners, objects, stored["surfel_emission"])
+        surfels = Surfels(cells, stored["surfel_corners"], owners, objects, stored["surfel_emission"], stored["surfel_hidden"])
         bounces = int(stored["bounces"])
         names = tuple(json.loads(str(stored["object_names"])))
         return replace(found, surfels=surfels, objects=names, bounces=None if bounces < 0 else bounces)

@@ -47,7 +47,7 @@ def pool_of(
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
         none, dark = Cells.of_image(np.zeros((2, 0, 4), np.float32)), np.zeros((0, 3), np.float32)
-        return Surfels(none, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark)
+        return Surfels(none, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark, np.zeros(0, bool))
     sides = both.at(kept)
     weight = gathered / max(float(gathered.sum()), 1e-30) + EVENLY * sides.areas / sides.areas.sum()
     scale = float(np.ptp(sides.centers, axis=0).max())
@@ -61,7 +61,7 @@ def pool_of(
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]
     dark = np.zeros((len(of_surfel), 3), np.float32)
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark)
+    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, np.zeros(len(of_surfel), bool))
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

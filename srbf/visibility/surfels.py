@@ -10,13 +10,13 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.emitting_sides import lighting_others
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
 from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, cells_of, exposed, grouped_cells, lit
 
 WITNESSES = 256  # free places by which it is known what a wall parts
 REACH, REACH_RAYS = 3, 64  # bounces and rays by which sides are found that no free place sees
-EMITTED_RAYS = 16
 LEAST_VIEW = 0.1  # share of such a side's hemisphere that lit surfaces fill
 SIDES = 1 << 14  # whose rays are traced at a time
 CUTS = 4  # halvings of a triangle that a wall parts
@@ -30,7 +30,8 @@ class Surfels:
     """Cells of every side of the surfaces that light can reach, and the triangles (T, 3, 3) that block bounces.
 
     `owners` (2, T): the surfel of the front and of the back of each triangle; -1 of sides that are out of reach. `objects` (S,): the number
-    of each surfel's object. `emission` (S, 3): mean radiance of what it emits itself.
+    of each surfel's object. `emission` (S, 3): mean radiance of what it emits itself. `hidden` (S,): those that emit into a gap which no
+    free place sees, narrower than a surfel, as the back of a picture does: receivers there are lit, and the bounces stay in the gap.
     """
 
     cells: Cells
@@ -38,6 +39,7 @@ class Surfels:
     owners: Int[ndarray, "2 T"]
     objects: Int[ndarray, " S"]
     emission: Float32[ndarray, "S 3"]
+    hidden: Bool[ndarray, " S"]
 
     @property
     def count(self) -> int:
@@ -110,12 +112,17 @@ def surfels_of(
     kept = np.flatnonzero(both.areas > 0)
     seen = np.zeros(len(both.corners), bool)
     seen[kept[exposed(both.at(kept), occluders, free)]] = True
-    kept = kept[reached(both, seen | _lights_others(both, object_of, shines))[kept]]
+    width = float(np.sqrt(both.areas.sum() / 2 / most)) if size is None else size
+    light, gap = lighting_others(both, object_of, shines, width)
+    kept, hidden = kept[(reached(both, seen) | light)[kept]], gap & ~seen
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
         nothing = Cells.of_image(np.zeros((2, 0, 4), np.float32))
-        return Surfels(nothing, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
-    sides = _Sides(both.at(kept), object_of[kept], shines[kept], lit(*_centers(both.at(kept)), occluders, free[:WITNESSES]))
+        dark = np.zeros((0, 3), np.float32)
+        return Surfels(nothing, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark, np.zeros(0, bool))
+    fragments = both.at(kept)
+    witnesses = lit(fragments.centers, fragments.normals, occluders, free[:WITNESSES])
+    sides = _Sides(fragments, object_of[kept], shines[kept], hidden[kept], witnesses)
     area = sides.fragments.areas * np.where(sides.is_dim, 1 / DIM_SIZE**2, 1.0)
     least = float(np.sqrt(area.sum() / most))
     spacing = least if size is None else max(size, least)
@@ -125,21 +132,23 @@ def surfels_of(
         owner = sides.owners(spacing)
     owners[kept] = owner
     count = int(owner.max()) + 1
-    of_cell = np.zeros(count, np.int64)
-    of_cell[owner] = sides.objects
+    of_cell, in_gap = np.zeros(count, np.int64), np.zeros(count, bool)
+    of_cell[owner], in_gap[owner] = sides.objects, sides.hidden
     own = np.maximum(np.bincount(owner, sides.fragments.areas, count), 1e-30)
     flux = np.stack([np.bincount(owner, sides.fragments.areas * sides.emission[:, c], count) for c in range(3)], axis=1)
     cells = grouped_cells(sides.fragments, owner)
-    return Surfels(cells, surfaces.corners, owners.reshape(2, -1), of_cell, (flux / own[:, None]).astype(np.float32))
+    radiance = (flux / own[:, None]).astype(np.float32)
+    return Surfels(cells, surfaces.corners, owners.reshape(2, -1), of_cell, radiance, in_gap)
 
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sides that have surfels: `objects` (N,), `emission` (N, 3) and `seen` (N, F), from which free places."""
+    """Sides that have surfels: `objects` (N,), `emission` (N, 3), which are `hidden`, and `seen` (N, F), from which free places."""
 
     fragments: Fragments
     objects: Int[ndarray, " N"]
     emission: Float32[ndarray, "N 3"]
+    hidden: Bool[ndarray, " N"]
     seen: Bool[ndarray, "N F"]
 
     @property
@@ -157,7 +166,7 @@ class _Sides:
         return _parted_cells(owner, self.seen)
 
     def _apart(self, spacing: float) -> Int[ndarray, " N"]:
-        """What no surfel has two of: objects, small ones of many together unless they emit; and steps of what an object emits."""
+        """What no surfel has two of: objects, small ones of many together unless they emit; steps of emission; hidden sides."""
         count = int(self.objects.max()) + 1
         strength = self.emission.max(axis=1)
         most = np.zeros(count)
@@ -165,11 +174,7 @@ class _Sides:
         large = np.bincount(self.objects, self.fragments.areas, count) >= spacing**2
         own = (most > 0) | large | (len(np.unique(self.objects)) <= MOST_OBJECTS)
         step = np.ceil(EMISSION_STEPS * strength / np.maximum(most, 1e-30)[self.objects]).astype(np.int64)
-        return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1)
-
-
-def _centers(sides: Fragments) -> tuple[Float64[ndarray, "T 3"], Float64[ndarray, "T 3"]]:
-    return sides.centers, sides.normals
+        return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1) * 2 + self.hidden
 
 
 def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
@@ -195,19 +200,6 @@ def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
         now = received >= LEAST_VIEW * areas
         last = np.flatnonzero(now & ~found)
         found |= now
-    return found
-
-
-def _lights_others(both: Fragments, objects: Int[ndarray, " T"], emission: Float32[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
-    """Sides that emit to where other objects are: the back of a picture lights the wall, the inside of a tube nothing else."""
-    half, own = len(both.corners) // 2, np.flatnonzero(emission.any(axis=1) & (both.areas > 0))
-    found = np.zeros(len(both.corners), bool)
-    lift = OFFSET * float(np.ptp(both.corners.reshape(-1, 3), axis=0).max(initial=0))
-    starts = np.repeat(both.centers[own] + lift * both.normals[own], EMITTED_RAYS, axis=0)
-    directions = cosine_directions(both.normals[own][:, None], EMITTED_RAYS, np.random.default_rng(0))[:, 0].reshape(-1, 3)
-    triangle, _, _ = EmbreeTriangles(both.corners[:half]).first_hit(starts, directions)
-    other = (triangle >= 0) & (objects[triangle] != np.repeat(objects[own], EMITTED_RAYS))
-    found[own] = other.reshape(-1, EMITTED_RAYS).any(axis=1)
     return found
 
 

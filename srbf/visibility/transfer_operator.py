@@ -76,6 +76,8 @@ class TransferOperator:
         spread = RayOrigins.even(*surfels.spread(POINTS, seed))
         own, environment = factors_and_environment(surfels, Openings(receivers.triangles), spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
         own = aimed.put(own, spread, len(chosen), _hash(seed, -1))
+        own.data[surfels.hidden[np.repeat(np.arange(surfels.count), np.diff(own.indptr))] | surfels.hidden[own.indices]] = 0
+        own.eliminate_zeros()
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)

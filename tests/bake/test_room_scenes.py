@@ -28,6 +28,7 @@ CLOSED = {
     "cornell_box": (("-1,-1,0", "1,1,2"), (), ["Room", "Short block", "Tall block"]),
     "cornell_box with a hole": (("-2.5,-1,0", "1,1,2"), ("--hole",), ["Anteroom", "Room", "Short block", "Tall block"]),
     "maze": (("0,0,0", "6,6,2"), (), ["Ceiling", "Floor", "Walls"]),
+    "studio": (("0,0,0", "4,3,2.5"), (), ["Block", "Picture", "Room", "Screen", "Table", "Television", "Tube"]),
     "glossy_figure": (("-1.5,-1.5,0", "1.5,1.5,2.4"), (), ["Pedestal", "Rabbit", "Room"]),
 }
 

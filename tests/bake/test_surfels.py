@@ -45,7 +45,7 @@ def test_a_capture_holds_an_operator_in_place_of_train_lights(whole: Path) -> No
     rows = np.asarray(operator.receivers.sum(axis=1))
     covered = capture.coverage().ravel() > 0.5
     assert operator.receivers.shape == (32 * 32, told["count"]) and not rows[capture.coverage().ravel() == 0].any()
-    assert np.quantile(rows[covered], 0.1) > 0.5 and rows.max() < 1.001  # what opens or emits takes the rest
+    assert np.quantile(rows[covered], 0.1) > 0.5 and rows.max() < 1.03  # openings take the rest; what emits is measured apart
     flux = operator.cells.areas[:, None] * operator.exchange.toarray()
     assert np.linalg.norm(flux - flux.T) < 0.5 * np.linalg.norm(flux), "the rays of both agree"
 

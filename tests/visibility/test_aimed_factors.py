@@ -78,6 +78,6 @@ def test_points_of_a_receiver_weigh_as_told() -> None:
 
 def test_without_emission_rays_stay_as_they_are() -> None:
     found = under_a_small_square()
-    dark = Surfels(found.cells, found.corners, found.owners, found.objects, np.zeros_like(found.emission))
+    dark = Surfels(found.cells, found.corners, found.owners, found.objects, np.zeros_like(found.emission), found.hidden)
     factors = form_factors(found, places(), 64)
     assert AimedFactors(dark).put(factors, places(), 16, 0) is factors
