@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Diffuse albedo of fragments of meshes, by Cycles from the scene's own materials."""
+"""Diffuse albedo and emission of fragments of meshes, by Cycles from the scene's own materials."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import numpy as np
 from blender_bake.vertex_albedo import ATTRIBUTE, bake_colors, corner_colors
 
 Kinds = tuple[str, ...]  # of reflection that make up an albedo
+EMISSION: Kinds = ("EMIT",)  # and what stands for emission, W/(m2 sr)
+BRIGHTEST = 1e6  # radiance
 GRAY = 0.8  # of a face without a material
 EVEN = {  # nodes whose color is the same all over a surface, if that of their inputs is
     *("ShaderNodeMixShader", "ShaderNodeAddShader", "ShaderNodeRGB", "ShaderNodeValue", "ShaderNodeMath", "ShaderNodeMix"),
@@ -82,8 +84,16 @@ def varies(material: bpy.types.Material | None) -> bool:
     return any(node.bl_idname not in EVEN and "Bsdf" not in node.bl_idname for node in _behind_colors(material.node_tree))
 
 
+def faces_front(material: bpy.types.Material) -> bool:
+    """Whether a material looks at which side of a face is seen, so that its back may emit nothing."""
+    tree = material.node_tree if material.use_nodes else None
+    return tree is not None and any(
+        node.bl_idname == "ShaderNodeNewGeometry" and node.outputs["Backfacing"].is_linked for node in _behind_colors(tree)
+    )
+
+
 def even_albedo(scene: bpy.types.Scene, materials: list[bpy.types.Material], kinds: Kinds) -> dict[bpy.types.Material, np.ndarray]:
-    """(3,) albedo of each material that does not vary. Hides all other objects."""
+    """(3,) albedo, or emission, of each material that does not vary. Hides all other objects."""
     if not materials:
         return {}
     count = len(materials)
@@ -101,7 +111,9 @@ def varying_albedo(
     matrix: np.ndarray,
     kinds: Kinds,
 ) -> np.ndarray:
-    """(F, 3) albedo of fragments, `corners` (F, 3, 3) in the frame that `matrix` (4, 4) puts into the world, slots (F,) of `materials`.
+    """(F, 3) albedo, or emission, of fragments, `corners` (F, 3, 3) in the frame that `matrix` (4, 4) puts into the world.
+
+    slots (F,): of `materials`.
 
     attributes: at the fragments' corners, and the mesh's texture space, which generated coordinates depend on. Hides all other objects.
     """
@@ -113,11 +125,11 @@ def bake(scene: bpy.types.Scene, mesh: bpy.types.Mesh, matrix: np.ndarray, kinds
     colors = np.zeros((len(mesh.loops), 3), np.float32)
     for kind in kinds:
         (obj,) = bake_colors(scene, [(mesh, matrix)], kind)
-        colors += corner_colors(mesh)
+        colors += corner_colors(mesh, BRIGHTEST if kind in EMISSION else 1.0)
         mesh.color_attributes.remove(mesh.color_attributes[ATTRIBUTE])
         bpy.data.objects.remove(obj)
     bpy.data.meshes.remove(mesh)
-    return np.minimum(colors, 1).reshape(-1, 3, 3).mean(axis=1)
+    return (colors if kinds == EMISSION else np.minimum(colors, 1)).reshape(-1, 3, 3).mean(axis=1)
 
 
 def _behind_colors(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:

@@ -10,7 +10,8 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake.fragment_albedo import GRAY, Attributes, Kinds, even_albedo, varies, varying_albedo
+from blender_bake.emission_switch import emits
+from blender_bake.fragment_albedo import EMISSION, GRAY, Attributes, Kinds, even_albedo, faces_front, varies, varying_albedo
 from blender_bake.ipc import Events, WorkerError
 from blender_bake.scene_file import Shown, corners_of, rendered, show_as_rendered
 from blender_bake.translucency import _passes
@@ -18,6 +19,7 @@ from blender_bake.without_triangles import is_only_volume
 
 MOST = 400_000  # fragments, unless the scene has more triangles
 PER_SQUARE = 6.0  # fragments per square of the longest edge, about
+PARTS = 2  # halvings of every edge of a fragment whose emission varies: textures are finer than fragments
 SCALES = 20  # steps of scale, per factor e, within which instances are divided in the same way
 
 
@@ -33,6 +35,8 @@ class _Shape:
     parents: np.ndarray
     weights: np.ndarray
     albedo: np.ndarray
+    emission: np.ndarray
+    one_sided: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     corners (T, 3, 3) float32 in the world, wound so that normals point as they render; albedo (T, 3) float32, diffuse color by Cycles: 0 of
     metal, glass and black, with `gloss` also what gloss reflects, as if it were diffuse; object (T,) int32 of `names`, a list; transparent
     (T,) bool: of a material that light passes; occluders (O, 3, 3) float32: the undivided triangles that cast shadows and are not
-    transparent; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
+    transparent; emission (T, 3) float32, radiance of the front, and one_sided (T,) bool: of a material whose back may emit less, see
+    `faces_front`; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
     scene: objects are hidden. WorkerError where nothing renders.
     """
     show_as_rendered(scene)
@@ -74,6 +79,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     if divided > 1.001 * longest:
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
     transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
+    _shine(scene, shapes)
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}
     corners = []
@@ -88,6 +94,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
         "object": np.concatenate([np.full(len(part), numbers[one.name], np.int32) for part, one in zip(corners, placed, strict=True)]),
         "names": names,
         "transparent": np.concatenate([transparent[one.key] for one in placed]),
+        "emission": np.concatenate([shapes[one.key].emission for one in placed]).astype(np.float32),
+        "one_sided": np.concatenate([shapes[one.key].one_sided for one in placed]),
         "occluders": np.concatenate([np.zeros((0, 3, 3), np.float32), *occluders]),
         "longest": divided,
     }
@@ -156,6 +164,39 @@ def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds:
     return transparent
 
 
+def _shine(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> None:
+    """Set what every shape emits."""
+    used = dict.fromkeys(shape.materials[slot] for shape in shapes.values() for slot in np.unique(shape.slots))
+    emitting = [material for material in used if material is not None and emits(material)]
+    fronts = {material: faces_front(material) for material in emitting}
+    even = even_albedo(scene, [material for material in emitting if not varies(material)], EMISSION)
+    cuts = _subdivision(PARTS)
+    for shape in shapes.values():
+        slots = shape.slots[shape.parents]
+        shape.emission = np.array([even.get(material, np.zeros(3)) for material in shape.materials])[slots]
+        shape.one_sided = np.array([fronts.get(material, False) for material in shape.materials])[slots]
+        varying = np.array([material in fronts and material not in even for material in shape.materials])[slots]
+        if varying.any():
+            assert shape.attributes is not None
+            parents = np.repeat(shape.parents[varying], len(cuts))
+            weights = np.einsum("cij,fjk->fcik", cuts, shape.weights[varying]).reshape(-1, 3, 3)
+            corners = np.einsum("fij,fjk->fik", weights, shape.corners[parents])
+            attributes = _interpolated(shape.attributes, parents, weights)
+            within = np.repeat(slots[varying], len(cuts))
+            found = varying_albedo(scene, corners, within, shape.materials, attributes, shape.matrix, EMISSION)
+            shape.emission[varying] = found.reshape(-1, len(cuts), 3).mean(axis=1)
+
+
+def _subdivision(times: int) -> np.ndarray:
+    """(4 ** times, 3, 3): barycentric coordinates of the corners of equal parts of a triangle, every edge halved so many times."""
+    parts = np.eye(3)[None]
+    for _ in range(times):
+        first, second, third = np.moveaxis(parts, 1, 0)
+        ab, bc, ca = (first + second) / 2, (second + third) / 2, (third + first) / 2
+        parts = np.concatenate([np.stack(part, axis=1) for part in ((first, ab, ca), (ab, second, bc), (ca, bc, third), (ab, bc, ca))])
+    return parts
+
+
 def _interpolated(attributes: Attributes, parents: np.ndarray, weights: np.ndarray) -> Attributes:
     def at(values: np.ndarray) -> np.ndarray:
         return np.einsum("fij,fjc->fic", weights, values.reshape(-1, 3, values.shape[1])[parents]).reshape(-1, values.shape[1])
@@ -210,7 +251,7 @@ def _of_mesh(shown: Shown, mesh: bpy.types.Mesh, shapes: dict[tuple[Any, ...], _
         mesh.loop_triangles.foreach_get("polygon_index", faces)
         attributes = Attributes.of(mesh, found.loops.reshape(-1, 3)[kept].ravel(), faces[kept])
     nothing = np.zeros(0)
-    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, nothing, nothing, nothing), key
+    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, *(nothing,) * 5), key
 
 
 def _materials(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:

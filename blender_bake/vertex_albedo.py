@@ -43,7 +43,7 @@ class AlbedoBakes:
 def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.ndarray]], kind: str = "DIFFUSE") -> list[bpy.types.Object]:
     """Objects of meshes and transforms, whose attribute is now the color of every corner; all else is hidden from rendering.
 
-    kind: DIFFUSE, or GLOSSY, what its gloss reflects of light along the normal.
+    kind: DIFFUSE; GLOSSY, what its gloss reflects of light along the normal; or EMIT.
     """
     for other in scene.objects:
         other.hide_render = True
@@ -75,8 +75,8 @@ def bake_colors(scene: bpy.types.Scene, placed: list[tuple[bpy.types.Mesh, np.nd
     return objects
 
 
-def corner_colors(mesh: bpy.types.Mesh) -> np.ndarray:
-    """(corners, 3) linear colors, 0 to 1, of a mesh that was baked."""
+def corner_colors(mesh: bpy.types.Mesh, most: float = 1.0) -> np.ndarray:
+    """(corners, 3) linear colors, 0 to `most`, of a mesh that was baked."""
     colors = np.empty(len(mesh.loops) * 4, np.float32)
     mesh.color_attributes[ATTRIBUTE].data.foreach_get("color", colors)
-    return np.clip(np.nan_to_num(colors.reshape(-1, 4)[:, :3]), 0, 1)
+    return np.clip(np.nan_to_num(colors.reshape(-1, 4)[:, :3]), 0, most)

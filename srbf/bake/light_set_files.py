@@ -10,7 +10,8 @@ from typing import Any
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE, CloudSet
 from srbf.bake.settings import BakeSettings
-from srbf.capture import Capture
+from srbf.bake.surface_checks import warn_of_receivers
+from srbf.capture import COVERED, Capture
 from srbf.io.image import write_image
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.transfer_operator import TransferOperator, is_traced
@@ -39,8 +40,13 @@ def write_probes(folder: Path, settings: BakeSettings) -> None:
         settings.receiver.probes.write(folder)
 
 
-def trace_operator(receivers: Capture, settings: BakeSettings, progress: Callable[[int, int, str], None]) -> None:
-    """Form factors of surfels by rays, into the folder of `receivers`, a capture without lights; nothing where they are there already."""
+def trace_operator(
+    receivers: Capture, settings: BakeSettings, progress: Callable[[int, int, str], None], say: Callable[[str], None] = lambda line: None
+) -> None:
+    """Form factors of surfels by rays, into the folder of `receivers`, a capture without lights; nothing where they are there already.
+
+    `say` gets a line where receivers see no surface; InputError where none of them does.
+    """
     light_set = settings.light_set
     if isinstance(light_set, GatherSet):
         light_set.trace(receivers, settings.seed, progress)
@@ -56,4 +62,5 @@ def trace_operator(receivers: Capture, settings: BakeSettings, progress: Callabl
         settings.seed,
         lambda done, total: progress(done, total, "form factors"),
     )
+    warn_of_receivers(operator, receivers.coverage().ravel() >= COVERED, say)
     operator.write(receivers.folder, key)

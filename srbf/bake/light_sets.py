@@ -131,6 +131,7 @@ class FoundPlaces:
             "surfel_owners": surfels.owners.astype(np.int32),
             "surfel_objects": surfels.objects.astype(np.int32),
             "surfel_albedo": surfels.cells.albedo,
+            "surfel_emission": surfels.emission,
             "object_names": np.array(json.dumps(list(self.objects))),
             "bounces": np.array(-1 if self.bounces is None else self.bounces),
         }
@@ -145,7 +146,7 @@ class FoundPlaces:
             return found
         cells = replace(patches.cells, albedo=stored["surfel_albedo"])
         owners, objects = (stored[f"surfel_{name}"].astype(np.int64) for name in ("owners", "objects"))
-        surfels = Surfels(cells, stored["surfel_corners"], owners, objects)
+        surfels = Surfels(cells, stored["surfel_corners"], owners, objects, stored["surfel_emission"])
         bounces = int(stored["bounces"])
         names = tuple(json.loads(str(stored["object_names"])))
         return replace(found, surfels=surfels, objects=names, bounces=None if bounces < 0 else bounces)

@@ -254,7 +254,7 @@ class _Passes:
             if self._shard is None or self._shard.is_preparation:
                 assert self._images.prepared is not None
                 manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])
-                trace_operator(Capture(self._folder, manifest, ()), self._settings, self._reporter.progress)
+                trace_operator(Capture(self._folder, manifest, ()), self._settings, self._reporter.progress, self._reporter.say)
             try:
                 self._passes(pool)
             except KeyboardInterrupt:

@@ -18,6 +18,7 @@ from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlac
 from srbf.bake.probes import facts_line, grid_of
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings, LightSet
+from srbf.bake.surface_checks import require_surfels, warn_of_surfaces
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
@@ -202,7 +203,12 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
     if light_set.kind == "surfels":
         opaque = arrays["transparent"] < 0.5
         surfaces = Fragments(arrays["corners"][opaque], arrays["albedo"][opaque])
-        surfels = surfels_of(surfaces, arrays["object"][opaque].astype(np.int64), occluders, free, light_set.spacing, light_set.count)
+        warn_of_surfaces(surfaces, say)
+        front = arrays["emission"][opaque]
+        emission = np.stack([front, np.where(arrays["one_sided"][opaque, None] > 0.5, 0, front)])
+        objects = arrays["object"][opaque].astype(np.int64)
+        surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, light_set.count, emission)
+        require_surfels(surfels)
         patches = ungrouped(surfels.cells)
     else:
         patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)

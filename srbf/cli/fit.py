@@ -39,7 +39,7 @@ def fit(
     """Fit an asset to the train lights and measure its error on every role of the capture.
 
     Without flags: the best within 16 bytes per texel. -k N fits relighting maps, --components N an eigen map, --clusters N a clustered
-    one; --budget and --psnr choose among them.
+    one; --budget, --psnr and --error choose among them.
 
     Validation and holdout are measured on every texel. Train is measured on the images as they stream by, a sample of the texels where
     they are many: `srbf evaluate` reads them all again. With --dask other machines fit blocks of rows, and train is read once more here.
@@ -51,11 +51,11 @@ def fit(
     watch = None
     if dask is not None:
         with progress_bar("fit") as update, Cluster(checked(dask), note) as cluster:
-            asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster)), stitch)
+            asset = encode(chosen, opened, FitRun(update, solve_rows=partial(_solve_rows, cluster), say=note), stitch)
     else:
         watch = TrainErrorAccumulator(opened)
         with progress_bar("fit") as update:
-            asset = encode(chosen, opened, FitRun(update, watch.look), stitch)
+            asset = encode(chosen, opened, FitRun(update, watch.look, say=note), stitch)
     fitted = time.perf_counter()
     if (caution := chosen.caution(opened)) is not None:
         note(caution)

@@ -13,7 +13,7 @@ import typer
 
 from srbf.cli.flags import flags_alone
 from srbf.cli.group import Command
-from srbf.cli.values import COUNT, Number
+from srbf.cli.values import COUNT, Number, Parsed, parse_share
 from srbf.fitting.auto_method import DEFAULT_BUDGET
 from srbf.fitting.options import AUTO, check_settings
 from srbf.registry import all_methods, method_named, method_names
@@ -88,6 +88,16 @@ def _flags() -> dict[str, Any]:
             metavar="DECIBELS",
             parser=Number(),
             help="auto: to reach on held-out lights with the fewest bytes.",
+            show_default=False,
+        ),
+    ]
+    flags["error"] = Annotated[
+        float | None,
+        typer.Option(
+            "--error",
+            metavar="SHARE",
+            parser=Parsed(parse_share),
+            help="auto, transfer: relative RMSE on held-out lights that is not to be exceeded, as 5% or .05.",
             show_default=False,
         ),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -129,6 +130,9 @@ def relight(
     ] = None,
     fps: Annotated[float, typer.Option(metavar="N", parser=POSITIVE, help="With --fade: frames per second.")] = 24.0,
     ambient_only: Annotated[bool, typer.Option("--ambient-only", help="No light: the ambient light that the scene itself emits.")] = False,
+    ambient: Annotated[
+        bool, typer.Option("--ambient/--no-ambient", help="Add the ambient light that the scene itself emits, where the capture had any.")
+    ] = True,
     direct: Annotated[
         Literal["none", "ray", "shadow-map", "pca"] | None,
         typer.Option(help="Direct light added to an indirect asset; default: ray, without embreex shadow-map.", show_default=False),
@@ -196,6 +200,8 @@ def relight(
         raise typer.BadParameter("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
     if ambient_only and (has_light or lights is not None):
         raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
+    if ambient_only and not ambient:
+        raise typer.BadParameter("expected --ambient-only or --no-ambient, found both; leave one out")
     if not (has_light or ambient_only or lights is not None):
         raise typer.BadParameter(
             "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment "
@@ -212,13 +218,13 @@ def relight(
     if picture and alpha == "premultiplied":
         raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     if lights is not None:
-        opened = _opened(asset, painted)
+        opened = _opened(asset, painted, ambient)
         frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
-    opened = _opened(asset, painted)
+    opened = _opened(asset, painted, ambient)
     places = None if at is None else read_places(at)
     if harmonics or places is not None:
         probe_light.grid_of(opened)
@@ -291,8 +297,10 @@ def _atlas(asset: Asset, image: np.ndarray) -> np.ndarray:
     return probe_light.grid_of(asset).image(probe_light.harmonics(asset, image))
 
 
-def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]]) -> Asset:
+def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]], ambient: bool) -> Asset:
     opened = Asset.open(folder)
+    if not ambient:
+        opened = replace(opened, images={name: image for name, image in opened.images.items() if name != "ambient"})
     return with_albedo(opened, albedo) if albedo else opened
 
 

@@ -87,6 +87,18 @@ def duration(text: str | float) -> float:
     return seconds
 
 
+def parse_share(text: str) -> float:
+    """`5%` or `.05`: above 0 and below 1."""
+    percent = text.strip().endswith("%")
+    try:
+        share = float(text.strip().removesuffix("%")) / (100 if percent else 1)
+    except ValueError:
+        share = math.nan
+    if not 0 < share < 1:
+        raise InputError(f"expected a share above 0 and below 1, such as 5% or .05, found {text!r}")
+    return share
+
+
 @dataclass(frozen=True)
 class Parsed(Generic[T]):
     """What a function of the library makes of a text; its InputError is wrong usage."""

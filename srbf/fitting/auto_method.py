@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
 from srbf.light_domain import Directions, domain_of_capture
-from srbf.methods.protocol import Method
+from srbf.methods.protocol import Method, check_error
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
 
@@ -31,10 +31,12 @@ LEAST_LIGHTS = 8  # that a choice without validation lights needs
 WORTH = 0.2  # dB that more clusters or more bytes must bring to be chosen
 
 
-def check_budget(budget: int | None, psnr: float | None) -> None:
-    """InputError on a budget below LEAST_BUDGET, on a PSNR that is no number, or on both."""
-    if budget is not None and psnr is not None:
-        raise InputError("expected a `budget` or a `psnr`, found both")
+def check_budget(budget: int | None, psnr: float | None, error: float | None = None) -> None:
+    """InputError on a budget below LEAST_BUDGET, on a PSNR or an error that is none, and on a PSNR beside one of the others."""
+    if psnr is not None and (budget is not None or error is not None):
+        other = "budget" if error is None else "error"
+        raise InputError(f"expected a `{other}` or a `psnr`, found both")
+    check_error(error)
     if budget is not None and budget < LEAST_BUDGET:
         raise InputError(f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, found {budget}")
     if psnr is not None and not np.isfinite(psnr):
@@ -45,25 +47,27 @@ def within_budget(
     capture: Capture,
     budget: int | None = None,
     psnr: float | None = None,
+    error: float | None = None,
     say: Callable[[str], None] = lambda line: None,
     **settings: Any,
 ) -> Method:
-    """The method that does best on held-out lights of a texel sample: within `budget` bytes per texel, or with the fewest bytes that reach
-    `psnr` dB, or its best if none does.
+    """The method that does best on held-out lights of a texel sample: within `budget` bytes per texel, or with the fewest bytes, within a
+    budget if there is one, that reach `psnr` dB, or a relative RMSE of `error`, or its best if none does.
 
     Error is that of the validation lights. Without them it is estimated at each train light: what the candidate loses there, and what
     every candidate misses between the lights, measured by leaving that light out (`_between_lights`). Of near equals (WORTH) the one with
     fewer light functions is taken.
+    Surfels know any light: there `transfer` itself chooses by `error`.
     With fewer than LEAST_LIGHTS train lights and no validation lights the simplest is taken. `settings` go to the method. InputError on a
-    budget below LEAST_BUDGET, or on both budget and psnr.
+    budget below LEAST_BUDGET, or on psnr beside budget or error.
     """
-    check_budget(budget, psnr)
+    check_budget(budget, psnr, error)
     if capture.kind in ("surfel", "pool"):  # any light is known, and bytes alone decide
         if psnr is not None:
             raise InputError("expected a `budget` for a capture of surfels, found `psnr`: it has no train lights to measure by")
         (chosen,) = _candidates(capture, budget or DEFAULT_BUDGET, int((capture.coverage() >= COVERED).sum()), 0)
-        say(f"chose {chosen}")
-        return _with(chosen, settings)
+        say(f"chose {chosen}{'' if error is None else ' at most'}")
+        return _with(chosen, settings if error is None else {**settings, "error": error})
     covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
     texels = covered if len(covered) <= TRIED_TEXELS else np.sort(np.random.default_rng(0).choice(covered, TRIED_TEXELS, replace=False))
     trial = capture.load(texels)
@@ -76,22 +80,24 @@ def within_budget(
         return _with(simplest, settings)
     missed = _between_lights(trial) if estimated else None
     ratio = len(covered) / max(1, len(texels))
-    sizes = [size] if psnr is None else range(LEAST_BUDGET, MOST_SIZE + 1, 4)
-    best: tuple[float, Method] | None = None
+    aimed = psnr is not None or error is not None
+    sizes = range(LEAST_BUDGET, (budget or MOST_SIZE) + 1, 4) if aimed else [size]
+    best: tuple[Reached, Method] | None = None
     for tried_size in sizes:
         for method in _candidates(trial, tried_size, len(covered), numbers):
             tried = method.on_sample(ratio)  # as many texels per cluster as there will be
             reached = _reached(_with(tried, settings).encode(trial), trial, missed)
-            if best is None or reached > best[0] + WORTH:
+            if best is None or reached.psnr > best[0].psnr + WORTH:
                 best = (reached, method)
-        assert best is not None, "no candidate fits"
-        if psnr is not None and best[0] >= psnr:
+        if best is not None and best[0].meets(psnr, error):
             break
     assert best is not None, "no candidate fits"
     reached, method = best
-    if psnr is not None and reached < psnr:
-        say(f"expected {psnr:g} dB on held-out lights of a sample, found {reached:.1f} at most; taking that")
-    say(f"chose {method}")
+    if psnr is not None and not reached.meets(psnr, None):
+        say(f"expected {psnr:g} dB on held-out lights of a sample, found {reached.psnr:.1f} at most; taking that")
+    if error is not None and not reached.meets(None, error):
+        say(f"expected an error of {error:.2%} on held-out lights of a sample, found {reached.error:.2%} at least; taking that")
+    say(f"chose {method}" if error is None else f"chose {method}: relative RMSE {reached.error:.2%} on held-out lights of a sample")
     return _with(method, settings)
 
 
@@ -125,11 +131,26 @@ def _between_lights(capture: Capture) -> Float64[ndarray, " L"]:
     return sample.held_out().single(path, model.ridge) / 4
 
 
-def _reached(asset: Asset, capture: Capture, missed: Float64[ndarray, " L"] | None) -> float:
-    """PSNR (dB) of a trial on the validation lights, or its estimate from the train lights; named lights are all there are."""
+@dataclass(frozen=True)
+class Reached:
+    """PSNR (dB) and relative RMSE of a trial."""
+
+    psnr: float
+    error: float
+
+    def meets(self, psnr: float | None, error: float | None) -> bool:
+        """What is asked, if anything is."""
+        return (psnr is not None and self.psnr >= psnr) or (error is not None and self.error <= error)
+
+
+def _reached(asset: Asset, capture: Capture, missed: Float64[ndarray, " L"] | None) -> Reached:
+    """Of a trial on the validation lights, or its estimate from the train lights; named lights are all there are."""
     if missed is None:
         role: Role = "validation" if capture.indices("validation") else "train"
-        return float(evaluate(asset, capture, roles=(role,))[role]["psnr"])
+        found = evaluate(asset, capture, roles=(role,))[role]
+        return Reached(float(found["psnr"]), float(found["relative_rmse"]))
     errors = evaluate(asset, capture, roles=("train",))
-    squares = np.array([light["rmse"] ** 2 for light in errors["lights"]]) + missed
-    return float(np.mean([psnr_of(errors["train"]["peak"], float(np.sqrt(square))) for square in squares]))
+    squares = np.array([light["rmse"] ** 2 for light in errors["lights"]])
+    power = (errors["train"]["rmse"] / max(errors["train"]["relative_rmse"], 1e-30)) ** 2  # mean square of the images
+    psnr = float(np.mean([psnr_of(errors["train"]["peak"], float(np.sqrt(square))) for square in squares + missed]))
+    return Reached(psnr, float(np.sqrt((squares + missed).mean() / max(power, 1e-30))))

@@ -16,7 +16,7 @@ from srbf.methods.protocol import QUIET, FitRun, Method
 from srbf.registry import all_methods, method_named, method_names
 
 AUTO = "auto"
-BUDGET_SETTINGS = ("budget", "psnr")  # of a choice
+BUDGET_SETTINGS = ("budget", "psnr", "error")  # of a choice
 
 
 def fit(
@@ -37,7 +37,8 @@ def fit(
     method
         `relighting-map`, `eigen-map`, `clustered-eigen-map`, or one with its settings, such as `RelightingMap(k=25)`. By default what the
         settings imply (`k` relighting maps, `components` an eigen map, `clusters` a clustered one), and without those `auto`: the best
-        within `budget` bytes per texel (16), or with the fewest bytes that reach `psnr` dB on held-out lights of a sample.
+        within `budget` bytes per texel (16), or with the fewest bytes that reach `psnr` dB, or a relative RMSE of `error`, on held-out
+        lights of a sample.
     stitch
         Close the seams of the UV layer, where the capture has any.
     run
@@ -65,6 +66,8 @@ def fit(
     >>> fit(capture, budget=8).bytes_per_texel()["directional"] <= 8
     True
     """
+    if run.say is QUIET.say:
+        run = replace(run, say=say)
     if isinstance(method, Method):
         if settings:
             raise InputError(f"expected settings within the method, found {', '.join(settings)} beside {method.name}")
@@ -105,7 +108,7 @@ def check_settings(method: str | None, settings: dict[str, Any]) -> str:
     name = implied_method(settings) if method is None else _variant(method, settings)
     if name == AUTO:
         _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
-        check_budget(settings.get("budget"), settings.get("psnr"))
+        check_budget(settings.get("budget"), settings.get("psnr"), settings.get("error"))
     else:
         _check_known(name, settings, method_named(name).settings())
         chosen = method_named(name)
@@ -155,7 +158,7 @@ def _shared_settings() -> set[str]:
 def _check_known(name: str, settings: dict[str, Any], known: Any) -> None:
     for setting in settings:
         if setting not in known:
-            owners = [AUTO] if setting in BUDGET_SETTINGS else [m.name for m in all_methods() if setting in m.settings()]
+            owners = [AUTO] * (setting in BUDGET_SETTINGS) + [m.name for m in all_methods() if setting in m.settings()]
             if not owners:
                 raise InputError(f"expected settings of {', '.join((*method_names(), AUTO))}, found {setting!r}")
             raise InputError(f"`{setting}` applies only to method {' or '.join(owners)}, found it with method {name}")

@@ -40,18 +40,26 @@ def setting(default: Any, help: str, *, flag: str | None = None, words: tuple[st
     return field(default=default, metadata={"help": help, "flag": flag, "words": words})
 
 
+def check_error(error: float | None) -> None:
+    """InputError on an error that is no share."""
+    if error is not None and not 0 < error < 1:
+        raise InputError(f"expected `error` above 0 and below 1 (100 %), found {error:g}")
+
+
 @dataclass(frozen=True)
 class FitRun:
     """What a fit reports to, and what does parts of its work.
 
     `progress(done, total)` counts images. `on_image(row, image)` sees every train image once as it is read, in any thread. `stitch` closes
-    the seams of the UV layer. `solve_rows` has blocks of rows solved elsewhere, where the method can; `on_image` sees none then.
+    the seams of the UV layer. `say` gets a line on what a fit chose. `solve_rows` has blocks of rows solved elsewhere, where the method
+    can; `on_image` sees none then.
     """
 
     progress: Callable[[int, int], None] = lambda done, total: None
     on_image: OnImage = lambda row, image: None
     stitch: Stitch | None = None
     solve_rows: SolveRows | None = None
+    say: Callable[[str], None] = lambda line: None
 
 
 QUIET = FitRun()

@@ -19,8 +19,8 @@ from srbf.asset_reader import AssetReader
 from srbf.errors import InputError
 from srbf.methods.environment_table import without_environment_table
 from srbf.solve.radiosity import MOST_REFLECTED, SERIES
-from srbf.visibility.surface_cells import Cells
-from srbf.visibility.transfer_basis import TransferBasis, grouped
+from srbf.visibility.transfer_basis import Emitted, TransferBasis, grouped
+from srbf.visibility.transfer_operator import TransferOperator
 
 KEY = "surfaces"
 FILES = {
@@ -30,6 +30,9 @@ FILES = {
     "surface_objects": "surface_objects.exr",
     "surface_albedo": "surface_albedo.exr",
 }
+EMISSION = "surface_emission"  # which older assets lack
+SHINING, MAY_SHINE = 16.0, 4.0  # lights that an object counts as among those that shapes are made for
+EMISSION_FILE = {EMISSION: "surface_emission.exr"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class Surfaces:
     """What changes need: `gather` (r, S), `sent` (r, S) and `feedback` (r, r, 3), which is gather rho sent.
 
     `shares` (O, S): what part of a surfel's area each object has; `albedo` (S, 3); `bounces`: how often light is exchanged, None: always.
+    `emission` (r, O, 3): weights of objects that emit a mean radiance of 1, in the pattern of their own emission, without bounces.
     """
 
     gather: Float32[ndarray, "r S"]
@@ -46,17 +50,14 @@ class Surfaces:
     albedo: Float32[ndarray, "S 3"]
     names: tuple[str, ...]
     bounces: int | None
+    emission: Float32[ndarray, "r O 3"]
 
     @staticmethod
     def of_basis(
-        basis: TransferBasis,
-        cells: Cells,
-        groups: Int[ndarray, " F"],
-        objects: Int[ndarray, " F"],
-        names: tuple[str, ...],
-        bounces: int | None,
+        basis: TransferBasis, operator: TransferOperator, groups: Int[ndarray, " F"], names: tuple[str, ...], bounces: int | None
     ) -> Surfaces:
-        """Of fine surfels `cells`, each in a group and of an object: sums and means over the groups; of objects that have surfels."""
+        """Of an operator's fine surfels, each in a group: sums and means over the groups; of objects that have surfels."""
+        cells, objects = operator.cells, operator.objects
         having = np.unique(objects)
         count = int(groups.max()) + 1
         area = np.maximum(np.bincount(groups, cells.areas, count), 1e-30).astype(np.float32)
@@ -65,6 +66,8 @@ class Surfaces:
         albedo = grouped(np.ascontiguousarray(cells.albedo.T) * cells.areas, groups, count) / area
         shares = grouped(owned.astype(np.float32), groups, count) / area
         feedback = basis.feedback.astype(np.float32)
+        radiosity = emitted_by_objects(operator).radiosity
+        emission = np.stack([basis.gather @ np.ascontiguousarray(radiosity[:, :, c]) for c in range(3)], axis=2)
         return Surfaces(
             grouped(basis.gather, groups, count),
             sent,
@@ -73,6 +76,7 @@ class Surfaces:
             np.ascontiguousarray(albedo.T),
             tuple(names[i] for i in having),
             bounces,
+            emission,
         )
 
     @staticmethod
@@ -86,9 +90,14 @@ class Surfaces:
     def of_tables(manifest: dict[str, Any], tables: Mapping[str, ndarray]) -> Surfaces:
         """From the manifest and the tables of an asset that has them."""
         told = manifest[KEY]
-        values = [tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in FILES]
-        gather, sent, feedback, shares, albedo = values
-        return Surfaces(gather[..., 0], sent[..., 0], feedback, shares[..., 0], albedo[0], tuple(told["objects"]), told.get("bounces"))
+        has_emission = EMISSION in told["scales"]
+        kept = (*FILES, EMISSION) if has_emission else FILES
+        gather, sent, feedback, shares, albedo, *more = (
+            tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in kept
+        )
+        gather, sent, shares = gather[..., 0], sent[..., 0], shares[..., 0]
+        emission = more[0] if has_emission else np.repeat((np.float32(np.pi) * gather @ shares.T)[:, :, None], 3, axis=2)
+        return Surfaces(gather, sent, feedback, shares, albedo[0], tuple(told["objects"]), told.get("bounces"), emission)
 
     def add_to(self, asset: Asset) -> None:
         """Its tables and keys."""
@@ -98,9 +107,9 @@ class Surfaces:
 
     def stored(self) -> tuple[dict[str, ndarray], dict[str, Any]]:
         """(tables, keys of the manifest) as an asset has them."""
-        tables = (self.gather[..., None], self.sent[..., None], self.feedback, self.shares[..., None], self.albedo[None])
+        tables = (self.gather[..., None], self.sent[..., None], self.feedback, self.shares[..., None], self.albedo[None], self.emission)
         stored, scales, keys = {}, {}, {}
-        for (name, file), table in zip(FILES.items(), tables, strict=True):
+        for (name, file), table in zip((FILES | EMISSION_FILE).items(), tables, strict=True):
             scales[name] = float(2.0 ** np.ceil(np.log2(max(float(np.abs(table).max(initial=0)), 1e-30))))
             stored[name] = (table / np.float32(scales[name])).astype(np.float16)
             keys[name] = {"file": file}
@@ -115,16 +124,20 @@ class Surfaces:
         told = reader.manifest["surfel_transfer"]
         rank, count, objects = int(told["rank"]), int(told["surfels"]), len(reader.manifest[KEY]["objects"])
         shapes = ((rank, count, 1), (rank, count, 1), (rank, rank, 3), (objects, count, 1), (1, count, 3))
-        return {name: reader.table(name, shape[:2], shape[2]).astype(np.float16) for name, shape in zip(FILES, shapes, strict=True)}
+        found = {name: reader.table(name, shape[:2], shape[2]).astype(np.float16) for name, shape in zip(FILES, shapes, strict=True)}
+        return found | {
+            name: reader.table(name, (rank, objects), 3).astype(np.float16) for name in EMISSION_FILE if name in reader.manifest
+        }
 
     def emitted(self, name: str, radiance: Float64[ndarray, " 3"]) -> Float64[ndarray, "r 3"]:
-        """Weights of the shapes under an object that emits diffusely: of what it lays on receivers itself, and of all bounces."""
-        radiosity = np.pi * self._share_of(name)[:, None] * radiance
+        """Weights of the shapes under an object that emits diffusely: of what it lays on receivers itself, and of all bounces.
+
+        `radiance`: the mean over what emits of the object, in the pattern that it emits in; over all of it where it emits nothing.
+        """
+        self._share_of(name)
+        first = self.emission[:, self.names.index(name)] * radiance.astype(np.float32)  # (r, 3)
         more = None if self.bounces is None else self.bounces + 1
-        return np.stack(
-            [_series(self.feedback[:, :, c], self.gather @ radiosity[:, c : c + 1].astype(np.float32), more)[:, 0] for c in range(3)],
-            axis=1,
-        ).astype(np.float64)
+        return np.stack([_series(self.feedback[:, :, c], first[:, c : c + 1], more)[:, 0] for c in range(3)], axis=1).astype(np.float64)
 
     def repainted(self, albedo: Mapping[str, tuple[float, float, float]]) -> tuple[Surfaces, Float32[ndarray, "r S 3"]]:
         """(the same with objects of another albedo, what that adds to the weights of shapes from irradiance on surfels)."""
@@ -189,6 +202,27 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     )
     painted.add_to(changed)
     return without_environment_table(changed)
+
+
+def emitted_by_objects(operator: TransferOperator) -> Emitted:
+    """What each object that has surfels, in order of number, emits by itself: a mean radiance of 1.
+
+    The mean is over its surfels that emit, of each color; an object that emits nothing, or nothing of a color, emits evenly. Those that
+    emit in the scene count as more lights.
+    """
+    having, owner = np.unique(operator.objects, return_inverse=True)
+    owner, areas = owner.ravel(), operator.cells.areas.astype(np.float64)
+    result = np.zeros((len(owner), len(having), 3), np.float32)
+    shines = operator.emission.any(axis=1)
+    some = np.bincount(owner, areas * shines, len(having)) > 0
+    shines |= ~some[owner]
+    whole = np.bincount(owner, areas * shines, len(having))
+    for c in range(3):
+        mean = np.bincount(owner, areas * operator.emission[:, c], len(having)) / np.maximum(whole, 1e-30)
+        lit = mean[owner] > 0
+        pattern = np.where(lit, operator.emission[:, c] / np.maximum(mean[owner], 1e-30), shines)
+        result[np.arange(len(owner)), owner, c] = np.pi * pattern
+    return Emitted(result, np.where(some, SHINING, MAY_SHINE))
 
 
 def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:

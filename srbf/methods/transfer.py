@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float16, Float32, Float64, Int
+from srbf.arrays import Bool, Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
@@ -29,17 +29,20 @@ from srbf.methods.environment_table import (
 from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
-from srbf.methods.protocol import QUIET, FitRun, setting
-from srbf.methods.surface_changes import FILES, Surfaces
+from srbf.methods.protocol import QUIET, FitRun, check_error, setting
+from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, emitted_by_objects
+from srbf.methods.transfer_choice import Judges, Sizes, fit_for_error, truncated
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
 from srbf.visibility.received import ReceivedLight
-from srbf.visibility.transfer_basis import MOST_RANK, TransferBasis, grouped, training_light, transfer_basis
+from srbf.visibility.surface_cells import DARK, Cells
+from srbf.visibility.transfer_basis import MOST_RANK, RANK_ERROR, TransferBasis, exchange_of, grouped, training_light, transfer_basis
 from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
 MOST_SURFELS = 8000
 BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
+SHAPES_LEFT_OUT = 0.25  # of an error that is asked for, on the lights that shapes are made for
 VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
@@ -67,6 +70,9 @@ class Transfer(LightsInsideMaps):
         1 to 256: the index per texel is one byte.
     components
         How many numbers per texel.
+    error
+        Relative RMSE, 0 to 1, that is not to be exceeded on validation lights or, without these, on random lights against the uncompressed
+        form factors: by the fewest shapes and surfels, where these are `auto`, and the fewest components, four by four. A line tells.
     editable
         Keep what changed albedo and emission of objects need.
     smooth
@@ -95,12 +101,19 @@ class Transfer(LightsInsideMaps):
     order: ClassVar[int] = 8
     domains: ClassVar[tuple[str, ...]] = ("surfels",)
     takes_objects: ClassVar[bool] = True
-    tables: ClassVar[dict[str, str]] = {**LightsInsideMaps.tables, "surfel_transfer": TRANSFER_FILE, **FILES, **TABLE_FILES}
+    tables: ClassVar[dict[str, str]] = {
+        **LightsInsideMaps.tables,
+        "surfel_transfer": TRANSFER_FILE,
+        **FILES,
+        **EMISSION_FILE,
+        **TABLE_FILES,
+    }
 
     surfels: Literal["auto"] | int = setting("auto", "Parts of the surfaces that lights are measured by.", words=("auto",))
     rank: Literal["auto"] | int = setting("auto", "Shapes of light on the receivers.", words=("auto",))
     clusters: int = setting(64, "How many clusters, at most 256.")
     components: int = setting(12, "How many numbers per texel.")
+    error: float | None = None
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
     smooth: bool = setting(False, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
@@ -113,6 +126,7 @@ class Transfer(LightsInsideMaps):
         check_visibility(self.visibility, self.receiver_visibility)
         if self.surfels != "auto" and not 1 <= self.surfels <= MOST_SURFELS:
             raise InputError(f"expected `surfels` auto or 1 to {MOST_SURFELS}, found {self.surfels}")
+        check_error(self.error)
         if self.rank != "auto" and not self.rank >= 1:
             raise InputError(f"expected `rank` auto or 1 or more, found {self.rank}")
 
@@ -149,37 +163,60 @@ class Transfer(LightsInsideMaps):
             raise InputError(
                 f"expected receivers in {capture.folder} that see lit surfaces, found none; choose others, or other `light_bounds`"
             )
-        count = MOST_SURFELS if self.surfels == "auto" else int(self.surfels)
-        inside = replace(inside, cells=surfel_groups(operator.cells, inside.occluders, inside.free, count, self.seed))
-        if self.editable:  # an object emits by itself
-            inside = replace(inside, cells=inside.cells.with_patches(_parted(inside.cells.patches, operator.objects)))
+        measured = np.full(len(operator.objects), True) if self.editable else operator.cells.albedo.max(axis=1) >= DARK
+        cells = operator.cells.at(measured)
+
+        def cells_of(count: int) -> Cells:
+            found = surfel_groups(cells, inside.occluders, inside.free, count, self.seed)
+            return found.with_patches(_parted(found.patches, operator.objects)) if self.editable else found  # an object emits by itself
+
+        told = capture.manifest["surfels"]
         received = ReceivedLight(operator.cells, inside.occluders)
         lit = training_light(operator, received, inside.free, self.seed)
         most = max(1, min(MOST_RANK, MOST_BYTES // (12 * capture.width * capture.height)))
         asked = None if self.rank == "auto" else int(self.rank)
-        basis = transfer_basis(operator, lit, asked, self.seed, capture.manifest["surfels"].get("bounces"), most)
-        rank = basis.shapes.shape[1]
-        asset = encode_table(
-            self, _of_shapes(capture, basis), replace(run, on_image=QUIET.on_image), np.eye(rank), self.clusters, self.seed
-        )
-        if capture.quantity == "irradiance":  # shapes have no color
-            asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
-            asset.manifest["light_values"]["channels"] = 1
-        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
-        count = inside.cells.patch_count
-        own = np.stack([grouped(basis.transfer[:, :, c], inside.cells.patches, count) for c in range(3)], axis=2)
-        asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
-        asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        emitted = emitted_by_objects(operator) if self.editable else None
+        exchange, bounces = exchange_of(operator, told.get("bounces"))
+        left_out = RANK_ERROR if self.error is None else min(RANK_ERROR, SHAPES_LEFT_OUT * self.error)
+        basis = transfer_basis(operator, lit, (exchange, bounces), asked, self.seed, most, emitted, left_out)
+        silent = replace(run, on_image=QUIET.on_image)
+
+        def encode(basis: TransferBasis, cells: Cells, components: int) -> Asset:
+            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured)
+
+        if self.error is None:
+            cells = cells_of(MOST_SURFELS if self.surfels == "auto" else int(self.surfels))
+            asset = encode(basis, cells, self.components)
+        else:
+            judges = Judges.of(capture, operator, received, bounces, inside.free)
+            surfels = None if self.surfels == "auto" else int(self.surfels)
+            sizes = Sizes.of(cells_of, measured, surfels, MOST_SURFELS, basis.shapes.shape[1])
+            found = fit_for_error(self.error, judges, sizes, basis, self.components, encode, Transfer, run.say)
+            asset, cells, basis = found.asset, found.cells, truncated(basis, found.rank)
         if operator.environment is not None:
             add_environment_table(asset, _rounded(environment_columns(basis.transfer, operator.environment)), operator.environment)
         if self.editable:
-            told = capture.manifest["surfels"]
             names = tuple(told.get("objects", ()))
-            Surfaces.of_basis(basis, operator.cells, inside.cells.patches, operator.objects, names, told.get("bounces")).add_to(asset)
+            Surfaces.of_basis(basis, operator, cells.patches, names, told.get("bounces")).add_to(asset)
+        inside = replace(inside, cells=cells)
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)
         self.add_visibility(asset, inside)
+        return asset
+
+    def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
+        """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
+        rank = basis.shapes.shape[1]
+        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed)
+        if capture.quantity == "irradiance":  # shapes have no color
+            asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
+            asset.manifest["light_values"]["channels"] = 1
+        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
+        count = cells.patch_count
+        own = np.stack([grouped(basis.transfer[:, measured, c], cells.patches, count) for c in range(3)], axis=2)
+        asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
+        asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
         return asset
 
     @classmethod

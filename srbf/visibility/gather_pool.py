@@ -36,7 +36,8 @@ def pool_of(
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well.
     """
-    surfaces, objects = cut_at_walls(surfaces, objects, occluders)
+    surfaces, source = cut_at_walls(surfaces, occluders)
+    objects = objects[source]
     both = surfaces.both_sides()
     able = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
     gathered = looked_at(surfaces, points, normals, seed)[able]
@@ -45,7 +46,8 @@ def pool_of(
     kept, gathered, witnesses = able[found], gathered[found], witnesses[found]
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
-        return Surfels(Cells.of_image(np.zeros((2, 0, 4), np.float32)), surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64))
+        none, dark = Cells.of_image(np.zeros((2, 0, 4), np.float32)), np.zeros((0, 3), np.float32)
+        return Surfels(none, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark)
     sides = both.at(kept)
     weight = gathered / max(float(gathered.sum()), 1e-30) + EVENLY * sides.areas / sides.areas.sum()
     scale = float(np.ptp(sides.centers, axis=0).max())
@@ -58,7 +60,8 @@ def pool_of(
     owners[kept] = owner
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel)
+    dark = np.zeros((len(of_surfel), 3), np.float32)
+    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark)
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

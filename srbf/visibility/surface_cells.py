@@ -73,6 +73,10 @@ class Cells:
     def patch_count(self) -> int:
         return int(self.patches.max()) + 1 if len(self.patches) else 0
 
+    def at(self, chosen: ndarray) -> Cells:
+        """Those of a mask or of indices."""
+        return Cells(self.places[chosen], self.normals[chosen], self.areas[chosen], self.albedo[chosen], self.patches[chosen])
+
     def with_patches(self, patches: Int[ndarray, " N"]) -> Cells:
         """The same cells in other patches."""
         return replace(self, patches=patches)
@@ -125,8 +129,11 @@ def lit(
     return result
 
 
-def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T"]]:
-    """(cells of about `size` meters, the cell of every fragment): fragments of one voxel that face about the same way are one cell."""
+def cells_of(fragments: Fragments, size: float, apart: Int[ndarray, " T"] | None = None) -> tuple[Cells, Int[ndarray, " T"]]:
+    """(cells of about `size` meters, the cell of every fragment): fragments of one voxel that face about the same way are one cell.
+
+    Those whose numbers in `apart` differ are not.
+    """
     centers, normals = fragments.centers, fragments.normals
     major = np.abs(normals).argmax(axis=1)
     facing = 2 * major + (np.take_along_axis(normals, major[:, None], 1)[:, 0] < 0)
@@ -135,7 +142,7 @@ def cells_of(fragments: Fragments, size: float) -> tuple[Cells, Int[ndarray, " T
     low = centers.min(axis=0) - size / 3  # no voxel's side in the plane of a wall at a round number
     voxel = np.floor((centers - low) / size).astype(np.int64)
     rough = np.abs(normals).max(axis=1) < 0.99  # curved or slanted: by its direction as well
-    keys = np.column_stack([voxel, facing, np.where(rough[:, None], across, 0), color])
+    keys = np.column_stack([voxel, facing, np.where(rough[:, None], across, 0), color, *(() if apart is None else (apart,))])
     _, owner = np.unique(keys, axis=0, return_inverse=True)
     owner = owner.ravel()
     return grouped_cells(fragments, owner), owner

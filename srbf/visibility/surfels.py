@@ -16,40 +16,49 @@ from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, cells_
 
 WITNESSES = 256  # free places by which it is known what a wall parts
 REACH, REACH_RAYS = 3, 64  # bounces and rays by which sides are found that no free place sees
+EMITTED_RAYS = 16
 LEAST_VIEW = 0.1  # share of such a side's hemisphere that lit surfaces fill
 SIDES = 1 << 14  # whose rays are traced at a time
 CUTS = 4  # halvings of a triangle that a wall parts
+DIM_SIZE = 2.0  # of surfels that neither reflect nor emit
+MOST_OBJECTS = 500  # beyond, objects smaller than a surfel share them
+EMISSION_STEPS = 4  # of what an object emits
 
 
 @dataclass(frozen=True, eq=False)
 class Surfels:
     """Cells of every side of the surfaces that light can reach, and the triangles (T, 3, 3) that block bounces.
 
-    `owners` (2, T): the surfel of the front and of the back of each triangle; -1 of sides that are black or out of reach. `objects` (S,):
-    the number of each surfel's object.
+    `owners` (2, T): the surfel of the front and of the back of each triangle; -1 of sides that are out of reach. `objects` (S,): the number
+    of each surfel's object. `emission` (S, 3): mean radiance of what it emits itself.
     """
 
     cells: Cells
     corners: Float32[ndarray, "T 3 3"]
     owners: Int[ndarray, "2 T"]
     objects: Int[ndarray, " S"]
+    emission: Float32[ndarray, "S 3"]
 
     @property
     def count(self) -> int:
         return len(self.cells.places)
 
     def seen_along(self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]) -> Int[ndarray, " n"]:
-        """The surfel that each ray meets first; -1 where it meets none, or black."""
+        """The surfel that each ray meets first; -1 where it meets none, or a side out of reach."""
         return self.met_along(origins, directions)[0]
 
     def met_along(
         self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"]
     ) -> tuple[Int[ndarray, " n"], Bool[ndarray, " n"]]:
-        """(the surfel that each ray meets first, -1 where it meets none, or black; whether it meets any surface)."""
+        """(the surfel that each ray meets first, -1 where it meets none, or a side out of reach; whether it meets any surface)."""
         triangle, _, _ = self._triangles.first_hit(origins, directions)
         back = np.einsum("nk,nk->n", self._normals[triangle], directions) > 0
         met = triangle >= 0
         return np.where(met, self.owners[back.astype(np.int64), triangle], -1), met
+
+    def blocked(self, origins: Float64[ndarray, "n 3"], directions: Float64[ndarray, "n 3"], distance: Float64[ndarray, " n"]) -> ndarray:
+        """(n,) whether a surface stands closer than `distance` along each ray."""
+        return self._triangles.occluded(origins.astype(np.float32), directions, distance)
 
     def spread(self, count: int, seed: int = 0) -> tuple[Float64[ndarray, "S q 3"], Float64[ndarray, "S q 3"]]:
         """`count` points of each surfel, evenly over its area, and unit normals there."""
@@ -85,33 +94,82 @@ def surfels_of(
     free: Float64[ndarray, "F 3"],
     size: float | None,
     most: int,
+    emission: Float32[ndarray, "2 T 3"] | None = None,
 ) -> Surfels:
     """Surfels of about `size` meters of all that the free places see, larger where there would be more than `most`; None: about `most`.
 
-    None straddles a border of albedo, or a wall that stands on a surface. `surfaces`: opaque triangles of any side, no edge longer than a
-    surfel; `objects`: of each, its object's number.
+    None straddles a border of albedo or of emission, or a wall that stands on a surface, nor are objects mixed, but small ones where there
+    are thousands. Black surfaces have surfels of twice the size, since they may be made to emit. `surfaces`: opaque triangles of any side,
+    no edge longer than a surfel; `objects`: of each, its object's number; `emission`: radiance of both sides of each.
     """
-    surfaces, objects = cut_at_walls(surfaces, objects, occluders)
-    both, object_of = surfaces.both_sides(), np.concatenate([objects, objects])
-    kept = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
+    if emission is None:
+        emission = np.zeros((2, len(objects), 3), np.float32)
+    surfaces, source = cut_at_walls(surfaces, occluders)
+    objects, emission = objects[source], emission[:, source]
+    both, object_of, shines = surfaces.both_sides(), np.concatenate([objects, objects]), np.concatenate(list(emission))
+    kept = np.flatnonzero(both.areas > 0)
     seen = np.zeros(len(both.corners), bool)
     seen[kept[exposed(both.at(kept), occluders, free)]] = True
-    kept = kept[reached(both, seen)[kept]]
+    kept = kept[reached(both, seen | _lights_others(both, object_of, shines))[kept]]
     owners = np.full(len(both.corners), -1, np.int64)
     if not len(kept):
-        return Surfels(Cells.of_image(np.zeros((2, 0, 4), np.float32)), surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64))
-    sides = both.at(kept)
-    seen = lit(sides.centers, sides.normals, occluders, free[:WITNESSES])
-    least = float(np.sqrt(sides.areas.sum() / most))
+        nothing = Cells.of_image(np.zeros((2, 0, 4), np.float32))
+        return Surfels(nothing, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
+    sides = _Sides(both.at(kept), object_of[kept], shines[kept], lit(*_centers(both.at(kept)), occluders, free[:WITNESSES]))
+    area = sides.fragments.areas * np.where(sides.is_dim, 1 / DIM_SIZE**2, 1.0)
+    least = float(np.sqrt(area.sum() / most))
     spacing = least if size is None else max(size, least)
-    owner = _owners(sides, spacing, seen)
+    owner = sides.owners(spacing)
     while owner.max() >= most and spacing < 8 * least:  # surfels are cut at edges, borders and walls
         spacing *= float(np.sqrt((owner.max() + 1) / most))
-        owner = _owners(sides, spacing, seen)
+        owner = sides.owners(spacing)
     owners[kept] = owner
-    of_cell = np.zeros(int(owner.max()) + 1, np.int64)
-    of_cell[owner] = object_of[kept]
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_cell)
+    count = int(owner.max()) + 1
+    of_cell = np.zeros(count, np.int64)
+    of_cell[owner] = sides.objects
+    own = np.maximum(np.bincount(owner, sides.fragments.areas, count), 1e-30)
+    flux = np.stack([np.bincount(owner, sides.fragments.areas * sides.emission[:, c], count) for c in range(3)], axis=1)
+    cells = grouped_cells(sides.fragments, owner)
+    return Surfels(cells, surfaces.corners, owners.reshape(2, -1), of_cell, (flux / own[:, None]).astype(np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
+    """Sides that have surfels: `objects` (N,), `emission` (N, 3) and `seen` (N, F), from which free places."""
+
+    fragments: Fragments
+    objects: Int[ndarray, " N"]
+    emission: Float32[ndarray, "N 3"]
+    seen: Bool[ndarray, "N F"]
+
+    @property
+    def is_dim(self) -> Bool[ndarray, " N"]:
+        """Those that neither reflect nor emit."""
+        return (self.fragments.albedo.max(axis=1) < DARK) & ~self.emission.any(axis=1)
+
+    def owners(self, spacing: float) -> Int[ndarray, " N"]:
+        """The surfel of every side: those of a cell that share places from which they are seen; one that none sees joins another."""
+        apart, owner, count = self._apart(spacing), np.empty(len(self.objects), np.int64), 0
+        for chosen, size in ((~self.is_dim, spacing), (self.is_dim, DIM_SIZE * spacing)):
+            if chosen.any():
+                owner[chosen] = count + cells_of(self.fragments.at(chosen), size, apart[chosen])[1]
+                count = int(owner[chosen].max()) + 1
+        return _parted_cells(owner, self.seen)
+
+    def _apart(self, spacing: float) -> Int[ndarray, " N"]:
+        """What no surfel has two of: objects, small ones of many together unless they emit; and steps of what an object emits."""
+        count = int(self.objects.max()) + 1
+        strength = self.emission.max(axis=1)
+        most = np.zeros(count)
+        np.maximum.at(most, self.objects, strength)
+        large = np.bincount(self.objects, self.fragments.areas, count) >= spacing**2
+        own = (most > 0) | large | (len(np.unique(self.objects)) <= MOST_OBJECTS)
+        step = np.ceil(EMISSION_STEPS * strength / np.maximum(most, 1e-30)[self.objects]).astype(np.int64)
+        return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1)
+
+
+def _centers(sides: Fragments) -> tuple[Float64[ndarray, "T 3"], Float64[ndarray, "T 3"]]:
+    return sides.centers, sides.normals
 
 
 def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
@@ -140,10 +198,24 @@ def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
     return found
 
 
-def cut_at_walls(surfaces: Fragments, objects: Int[ndarray, " T"], occluders: EmbreeTriangles) -> tuple[Fragments, Int[ndarray, " U"]]:
-    """Triangles that another surface parts, so that a corner is hidden from the middle, in halves, a few times over."""
+def _lights_others(both: Fragments, objects: Int[ndarray, " T"], emission: Float32[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
+    """Sides that emit to where other objects are: the back of a picture lights the wall, the inside of a tube nothing else."""
+    half, own = len(both.corners) // 2, np.flatnonzero(emission.any(axis=1) & (both.areas > 0))
+    found = np.zeros(len(both.corners), bool)
+    lift = OFFSET * float(np.ptp(both.corners.reshape(-1, 3), axis=0).max(initial=0))
+    starts = np.repeat(both.centers[own] + lift * both.normals[own], EMITTED_RAYS, axis=0)
+    directions = cosine_directions(both.normals[own][:, None], EMITTED_RAYS, np.random.default_rng(0))[:, 0].reshape(-1, 3)
+    triangle, _, _ = EmbreeTriangles(both.corners[:half]).first_hit(starts, directions)
+    other = (triangle >= 0) & (objects[triangle] != np.repeat(objects[own], EMITTED_RAYS))
+    found[own] = other.reshape(-1, EMITTED_RAYS).any(axis=1)
+    return found
+
+
+def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles) -> tuple[Fragments, Int[ndarray, " U"]]:
+    """(triangles, those that another surface parts, so that a corner is hidden from the middle, in halves, a few times over; of which each
+    is a part)."""
     done: list[tuple[ndarray, ndarray, ndarray]] = []
-    corners, albedo = surfaces.corners, surfaces.albedo
+    corners, albedo, source = surfaces.corners, surfaces.albedo, np.arange(len(surfaces.corners))
     lift = OFFSET * float(np.ptp(corners.reshape(-1, 3), axis=0).max(initial=0))
     for _ in range(CUTS):
         own = Fragments(corners, albedo)
@@ -155,9 +227,9 @@ def cut_at_walls(surfaces: Fragments, objects: Int[ndarray, " T"], occluders: Em
                 distance = np.linalg.norm(vector, axis=1)
                 direction = vector / np.maximum(distance, 1e-30)[:, None]
                 hidden |= occluders.occluded(middle.astype(np.float32), direction, distance)
-        done.append((corners[~hidden], albedo[~hidden], objects[~hidden]))
-        corners, albedo, objects = _halves(corners[hidden]), np.repeat(albedo[hidden], 2, axis=0), np.repeat(objects[hidden], 2)
-    done.append((corners, albedo, objects))
+        done.append((corners[~hidden], albedo[~hidden], source[~hidden]))
+        corners, albedo, source = _halves(corners[hidden]), np.repeat(albedo[hidden], 2, axis=0), np.repeat(source[hidden], 2)
+    done.append((corners, albedo, source))
     every = [np.concatenate(part) for part in zip(*done, strict=True)]
     return Fragments(every[0], every[1]), every[2]
 
@@ -171,9 +243,8 @@ def _halves(corners: Float32[ndarray, "T 3 3"]) -> Float32[ndarray, "U 3 3"]:
     return np.stack([np.stack([first, middle, third], axis=1), np.stack([middle, second, third], axis=1)], axis=1).reshape(-1, 3, 3)
 
 
-def _owners(sides: Fragments, spacing: float, seen: Bool[ndarray, "T F"]) -> Int[ndarray, " T"]:
-    """The surfel of every side: those of a cell that share places from which they are seen; one that none sees joins another."""
-    _, owner = cells_of(sides, spacing)
+def _parted_cells(owner: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarray, " N"]:
+    """Cells without parts that share no place from which they are seen; what none sees joins another part of its cell."""
     known = seen.any(axis=1)
     result = np.full(len(owner), -1, np.int64)
     if known.any():

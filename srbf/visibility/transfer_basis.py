@@ -8,6 +8,7 @@ matrix product with its direct irradiance e on the surfels.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy import ndarray
@@ -19,6 +20,9 @@ from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.solve.sparse_rows import product, transposed_product
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 PLACED, NEAR, SPOTS = 700, 250, 250  # lights that the shapes are made for
 NEAR_RANGE = (0.03, 0.12)  # m from a surface
@@ -47,6 +51,14 @@ class TransferBasis:
     feedback: Float64[ndarray, "r r 3"]
 
 
+@dataclass(frozen=True, eq=False)
+class Emitted:
+    """Radiosity of the surfels under each of M objects that emit by themselves, and how many lights each counts as."""
+
+    radiosity: Float32[ndarray, "S M 3"]
+    counts: Float64[ndarray, " M"]
+
+
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
     """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments."""
     rng = np.random.default_rng(seed)
@@ -66,32 +78,45 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
     return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
 
 
+Exchange = tuple[Float32[ndarray, "S S"], list[Bounces]]
+
+
+def exchange_of(operator: TransferOperator, most_bounces: int | None = None) -> Exchange:
+    """(reciprocal form factors between the surfels, bounces of each color); `most_bounces`: reflections at most, None: all of them."""
+    exchange = reciprocal(operator.exchange.toarray(), operator.cells.areas)
+    return exchange, [Bounces(exchange, operator.cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
+
+
 def transfer_basis(
     operator: TransferOperator,
     irradiance: Float32[ndarray, "S V"],
+    exchanged: Exchange,
     rank: int | None = None,
     seed: int = 0,
-    most_bounces: int | None = None,
     most_rank: int = MOST_RANK,
+    emitted: Emitted | None = None,
+    left_out: float = RANK_ERROR,
 ) -> TransferBasis:
-    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out RANK_ERROR, or `most_rank`.
+    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out `left_out`, or `most_rank`.
 
-    `most_bounces`: reflections that light has at most; None: all of them. The pictures are never formed: their axes come from random
-    mixtures of them [Halko2011], at SAMPLE_TEXELS receivers. InputError where no light bounces onto a receiver.
+    `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many lights. The pictures are never formed:
+    their axes come from random mixtures of them [Halko2011], at SAMPLE_TEXELS receivers. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
     cells = operator.cells
-    exchange = reciprocal(operator.exchange.toarray(), cells.areas)
-    bounces = [Bounces(exchange, cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
+    exchange, bounces = exchanged
     lit = np.flatnonzero(np.diff(operator.receivers.indptr))
     some = operator.receivers[lit[:: max(1, len(lit) // NORM_TEXELS)]]
     sampled = len(lit) > SAMPLE_TEXELS
     form_factors = operator.receivers[np.sort(rng.choice(lit, SAMPLE_TEXELS, replace=False)) if sampled else lit]
     radiosity = []
-    for one in bounces:
-        own = one.radiosity(irradiance)
-        norm = np.sqrt(((some @ own) ** 2).sum(axis=0))
-        radiosity.append(own / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)))
+    for channel, one in enumerate(bounces):
+        own = _of_unit_norm(one.radiosity(irradiance), some)
+        if emitted is not None:
+            first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
+            shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), some)
+            own = np.concatenate([own, np.sqrt(emitted.counts).astype(np.float32) * shining], axis=1)
+        radiosity.append(own)
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
     if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
         raise InputError(
@@ -105,7 +130,8 @@ def transfer_basis(
         found = np.linalg.qr(product(form_factors, lights @ (lights.T @ transposed_product(form_factors, found))))[0]
     left, values, _ = np.linalg.svd(transposed_product(form_factors, found).T @ lights, full_matrices=False)
     axes = found @ left
-    count = most if rank is not None else _enough(axes[:, :most], form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES))))
+    mixtures = form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES)))
+    count = most if rank is not None else _enough(axes[:, :most], mixtures, left_out)
     values = np.maximum(values[:count], 1e-7 * max(float(values[0]), 1e-30))
     axes = axes[:, :count]
     share = np.float32(len(axes) / lights.shape[1])
@@ -120,11 +146,17 @@ def transfer_basis(
     return TransferBasis(shapes, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
 
 
-def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray) -> int:
-    """How many of the axes leave RANK_ERROR of the pictures, by norm."""
+def _of_unit_norm(radiosity: Float32[ndarray, "S n"], receivers: csr_array) -> Float32[ndarray, "S n"]:
+    """Lights whose pictures have unit norm; those that next to nothing arrives of stay dark."""
+    norm = np.sqrt(((receivers @ radiosity) ** 2).sum(axis=0))
+    return radiosity / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)).astype(np.float32)
+
+
+def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray, left_out: float) -> int:
+    """How many of the axes leave no more than that share of the pictures, by norm."""
     energy = float((pictures.astype(np.float64) ** 2).sum())
     kept = np.cumsum(((axes.T @ pictures).astype(np.float64) ** 2).sum(axis=1))
-    return min(len(kept), int(np.searchsorted(kept, (1 - RANK_ERROR**2) * energy)) + 1)
+    return min(len(kept), int(np.searchsorted(kept, (1 - left_out**2) * energy)) + 1)
 
 
 def grouped(values: Float32[ndarray, "r S"], groups: Int[ndarray, " S"], count: int) -> Float32[ndarray, "r G"]:

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float64, Int
+from srbf.arrays import Float32, Float64, Int
 from srbf.errors import ImageError
 from srbf.io import files
 from srbf.io.image import read_image, write_image
+from srbf.visibility.aimed_factors import AimedFactors
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.environment_cells import EnvironmentRows, Openings
 from srbf.visibility.form_factors import RayOrigins, factors_and_environment, form_factors
@@ -40,11 +41,13 @@ class TransferOperator:
     """Form factors from P receivers (P, S) and from surfels (S, S) to S surfels, sparse, float32.
 
     Irradiance at receivers is `receivers` times the radiosity of the surfels. `objects` (S,): the number of each surfel's object.
-    `environment`: what the surfels see of it, S rows; None where no ray left the scene, or the capture is older than this.
+    `emission` (S, 3): radiance that it emits itself. `environment`: what the surfels see of it, S rows; None where no ray left the scene,
+    or the capture is older than this.
     """
 
     cells: Cells
     objects: Int[ndarray, " S"]
+    emission: Float32[ndarray, "S 3"]
     receivers: csr_array
     exchange: csr_array
     environment: EnvironmentRows | None = None
@@ -62,25 +65,34 @@ class TransferOperator:
         rays = int(np.clip(RAYS / max(1, len(chosen)), FEWEST_RAYS, MOST_RAYS))
         points = _LightmapPoints(receivers, seed) if is_lightmap else _Centers(receivers)
         total = len(chosen) + surfels.count
+        aimed = AimedFactors(surfels, seed)
         parts = [csr_array((0, surfels.count), dtype=np.float32)]
         for start in range(0, len(chosen), RECEIVERS):
             rows = chosen[start : start + RECEIVERS]
             origins = points.origins(rows)
-            parts.append(form_factors(surfels, origins, rays // origins.weights.shape[1], _hash(seed, start)))
+            factors = form_factors(surfels, origins, rays // origins.weights.shape[1], _hash(seed, start))
+            parts.append(aimed.put(factors, origins, len(chosen), _hash(seed, start)))
             progress(start + len(rows), total)
         spread = RayOrigins.even(*surfels.spread(POINTS, seed))
         own, environment = factors_and_environment(surfels, Openings(receivers.triangles), spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
+        own = aimed.put(own, spread, len(chosen), _hash(seed, -1))
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)
         counts[chosen + 1] = np.diff(traced.indptr)
         every = csr_array((traced.data, traced.indices, np.cumsum(counts)), shape=(texels, surfels.count))
-        return TransferOperator(surfels.cells, surfels.objects, every, own, environment if len(environment.cells) else None)
+        seen = environment if len(environment.cells) else None
+        return TransferOperator(surfels.cells, surfels.objects, surfels.emission, every, own, seen)
 
     def write(self, folder: Path, key: str) -> None:
-        """surfels.exr, three rows (x, y, z, area), (normal, patch), (albedo, object), and operator.npz; `key` tells what they are of."""
-        image = np.concatenate([self.cells.image(), np.column_stack([self.cells.albedo, self.objects])[None]]).astype(np.float32)
-        write_image(folder / SURFELS_FILE, image, "float")
+        """surfels.exr, rows (x, y, z, area), (normal, patch), (albedo, object) and, if any emits, (emission, 0), and operator.npz.
+
+        `key` tells what they are of.
+        """
+        rows = [*self.cells.image(), np.column_stack([self.cells.albedo, self.objects])]
+        if self.emission.any():
+            rows.append(np.pad(self.emission, ((0, 0), (0, 1))))
+        write_image(folder / SURFELS_FILE, np.stack(rows).astype(np.float32), "float")
         arrays = {}
         for name in ("receivers", "exchange"):
             matrix = getattr(self, name)
@@ -105,8 +117,8 @@ class TransferOperator:
 
         path = folder / OPERATOR_FILE
         image = read_image(folder / SURFELS_FILE, 4)
-        if len(image) != 3:
-            raise ImageError(f"expected 3 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again with `force=True`")
+        if len(image) not in (3, 4):
+            raise ImageError(f"expected 3 or 4 rows in {folder / SURFELS_FILE}, found {len(image)}; bake again with `force=True`")
         count = image.shape[1]
         found = {}
         try:
@@ -120,7 +132,9 @@ class TransferOperator:
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected form factors of surfels in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
-        return TransferOperator(cells, np.round(image[2, :, 3]).astype(np.int64), found["receivers"], found["exchange"], environment)
+        objects = np.round(image[2, :, 3]).astype(np.int64)
+        emission = np.ascontiguousarray(image[3, :, :3]) if len(image) == 4 else np.zeros((count, 3), np.float32)
+        return TransferOperator(cells, objects, emission, found["receivers"], found["exchange"], environment)
 
 
 def _read_environment(stored: Any, path: Path) -> EnvironmentRows | None:

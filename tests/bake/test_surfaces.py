@@ -180,6 +180,48 @@ def test_sides_albedo_and_names() -> None:
     assert found["occluders"].shape == (7 * 12 + 2, 3, 3)  # undivided; the pane casts no shadow, the unseen sheet does
 
 
+def glowing() -> dict[str, Any]:
+    """Sheets that emit: a ramp along x, 5 times (1, 0.5, 0) on one side, and a strength of 0; a plain one."""
+    import bpy
+
+    from blender_bake import materials, surfaces
+
+    scene = new_scene()
+    made = {}
+    for name, strength in (("ramp", 4.0), ("front", 5.0), ("off", 0.0)):
+        material = made[name] = bpy.data.materials.new(name)
+        material.use_nodes = True
+        nodes, links = material.node_tree.nodes, material.node_tree.links
+        nodes.clear()
+        emission, output = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeOutputMaterial")
+        emission.inputs["Color"].default_value = (1, 0.5, 0, 1)
+        emission.inputs["Strength"].default_value = strength
+        shader = emission.outputs[0]
+        if name == "ramp":
+            links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], emission.inputs["Color"])
+        if name == "front":
+            mix = nodes.new("ShaderNodeMixShader")
+            links.new(nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"], mix.inputs[0])
+            links.new(shader, mix.inputs[1])
+            shader = mix.outputs[0]
+        links.new(shader, output.inputs["Surface"])
+    made["plain"] = materials.lambert((0.6, 0.1, 0.05))
+    for i, (name, material) in enumerate(made.items()):
+        add(name, mesh_of(name, SHEET, [(0, 1, 2, 3)], material), (0, 2 * i, 0))
+    bpy.context.view_layer.update()
+    return surfaces.fragments(scene, 0.5, Silent())  # type: ignore[arg-type]
+
+
+def test_emission_of_textures_strengths_and_sides() -> None:
+    found = in_blender(glowing)
+    of = {name: found["object"] == i for i, name in enumerate(found["names"].tolist())}
+    places = found["corners"][of["ramp"]].mean(axis=1)
+    np.testing.assert_allclose(found["emission"][of["ramp"]][:, :2], 4 * places[:, :2] / SIZE, atol=0.02)
+    np.testing.assert_allclose(found["emission"][of["front"]], np.broadcast_to([5.0, 2.5, 0.0], (of["front"].sum(), 3)), rtol=1e-3)
+    assert not found["emission"][of["off"] | of["plain"]].any()
+    np.testing.assert_array_equal(found["one_sided"].astype(bool), of["front"])
+
+
 def large() -> dict[str, Any]:
     """A scene of a square kilometer, and a dense one of 43,000 triangles with a texture."""
     import bpy

@@ -256,6 +256,7 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
             "or --ambient-only",
         ),
         (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
+        (["--ambient-only", "--no-ambient"], "expected --ambient-only or --no-ambient"),
         (["--lights", "frames.json", "--point", "0,0,1"], "put all lights into the file"),
     ],
 )
@@ -267,6 +268,18 @@ def test_bad_lights(tmp_path: Path, arguments: list[str], words: str) -> None:
 
 def test_an_environment_map_that_is_not_there(asset: Path, tmp_path: Path) -> None:
     assert "nowhere.exr" in refused("relight", asset, "-o", tmp_path / "x.exr", "--environment", "nowhere.exr")
+
+
+def test_the_light_of_the_scene_itself_is_left_out_where_asked(asset: Path, tmp_path: Path) -> None:
+    opened = Asset.open(asset)
+    shape = (opened.manifest["height"], opened.manifest["width"], 3)
+    opened.images["ambient"] = np.random.default_rng(0).uniform(0.5, 1, shape).astype(np.float32)
+    opened.manifest["ambient"] = "ambient.exr"
+    opened.save(tmp_path / "own")
+    for name, more in (("with", []), ("without", ["--no-ambient"])):
+        ok("relight", tmp_path / "own", "-o", tmp_path / f"{name}.exr", "--directional", "0.2,0.3,1", *more)
+    both, alone = (read_image(tmp_path / f"{name}.exr")[..., :3] for name in ("with", "without"))
+    np.testing.assert_allclose(both - alone, opened.images["ambient"], atol=1e-5)
 
 
 def test_the_ambient_light_alone_is_asked_for(asset: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 import typer
 from test_commands import misused
 
-from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size, duration, size
+from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size, duration, parse_share, size
 
 
 @pytest.mark.parametrize(
@@ -55,6 +55,10 @@ def test_a_bake_without_a_receiver(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (["fit", "a", "-o", "x", "--error", "5 percent"], "--error: expected a share above 0 and below 1, such as 5% or .05"),
+        (["fit", "a", "-o", "x", "--error", "100%"], "found '100%'"),
+        (["fit", "a", "-o", "x", "--error", "5%", "--psnr", "40"], "expected a --error or a --psnr"),
+        (["fit", "a", "-o", "x", "--method", "eigen-map", "--error", "5%"], "--error applies only to method auto or transfer"),
         (["evaluate", "a", "b", "--samples", "0"], "--samples: expected a whole number of 1 or more"),
         (["evaluate", "a"], "found one path"),
         (["evaluate", "--leave-one-out", "a", "b"], "found a second path"),
@@ -81,3 +85,7 @@ def test_numbers_in_their_range_or_words() -> None:
 def test_sizes_and_durations() -> None:
     assert size("256") == Size(256, 256) and size("640X480") == (640, 480) == size(Size(640, 480))
     assert duration("1h30m") == 5400 and duration("90") == duration("90s") == duration("1.5m") == 90
+
+
+def test_a_share_as_percent_or_as_a_number() -> None:
+    assert parse_share("5%") == pytest.approx(0.05) == parse_share(".05") == parse_share(" 5 %")

@@ -50,7 +50,8 @@ def made_asset() -> Asset:
     gather, sent = rng.normal(size=(2, RANK, count)).astype(np.float32) / count
     shares = np.stack([np.arange(count) % 2, 1 - np.arange(count) % 2]).astype(np.float32)
     feedback = rng.normal(size=(RANK, RANK, 3)).astype(np.float32) / (4 * RANK)
-    Surfaces(gather, sent, feedback, shares, np.full((count, 3), 0.5, np.float32), ("Walls", "Screen"), None).add_to(asset)
+    albedo, emission = np.full((count, 3), 0.5, np.float32), np.repeat((np.float32(np.pi) * gather @ shares.T)[:, :, None], 3, axis=2)
+    Surfaces(gather, sent, feedback, shares, albedo, ("Walls", "Screen"), None, emission).add_to(asset)
     low = (ROOMS.corners[:, :, 2] < 2.4).any(axis=1)
     assert (~low).sum() == 2
     return replace(asset, scene=glb(ROOMS.corners[low] + SHIFT))

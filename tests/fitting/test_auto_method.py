@@ -7,6 +7,7 @@ import pytest
 
 from srbf.capture import Capture
 from srbf.errors import InputError
+from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.auto_method import DEFAULT_BUDGET, LEAST_LIGHTS, within_budget
 from srbf.methods.clustered_eigen_map import ClusteredEigenMap
 from srbf.methods.eigen_map import EigenMap
@@ -78,6 +79,16 @@ def test_a_lower_target_takes_fewer_bytes(shadows: Capture, monkeypatch: pytest.
     assert "expected 90 dB" in said[-2] and said[-1].startswith("chose")
 
 
+def test_a_relative_error_takes_bytes_that_reach_it(cosines: Capture) -> None:
+    said: list[str] = []
+    settings = {"spread": 0.3, "ridge": 0.01}
+    chosen = within_budget(cosines, error=0.05, say=said.append, **settings)
+    assert evaluate(chosen.encode(cosines), cosines, roles=("validation",))["validation"]["relative_rmse"] <= 0.05
+    assert len(said) == 1 and "relative RMSE" in said[0]
+    within_budget(cosines, 8, error=1e-4, say=said.append, **settings)
+    assert "expected an error of 0.01%" in said[1] and "at least" in said[1]
+
+
 def test_train_lights_stand_in_for_validation(make_capture) -> None:
     capture = make_capture(smooth(np.random.default_rng(2)), lights=LEAST_LIGHTS, holdout=3).load()
     assert isinstance(within_budget(capture, 4), EigenMap)
@@ -89,7 +100,13 @@ def test_train_lights_stand_in_for_validation(make_capture) -> None:
 
 @pytest.mark.parametrize(
     ("asked", "words"),
-    [({"budget": 3}, "at least 4"), ({"budget": 8, "psnr": 30.0}, "found both"), ({"psnr": float("inf")}, "psnr")],
+    [
+        ({"budget": 3}, "at least 4"),
+        ({"budget": 8, "psnr": 30.0}, "found both"),
+        ({"error": 0.1, "psnr": 30.0}, "`error` or a `psnr`"),
+        ({"error": 1.0}, "`error` above 0 and below 1"),
+        ({"psnr": float("inf")}, "psnr"),
+    ],
 )
 def test_what_no_method_can_keep_to(cosines: Capture, asked: dict, words: str) -> None:
     with pytest.raises(InputError, match=words):

@@ -52,7 +52,7 @@ def test_an_open_plane_has_pi_times_the_radiance_of_an_even_environment() -> Non
     plane = build_plane()
     origins = RayOrigins.even(np.zeros((3, 1, 3)), np.array([[[0, 0, 1.0]], [[0, 0.6, 0.8]], [[1.0, 0, 0]]]))
     empty = inside(box(True))
-    far = Surfels(empty.cells, empty.corners + 100, empty.owners, empty.objects)
+    far = Surfels(empty.cells, empty.corners + 100, empty.owners, empty.objects, empty.emission)
     _, environment = factors_and_environment(far, Openings(plane.triangles), origins, RAYS)
     shares = np.asarray(environment.matrix().sum(axis=1)).ravel()
     np.testing.assert_allclose(shares[0], 1, atol=1e-5)

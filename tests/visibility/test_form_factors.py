@@ -59,8 +59,48 @@ def test_sides_that_no_free_place_sees_have_no_surfel() -> None:
     assert outside[0] == -1 and outside[1] >= 0
 
 
-def test_black_surfaces_have_no_surfel() -> None:
-    assert surfels(square(0, True), np.array([[0.5, 0.5, 0.5]]), 16, albedo=0.0).count == 0
+def test_black_surfaces_have_larger_surfels_unless_they_emit() -> None:
+    """They may be made to emit after the bake."""
+    corners, free = square(0, True, 16), np.array([[0.5, 0.5, 0.5]])
+    gray = surfels(corners, free, 64).count
+    black = Fragments(corners, np.zeros((len(corners), 3), np.float32))
+    numbers, occluders = np.zeros(len(corners), np.int64), EmbreeTriangles(corners)
+    dark = surfels_of(black, numbers, occluders, free, None, 64)
+    assert 0.5 * gray < dark.count <= 64 and not dark.emission.any()
+    dark = surfels_of(black, numbers, occluders, free, 0.125, 64)
+    shining = surfels_of(black, numbers, occluders, free, 0.125, 64, np.full((2, len(corners), 3), 2.0, np.float32))
+    assert 2 * dark.count < shining.count == 64
+    np.testing.assert_allclose(shining.emission, 2.0)
+
+
+def test_surfels_of_two_objects_or_of_light_and_dark_are_not_mixed() -> None:
+    corners, free = square(0, True, 16), np.array([[0.5, 0.5, 0.5]])
+    middle = corners.mean(axis=1)[:, 0]
+    albedo, occluders = np.full((len(corners), 3), 0.5, np.float32), EmbreeTriangles(corners)
+    objects = (middle > 0.4).astype(np.int64)
+    emission = np.where(middle[:, None] > 0.7, np.array([3.0, 2.0, 0.0], np.float32), 0)
+    found = surfels_of(
+        Fragments(corners, albedo), objects, occluders, free, 0.25, 200, np.stack([emission, 0 * emission]).astype(np.float32)
+    )
+    shares = [np.bincount(found.owners[0], of, found.count) / np.bincount(found.owners[0]) for of in (objects, middle > 0.7)]
+    assert all(np.isin(share, (0, 1)).all() for share in shares)
+    np.testing.assert_array_equal(found.objects, shares[0])
+    np.testing.assert_allclose(found.emission, shares[1][:, None] * [3, 2, 0])
+
+
+def test_the_back_of_what_emits_lights_the_wall_behind() -> None:
+    """A picture 5 mm off a wall: no free place sees its back. The inside of what is closed lights nothing else."""
+    wall, picture = square(0, True), square(0.005, True) * [0.5, 0.5, 1] + [0.25, 0.25, 0]
+    corners = np.concatenate([wall, picture]).astype(np.float32)
+    objects = np.repeat([0, 1], len(wall))
+    emission = np.broadcast_to((objects == 1)[None, :, None], (2, len(corners), 3)).astype(np.float32)
+    albedo = np.full((len(corners), 3), 0.5, np.float32)
+    free = np.random.default_rng(0).uniform([0.4, 0.4, 0.3], [0.6, 0.6, 0.5], (64, 3))
+    for numbers, sides in ((objects, {-1, 1}), (0 * objects, {1})):  # a picture; a closed thing of one object
+        found = surfels_of(Fragments(corners, albedo), numbers, EmbreeTriangles(corners), free, None, 200, emission)
+        assert set(np.sign(found.cells.normals[found.emission.any(axis=1), 2])) == sides
+        behind = (found.cells.places[:, 2] < 1e-3) & (np.abs(found.cells.places[:, :2] - 0.5) < 0.15).all(axis=1)
+        assert behind.any() == (len(sides) == 2), "and so has the wall that it lights"
 
 
 def test_no_more_surfels_than_asked() -> None:

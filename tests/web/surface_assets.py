@@ -17,8 +17,9 @@ def with_surfaces(made: Room, bounces: int | None) -> tuple[Room, Surfaces]:
     gather, sent = (rng.uniform(0, 0.2, (rank, PATCHES)).astype(np.float32) for _ in range(2))
     albedo = rng.uniform(0.1, 0.9, (PATCHES, 3)).astype(np.float32)
     shares = rng.uniform(0, 0.5, (2, PATCHES)).astype(np.float32)
+    emission = rng.uniform(0, 0.5, (rank, 2, 3)).astype(np.float32)
     feedback = np.stack([(gather * albedo[:, c]) @ sent.T for c in range(3)], axis=2)
-    tables, keys = Surfaces(gather, sent, feedback, shares, albedo, ("Wall", "Screen"), bounces).stored()
+    tables, keys = Surfaces(gather, sent, feedback, shares, albedo, ("Wall", "Screen"), bounces, emission).stored()
     files = {name: (table.astype(np.float32), "half") for name, table in tables.items()}
     stored = {keys[name]["file"]: image for name, image in files.items()}
     stored["surface_albedo.exr"] = (stored["surface_albedo.exr"][0].reshape(1, PATCHES, 3), "half")

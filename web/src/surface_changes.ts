@@ -13,7 +13,7 @@ const SMALL = 1e-7; // of the sum: a reflection that no longer counts
 const TOLD = 12; // names in an error
 
 /** Keys of asset.json of an asset that was fitted with `--editable`. */
-export interface SurfacesManifest extends Manifest, Partial<Record<(typeof FILES)[number], { file: string }>> {
+export interface SurfacesManifest extends Manifest, Partial<Record<(typeof FILES)[number] | "surface_emission", { file: string }>> {
   surfaces?: { objects: string[]; scales: Record<string, number>; bounces?: number };
 }
 
@@ -30,10 +30,12 @@ interface Known {
   shares: Float64Array;
   /** (S, 3). */
   albedo: Float64Array;
+  /** Weights of objects that emit a mean radiance of 1 in their own pattern, without bounces, (r, O, 3); undefined: evenly, by `shares`. */
+  emission?: LightValues;
 }
 
 export class Surfaces {
-  /** Names of the objects that can change: those with surfels, which black ones have not. */
+  /** Names of the objects that can change: those with surfels. */
   readonly names: readonly string[];
   /** How often a surface is exchanged between the surfels at most; undefined: always. */
   readonly bounces: number | undefined;
@@ -69,8 +71,10 @@ export class Surfaces {
         return readRgbTable(files, { file, scale: told.scales[name] }, rows[i], columns[i]);
       }),
     );
+    const own = manifest.surface_emission && { file: manifest.surface_emission.file, scale: told.scales.surface_emission };
+    const emission = own && (await readRgbTable(files, own, rank, told.objects.length));
     const gray = ({ data }: LightValues) => Float64Array.from({ length: data.length / 3 }, (_, i) => data[3 * i]);
-    return new Surfaces(manifest, { transfer, gather: gray(gather), sent: gray(sent), feedback, shares: gray(shares), albedo: Float64Array.from(albedo.data) });
+    return new Surfaces(manifest, { transfer, gather: gray(gather), sent: gray(sent), feedback, shares: gray(shares), albedo: Float64Array.from(albedo.data), emission });
   }
 
   /** Weights of the shapes, (r, 3), from irradiance on the surfels, (S, 3). */
@@ -119,11 +123,14 @@ export class Surfaces {
     this.share(name);
   }
 
-  /** Of an object that emits radiance 1: of what it lays on the receivers itself, and of all bounces. */
+  /** Of an object that emits a mean radiance of 1: of what it lays on the receivers itself, and of all bounces. */
   private white(name: string): Float64Array {
     const known = this.emitted.get(name);
     if (known) return known;
-    const first = product(this.known.gather, rgb(this.share(name).map((x) => Math.PI * x), this.known.transfer.count));
+    const share = this.share(name);
+    const { emission, gather, transfer } = this.known;
+    const at = this.manifest.surfaces?.objects.indexOf(name) ?? -1;
+    const first = emission ? column(emission, at) : product(gather, rgb(share.map((x) => Math.PI * x), transfer.count));
     const out = this.series(first, this.bounces === undefined ? undefined : this.bounces + 1, this.change);
     this.emitted.set(name, out);
     return out;
@@ -146,7 +153,7 @@ export class Surfaces {
   private share(name: string): Float64Array {
     const { names } = this;
     const at = this.manifest.surfaces?.objects.indexOf(name) ?? -1;
-    if (!names.includes(name)) throw new SrbfError(`expected an object of ${names.slice(0, TOLD).join(", ")}${names.length > TOLD ? ", …" : ""}, found ${JSON.stringify(name)}; black surfaces have no surfels`);
+    if (!names.includes(name)) throw new SrbfError(`expected an object of ${names.slice(0, TOLD).join(", ")}${names.length > TOLD ? ", …" : ""}, found ${JSON.stringify(name)}`);
     const { count } = this.known.transfer;
     return this.known.shares.subarray(at * count, (at + 1) * count);
   }
@@ -174,6 +181,11 @@ function product(matrix: Float64Array, numbers: Float64Array): Float64Array {
     out[i + 2] = b;
   }
   return out;
+}
+
+/** Column `at` of a table, (r, 3). */
+function column(table: LightValues, at: number): Float64Array {
+  return Float64Array.from({ length: 3 * table.functions }, (_, i) => table.data[3 * (Math.floor(i / 3) * table.count + at) + (i % 3)]);
 }
 
 /** The transposed of matrix (n, m) times RGB numbers (n, 3). */

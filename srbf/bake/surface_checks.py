@@ -1,0 +1,55 @@
+"""What a bake of surfels says of surfaces that suit it badly: without area, too many, black throughout, unseen by the receivers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Bool
+from srbf.errors import InputError
+from srbf.visibility.surface_cells import DARK, Fragments
+from srbf.visibility.surfels import Surfels
+from srbf.visibility.transfer_operator import TransferOperator
+
+MANY = 500_000  # triangles, from which on surfels take minutes
+MOST_SURFELS = 16_000  # form factors between them are kept as 16-bit numbers, and solved as a dense matrix
+BLIND = 0.2  # share of the receivers that see no surfel, from which on it is said
+
+
+def warn_of_surfaces(surfaces: Fragments, say: Callable[[str], None]) -> None:
+    """A line for triangles without area, and one for a great many."""
+    empty = int((surfaces.areas <= 0).sum())
+    if empty:
+        say(f"{empty} of {len(surfaces.corners)} triangles of the surfaces have no area and are left out")
+    if len(surfaces.corners) > MANY:
+        say(
+            f"the surfaces have {len(surfaces.corners):,} triangles: surfels of more than {MANY:,} take minutes and gigabytes of memory; "
+            "hide from renders, or simplify, what is dense"
+        )
+
+
+def require_surfels(surfels: Surfels) -> None:
+    """InputError where none reflects or emits, and where they are too many to exchange light."""
+    cells = surfels.cells
+    if not ((cells.albedo >= DARK).any() or surfels.emission.any()):
+        raise InputError(
+            "expected surfaces that reflect light around the free places, found none; choose another `light_bounds`, or make them diffuse"
+        )
+    if surfels.count > MOST_SURFELS:
+        raise InputError(
+            f"expected at most {MOST_SURFELS} surfels, found {surfels.count}: the surfaces are of very many small pieces; hide them from "
+            "renders or join them, or bake `light_set=patches`"
+        )
+
+
+def warn_of_receivers(operator: TransferOperator, covered: Bool[ndarray, " P"], say: Callable[[str], None]) -> None:
+    """A line where many of the `covered` receivers see no surfel; InputError where none sees one."""
+    blind = covered & (np.diff(operator.receivers.indptr) == 0)
+    share = float(blind.sum() / max(1, int(covered.sum())))
+    advice = "are their normals turned inside out, or do they look out of the scene alone?"
+    if share == 1:
+        raise InputError(f"expected receivers that see surfaces which light reaches, found none; {advice}")
+    if share > BLIND:
+        say(f"{share:.0%} of the receivers see no surface that light reaches and stay black; {advice}")
