@@ -19,8 +19,8 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
 from numpy import ndarray
-from test_godot import RENDERERS, ROOT, chroot_of_godot, run, say
 
 from srbf.asset import Asset
 from srbf.export.godot import write
