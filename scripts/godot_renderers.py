@@ -1,4 +1,4 @@
-"""Godot in its chroot, on both renderers, for scripts that compare it with numpy by what the tests make."""
+"""Godot in its chroot, on both renderers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
 
 RENDERERS = {
     "gl_compatibility": ["--rendering-method", "gl_compatibility", "--rendering-driver", "opengl3"],

@@ -18,22 +18,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from godot_renderers import RENDERERS, chroot_of_godot, run, say
-
-# isort: split
-from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform
-from made_assets import build_asset, build_planes
-from made_tables import KINDS, by_places, linear, made
+from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
 from numpy import ndarray
 
-from srbf.asset import Asset
-from srbf.export.godot import write
-from srbf.export.settings import PLAIN, Settings
-from srbf.io.image import decode_srgb, encode_srgb
-from srbf.light_geometry import attenuation
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight
-from srbf.methods import in_asset_frame, relight
-from srbf.methods.over_lights import finish
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
+
+from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform  # noqa: E402
+from made_assets import build_asset, build_planes  # noqa: E402
+from made_tables import KINDS, by_places, linear, made  # noqa: E402
+
+from srbf.asset import Asset  # noqa: E402
+from srbf.export.godot import write  # noqa: E402
+from srbf.export.settings import PLAIN, Settings  # noqa: E402
+from srbf.io.image import decode_srgb, encode_srgb  # noqa: E402
+from srbf.light_geometry import attenuation  # noqa: E402
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight  # noqa: E402
+from srbf.methods import in_asset_frame, relight  # noqa: E402
+from srbf.methods.over_lights import finish  # noqa: E402
 
 HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may cut instead of rounding
 STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's

@@ -25,7 +25,7 @@ from srbf.export.godot import write
 from srbf.methods import relight
 from srbf.relighting.probe_light import harmonics, light_at
 
-sys.path += [str(ROOT / "tests" / folder) for folder in ("web", "viewer")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), *(str(ROOT / "tests" / folder) for folder in ("export", "web", "viewer"))]
 from godot_lights import Z_UP, transform  # noqa: E402
 from godot_surfels import lights  # noqa: E402
 from probe_assets import probes_of_room, write_probes  # noqa: E402
