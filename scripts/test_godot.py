@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -20,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
 from numpy import ndarray
 
-ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
 
 from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform  # noqa: E402
@@ -38,16 +36,11 @@ from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, P
 from srbf.methods import in_asset_frame, relight  # noqa: E402
 from srbf.methods.over_lights import finish  # noqa: E402
 
-RENDERERS = {
-    "gl_compatibility": ["--rendering-method", "gl_compatibility", "--rendering-driver", "opengl3"],
-    "forward_plus": ["--rendering-method", "forward_plus", "--rendering-driver", "vulkan"],
-}
 HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may cut instead of rounding
 STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's
 FLOAT_ERROR = 1e-4  # single precision, of sums whose terms reach 10
 BYTE_STEP = 1.5 / 255
 FAR = 1e6  # meters
-SECONDS = 300  # of one Godot
 
 ENVIRONMENT = (
     np.random.default_rng(5).random((8, 16, 3)).astype(np.float32) ** 4
@@ -184,18 +177,6 @@ def held(picture: ndarray, job: dict[str, Any], renderer: str) -> ndarray:
     return picture if job["hdr"] else encode_srgb(np.clip(picture, 0, 1))
 
 
-def run(folder: Path, chroot: Path, *arguments: str, display: bool = False) -> str:
-    """Run Godot in the chroot on a project below its /tmp; returns its output."""
-    inside = "/" + folder.relative_to(chroot).as_posix()
-    screen = ["xvfb-run", "-a"] if display else []
-    command = ["chroot", str(chroot), "env", "HOME=/tmp", *screen, "godot", "--audio-driver", "Dummy", "--path", inside, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=SECONDS)
-    said = done.stdout + done.stderr
-    if done.returncode or "SCRIPT ERROR" in said or "SHADER ERROR" in said:
-        sys.exit(f"expected Godot to run {folder.name} {' '.join(arguments)}, found\n{said}")
-    return said
-
-
 def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: bool) -> int:
     """Print a line per renderer and job; returns the number of differences."""
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
@@ -241,19 +222,6 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     else:
         shutil.rmtree(folder)
     return missed
-
-
-def chroot_of_godot() -> Path:
-    """The folder of Godot's chroot; exits where it is not made yet."""
-    chroot = Path(os.environ.get("SRBF_GODOT_CHROOT", Path.home() / ".cache" / "srbf" / "godot")).resolve()
-    if not (chroot / "srbf-ready").exists():
-        sys.exit(f"expected a chroot with Godot at {chroot}, found none; scripts/godot-chroot makes it, or set SRBF_GODOT_CHROOT")
-    return chroot
-
-
-def say(line: str) -> None:
-    sys.stdout.write(line + "\n")
-    sys.stdout.flush()
 
 
 def main() -> None:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from test_godot import RENDERERS, ROOT, Z_UP, chroot_of_godot, run, say, transform
+from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
 from test_godot_surfels import edge_of, read, relative
 
 from srbf.asset import Asset
@@ -25,7 +25,8 @@ from srbf.export.godot import write
 from srbf.methods import relight
 from srbf.relighting.probe_light import harmonics, light_at
 
-sys.path += [str(ROOT / "tests" / folder) for folder in ("web", "viewer")]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), *(str(ROOT / "tests" / folder) for folder in ("export", "web", "viewer"))]
+from godot_lights import Z_UP, transform  # noqa: E402
 from godot_surfels import lights  # noqa: E402
 from probe_assets import probes_of_room, write_probes  # noqa: E402
 

@@ -19,16 +19,17 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
 from numpy import ndarray
-from test_godot import RENDERERS, ROOT, chroot_of_godot, run, say
 
 from srbf.asset import Asset
 from srbf.export.godot import write
 from srbf.methods import in_asset_frame, relight
 from srbf.methods.kept_visibility import light_on_patches
 
-from godot_lights import Lit  # isort: skip
-from godot_surfels import assets  # isort: skip
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
+from godot_lights import Lit  # noqa: E402
+from godot_surfels import assets  # noqa: E402
 
 MOST = 0.05  # of the picture: numpy sees each cell's middle by a ray, Godot its squares by shadow maps
 

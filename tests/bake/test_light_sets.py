@@ -26,7 +26,7 @@ def test_flags_mean_a_set() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("bulbs", (), 400, None, None, None), "named, cloud, patches, surfels or point:SPACING, found 'bulbs'"),
+        (("bulbs", (), 400, None, None, None), "named, cloud, patches, surfels, gather or point:SPACING, found 'bulbs'"),
         (("named", (), 400, 5, None, None), "`light_set=named` without `patches`"),
         (("cloud", ("Hall",), 400, None, None, None), "`light_group` with `light_set=named`"),
         (("patches", (), 400, None, None, None, 8.0), "`surfels_per_m2` with `light_set=surfels`"),
