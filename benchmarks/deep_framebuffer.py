@@ -10,16 +10,13 @@ seconds for one light; the noise of one reference. `--references FILE.npz` keeps
 from __future__ import annotations
 
 import argparse
-import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-from lights_inside import message, settings_of
+from references import rendered, settings_of
 
 from srbf.asset import Asset
-from srbf.bake.job import base_job
-from srbf.bake.worker import Worker
 from srbf.capture import COVERED, Capture
 from srbf.lights import Light, PointLight, SpotLight
 from srbf.methods import linear_response
@@ -41,7 +38,8 @@ def placed(capture: Capture, kind: str, count: int, seed: int = 3) -> list[Light
     occluders = occluders_of(scene)
     free = np.array(capture.manifest["free_places"])
     covered = capture.coverage().ravel() >= COVERED
-    position, normal = (capture.geometry(name).reshape(-1, 3)[covered].astype(np.float64) for name in ("position", "normal"))  # type: ignore[union-attr]
+    images = capture.geometry("position"), capture.geometry("normal")
+    position, normal = (image.reshape(-1, 3)[covered].astype(np.float64) for image in images if image is not None)
     lights: list[Light] = []
     while len(lights) < count:
         pixel = rng.integers(len(position), size=LOOKS)
@@ -70,31 +68,6 @@ def _sees(occluders: EmbreeTriangles, place: np.ndarray, points: np.ndarray) -> 
     )
 
 
-def rendered(scene: Path, capture: Capture, lights: list[Light], samples: int) -> np.ndarray:
-    """(2, N, 2, H, W, 3): indirect and direct light of every light, rendered twice."""
-    images = []
-    settings = settings_of(capture)
-    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
-        scratch = Path(name)
-        requests = [
-            {
-                "light": {"index": i, **message(light)},
-                "samples": samples,
-                "seed": 7919 * (i + len(lights) * again) + 11,
-                "region": None,
-                "channels": ["indirect", "direct"],
-            }
-            for again in range(2)
-            for i, light in enumerate(lights)
-        ]
-        job = {**base_job(scene, settings, scratch), "transport": "indirect", "transmittances": {}, "requests": requests}
-        with Worker(job, scratch, scratch / "bake.log", None) as worker:
-            for event in worker.events(print):
-                if event["event"] == "rendered":
-                    images.append([np.load(scratch / event["files"][part]) for part in ("indirect", "direct")])
-    return np.array(images, np.float32).reshape(2, len(lights), 2, settings.height, settings.width, 3)
-
-
 def error(own: np.ndarray, first: np.ndarray, second: np.ndarray) -> float:
     """Relative RMSE without the references' noise."""
     return float(np.sqrt(max(((own - first) * (own - second)).sum(dtype=np.float64), 0) / (first * second).sum(dtype=np.float64)))
@@ -118,7 +91,8 @@ def main() -> None:
     for kind in asked.kinds.split(","):
         lights = placed(capture, kind, asked.lights)
         if kind not in kept:
-            kept[kind] = rendered(asked.scene, capture, lights, asked.samples)
+            images = rendered(asked.scene, settings_of(capture), lights, asked.samples, ("indirect", "direct"))
+            kept[kind] = np.stack([images["indirect"], images["direct"]], axis=2)
             if asked.references is not None:
                 np.savez(asked.references, **kept)
         references = kept[kind][:, :, :, covered]
@@ -129,7 +103,7 @@ def main() -> None:
             indirect = np.stack([linear_response(asset, [light])[covered] for light in lights])
             seconds = (time.process_time() - started) / len(lights)
             with Added(asset, "ray") as added:
-                direct = np.stack([added.response([light])[covered] for light in lights])  # type: ignore[index]
+                direct = np.stack([np.asarray(added.response([light]))[covered] for light in lights])
             bounced, full, energies, noise = [], [], [], []
             for own, near, first, second in zip(indirect, direct, *references, strict=True):
                 known = np.isfinite(first + second).all(axis=(0, 2))  # Cycles leaves a few pixels of spots with sharp edges as NaN

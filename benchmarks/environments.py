@@ -9,15 +9,12 @@ each the ratio of energies.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
 
 import numpy as np
-from lights_inside import settings_of
+from references import rendered, settings_of
 
 from srbf.asset import Asset
-from srbf.bake.job import base_job
-from srbf.bake.worker import Worker
 from srbf.capture import COVERED, Capture
 from srbf.light_geometry import environment_samples
 from srbf.lights import EnvironmentLight
@@ -51,29 +48,6 @@ def environments(facing: np.ndarray) -> dict[str, EnvironmentLight]:
     return {name: EnvironmentLight(image.astype(np.float32)) for name, image in maps.items()}
 
 
-def rendered(scene: Path, capture: Capture, lights: list[EnvironmentLight], samples: int) -> dict[str, np.ndarray]:
-    """(2, N, H, W, 3) of `indirect` and `direct` light: every environment, twice."""
-    images: dict[str, list[np.ndarray]] = {"indirect": [], "direct": []}
-    settings = settings_of(capture)
-    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
-        scratch = Path(name)
-        requests = []
-        for again in range(2):
-            for i, light in enumerate(lights):
-                file = scratch / f"environment_{i}.npy"
-                np.save(file, light.image)
-                told = {"index": i, "kind": "environment", "file": str(file)}
-                seed = 7919 * (i + len(lights) * again) + 11
-                requests.append({"light": told, "samples": samples, "seed": seed, "region": None, "channels": list(images)})
-        job = {**base_job(scene, settings, scratch), "transport": "indirect", "transmittances": {}, "requests": requests}
-        with Worker(job, scratch, scratch / "bake.log", None) as worker:
-            for event in worker.events(print):
-                if event["event"] == "rendered":
-                    for channel, found in images.items():
-                        found.append(np.load(scratch / event["files"][channel]))
-    return {name: np.array(found).reshape(2, len(lights), settings.height, settings.width, 3) for name, found in images.items()}
-
-
 def cells(found: np.ndarray, first: np.ndarray, second: np.ndarray) -> str:
     """A column per environment; arrays (N, n, 3)."""
     errors = ((found - first) * (found - second)).sum(axis=(1, 2)) / (first * second).sum(axis=(1, 2))
@@ -94,7 +68,8 @@ def main() -> None:
     covered = capture.coverage() >= COVERED
     named = environments(np.array([float(number) for number in asked.facing.split(",")]))
     lights = list(named.values())
-    references = {name: images[:, :, covered] for name, images in rendered(asked.scene, capture, lights, asked.samples).items()}
+    images = rendered(asked.scene, settings_of(capture), lights, asked.samples, ("indirect", "direct"))
+    references = {name: found[:, :, covered] for name, found in images.items()}
     print(f"{'':>32}" + "".join(f"{name:>15}" for name in named))
     for path in asked.assets:
         asset = Asset.open(path)

@@ -10,16 +10,12 @@ one reference.
 from __future__ import annotations
 
 import argparse
-import tempfile
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from references import rendered, settings_of
 
 from srbf.asset import Asset
-from srbf.bake.job import base_job
-from srbf.bake.settings import BakeSettings, Receiver
-from srbf.bake.worker import Worker
 from srbf.capture import COVERED, Capture
 from srbf.lights import AreaLight, Light, PointLight, SpotLight
 from srbf.methods import linear_response
@@ -60,47 +56,6 @@ def placed(capture: Capture, kind: str, count: int, rng: np.random.Generator) ->
         else:
             lights.append(PointLight((x, y, z), falloff="inverse-square"))
     return lights
-
-
-def message(light: Light) -> dict[str, Any]:
-    """As the worker takes it."""
-    if isinstance(light, SpotLight):
-        return {"kind": "spot", "position": light.position, "direction": light.direction, "outer": light.outer}
-    if isinstance(light, AreaLight):
-        return {"kind": "area", "position": light.position, "u": light.u, "v": light.v}
-    assert isinstance(light, PointLight)
-    return {"kind": "point", "position": light.position}
-
-
-def settings_of(capture: Capture) -> BakeSettings:
-    """Those that render the receivers of a capture again."""
-    receiver = capture.manifest["source"]["settings"]["receiver"]
-    chosen = Receiver(receiver["kind"], receiver["name"], receiver.get("uv_layer"), tuple(receiver.get("also", ())))
-    return BakeSettings(chosen, capture.width, capture.height, quantity=capture.quantity)
-
-
-def rendered(scene: Path, settings: BakeSettings, lights: list[Light], samples: int) -> np.ndarray:
-    """(2, N, H, W, 3): the indirect light of every light, twice."""
-    images = []
-    with tempfile.TemporaryDirectory(prefix="srbf-") as name:
-        scratch = Path(name)
-        requests = [
-            {
-                "light": {"index": i, **message(light)},
-                "samples": samples,
-                "seed": 7919 * (i + len(lights) * again) + 11,
-                "region": None,
-                "channels": ["indirect"],
-            }
-            for again in range(2)
-            for i, light in enumerate(lights)
-        ]
-        job = {**base_job(scene, settings, scratch), "transport": "indirect", "transmittances": {}, "requests": requests}
-        with Worker(job, scratch, scratch / "bake.log", None) as worker:
-            for event in worker.events(print):
-                if event["event"] == "rendered":
-                    images.append(np.load(scratch / event["files"]["indirect"]))
-    return np.array(images).reshape(2, len(lights), settings.height, settings.width, 3)
 
 
 def row(relit: np.ndarray, first: np.ndarray, second: np.ndarray) -> str:
@@ -146,7 +101,7 @@ def main() -> None:
     )
     for kind in asked.kinds.split(","):
         lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
-        first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples)[:, :, covered]
+        first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples)["indirect"][:, :, covered]
         for path in asked.assets:
             asset = Asset.open(path)
             relit = np.stack([linear_response(asset, [light])[covered] for light in lights])

@@ -14,7 +14,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from lights_inside import placed, rendered, row
+from lights_inside import placed, row
+from references import rendered
 
 from srbf.asset import Asset
 from srbf.bake.job import base_job
@@ -68,7 +69,7 @@ def main() -> None:
         points, normals = geometry(scene, settings)
         for kind in asked.kinds.split(","):
             lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
-            references = rendered(scene, settings, lights, asked.samples)
+            references = rendered(scene, settings, lights, asked.samples)["indirect"]
             first, second = references.reshape(2, len(lights), -1, 3)[:, :, : len(points)]
             for path in asked.assets:
                 asset = Asset.open(path)

@@ -13,11 +13,13 @@ import argparse
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from lights_inside import placed, rendered, settings_of
+from lights_inside import placed
 from numpy import ndarray
+from references import rendered, settings_of
 
 from srbf.asset import Asset
 from srbf.bake.light_sets import LIGHT_SET_FILE, FoundPlaces
@@ -156,7 +158,7 @@ def main() -> None:
     cycles: dict[str, ndarray] = {}
     if asked.scene is not None:
         for kind, own in lights.items():
-            cycles[kind] = rendered(asked.scene, settings_of(capture), own, asked.samples)[:, :, covered]
+            cycles[kind] = rendered(asked.scene, settings_of(capture), own, asked.samples)["indirect"][:, :, covered]
     against = [f"{kind} surfels" for kind in KINDS] + list(KINDS) + [f"{kind} Cycles" for kind in cycles]
     print(f"{'':>26}" + "".join(f"{name:>15}" for name in against) + f"{'kept':>7}{'files MB':>10}{'frame ms':>10}")
 
@@ -174,7 +176,7 @@ def main() -> None:
         own_surfels = {kind: np.stack([light_on_surfels(asset, one) for one in direct[kind]]) for kind in KINDS}
         shown = {kind: relit(asset, lights[kind]) for kind in KINDS}
         kept = asset.tables["patch_matrices"].any(axis=2).mean()
-        frame = timed(lambda asset=asset: light_on_surfels(asset, direct["point"][0]))  # type: ignore[misc]
+        frame = timed(partial(light_on_surfels, asset, direct["point"][0]))
         row(f"d2 {count}", shown, own_surfels, f"{kept:7.0%}{files_of(asset) / 1e6:10.1f}{frame:10.1f}")
     splats = {kind: np.stack([on_receivers(asset, light)[covered] for light in on_surfels[kind]]) for kind in KINDS}
     row("splats, uncompressed", splats, on_surfels, "")
