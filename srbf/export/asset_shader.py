@@ -50,7 +50,7 @@ vec3 srbfAssetDirectional(highp sampler2DArray layers, highp sampler2D clusters,
 """,
 }
 PROBES = ["probes/probe_harmonics.glsl", "probes/probe_irradiance.glsl"]
-PROBE_TEXELS = 7  # of a probe's harmonics: 27 numbers, four to a texel
+PROBE_TEXELS = 7  # of a probe's harmonics: 27 numbers, four per texel
 _PROBES_GLSL = """
 /* The light of this asset's probes, PROBE_COLUMNS x PROBE_ROWS texels, from the finished picture of their facets. */
 vec4 srbfAssetProbeHarmonics(highp sampler2D facets, highp sampler2D places, ivec2 at) {

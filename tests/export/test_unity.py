@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pixels import FLOAT, LIGHTS, images_of, magnitude, run, weights_of
+from unity_programs import ENGINE_FREE, Said
 
 from srbf import methods
 from srbf.asset import Asset
@@ -31,7 +32,6 @@ needs_mono = pytest.mark.skipif(not (shutil.which("mcs") and shutil.which("mono"
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
 HERE = Path(__file__).parent / "unity"
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds", "SrbfLightTable", "SrbfPositionTable", "SrbfSurfels")
 AXES = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)  # of the asset from Unity's, written down once more
 OFFSET = np.array([0.2, -0.4, 0.3])  # of the imported scene's root, in the asset's axes
 FARS = [DirectionalLight((0.3, 0.5, 0.8), (1.0, 0.8, 0.3)), DirectionalLight((-0.6, 0.1, 0.4), (0.2, 0.5, 0.9))]
@@ -148,33 +148,6 @@ def test_the_graph_version_takes_a_texture_array_and_a_sampler(folders: dict[str
     text = structures + shader_of(folders["relighting-map"])
     assert "SrbfRelightFrom_float" in text
     spirv.compile_hlsl(text + "\nfloat4 main() : SV_Target { return 0.0; }\n")
-
-
-Said = dict[str, list[list[float]]]
-
-
-@pytest.fixture(scope="module")
-def ask(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path, list[float]], Said]:
-    """What the engine-free C# says of an exported folder and of lights as numbers, rows of numbers by name."""
-    program = tmp_path_factory.mktemp("mono") / "responses.exe"
-    sources = [engine_root("unity") / "Srbf" / "Runtime" / f"{name}.cs" for name in ENGINE_FREE]
-    done = subprocess.run(
-        ["mcs", "-langversion:7", f"-out:{program}", *map(str, sources), str(HERE / "Responses.cs")], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-
-    def found(folder: Path, lights: list[float]) -> Said:
-        done = subprocess.run(["mono", str(program), str(folder), *map(repr, lights)], capture_output=True, text=True, timeout=60)
-        assert done.returncode == 0, done.stderr
-        if done.stdout.startswith("refused"):
-            raise ValueError(done.stdout.strip())
-        said: Said = {}
-        for line in done.stdout.splitlines():
-            name, *values = line.split()
-            said.setdefault(name, []).append([float(value) for value in values])
-        return said
-
-    return found
 
 
 @pytest.fixture(scope="module")

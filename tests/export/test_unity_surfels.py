@@ -13,7 +13,7 @@ import pytest
 from closed_forms import glb
 from made_surfels import DOOR, LIGHTS, WALL, irradiance_of, made_asset, weights_of
 from passes import Passes
-from test_unity import ask, needs_mono, needs_spirv  # noqa: F401
+from test_unity import needs_mono, needs_spirv
 
 from srbf.asset import Asset
 from srbf.export import spirv, unity
@@ -286,7 +286,7 @@ def test_every_entry_compiles_for_direct3d_too(folder: Path) -> None:
 
 
 @needs_mono
-def test_c_sharp_reads_what_passes_need(folder: Path, told: dict[str, Any], ask: Callable[..., Any]) -> None:  # noqa: F811
+def test_c_sharp_reads_what_passes_need(folder: Path, told: dict[str, Any], ask: Callable[..., Any]) -> None:
     said = ask(folder, [0.5, 2.0, 1.0])
     assert said["surfels"] == [[told["patches"], told["triangles"], told["reach"], told["lift"], *told["middle"]]]
     assert said["table"] == [[t["rows"], t["columns"], t["channels"], t["scale"], -(-t["columns"] // 64)] for t in told["tables"]]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made_tables import INSIDE, KINDS, MIX, NAMES, by_places, linear, made, size_of_terms
 from pixels import FLOAT, run
-from test_unity import MAIN, UNITY_CG, ask, needs_mono, needs_spirv, shader_of  # noqa: F401
+from test_unity import MAIN, UNITY_CG, needs_mono, needs_spirv, shader_of
 
 from srbf import methods
 from srbf.asset import Asset
@@ -50,7 +50,7 @@ def weights_of(asset: Asset) -> np.ndarray:
 
 @needs_mono
 @pytest.mark.parametrize("kind", KINDS)
-def test_c_sharp_weighs_lights_as_numpy(folders: dict[str, Path], ask: Any, kind: str) -> None:  # noqa: F811
+def test_c_sharp_weighs_lights_as_numpy(folders: dict[str, Path], ask: Any, kind: str) -> None:
     asset = Asset.open(folders[kind])
     said = ask(folders[kind], numbers_of(asset))
     expected = weights_of(asset)

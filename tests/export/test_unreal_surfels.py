@@ -18,8 +18,8 @@ import pytest
 from made_surfels import LIGHTS, irradiance_of, made_asset, weights_of
 from made_tables import made
 from passes import Passes
-from test_unreal import StandIn, stand_in  # noqa: F401
 from test_unreal_tables import component_compiles
+from unreal_stand_in import StandIn
 
 from srbf.asset import Asset
 from srbf.errors import InputError
@@ -293,7 +293,7 @@ def test_the_component_compiles_against_unreals_interfaces(tmp_path: Path) -> No
 @pytest.mark.parametrize("kind", ["faces", "depths"])
 def test_the_script_makes_the_passes(
     folders: dict[str, Path],
-    stand_in: StandIn,  # noqa: F811
+    stand_in: StandIn,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     kind: str,

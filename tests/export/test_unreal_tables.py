@@ -17,7 +17,8 @@ import numpy as np
 import pytest
 from made_tables import INSIDE, KINDS, MIX, NAMES, by_places, linear, made, size_of_terms
 from pixels import FLOAT, run
-from test_unreal import StandIn, shader_of, stand_in  # noqa: F401
+from test_unreal import shader_of
+from unreal_stand_in import StandIn
 
 from srbf import methods
 from srbf.asset import Asset
@@ -137,7 +138,7 @@ def test_the_custom_node_gives_numpys_pixels(folders: dict[str, Path], kind: str
 @pytest.mark.parametrize("kind", ["named-maps", "light-cloud"])
 def test_the_script_connects_the_weights_and_copies_the_tables(
     folders: dict[str, Path],
-    stand_in: StandIn,  # noqa: F811
+    stand_in: StandIn,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     kind: str,
