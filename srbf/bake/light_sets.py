@@ -32,7 +32,8 @@ LIGHT_SET_FILE = "light_set.npz"  # in the capture's folder: what was found of t
 PATCHES_FILE = "patches.exr"
 MOST_NAMES = 4096
 MOST_LIGHTS = 20_000  # of a cloud, or patches
-SURFELS = 5000  # of the transfer operator, about, unless a density is given
+SURFELS = 5000  # of the transfer operator, about, unless a density is given; as many more, up to MOST_SURFELS, as this size asks for:
+SURFEL_SIZE = 0.16  # m
 MOST_SURFELS = 8000
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from srbf.bake.folder import STATE
 from srbf.bake.gather_set import GatherSet
-from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, CloudSet, FoundPlaces, NamedSet
+from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, MOST_SURFELS, SURFEL_SIZE, CloudSet, FoundPlaces, NamedSet
 from srbf.bake.probes import facts_line, grid_of
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings, LightSet
@@ -207,7 +207,10 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
         front = arrays["emission"][opaque]
         emission = np.stack([front, np.where(arrays["one_sided"][opaque, None] > 0.5, 0, front)])
         objects = arrays["object"][opaque].astype(np.int64)
-        surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, light_set.count, emission)
+        most = light_set.count
+        if light_set.spacing is None:
+            most = int(np.clip(surfaces.areas.sum() / SURFEL_SIZE**2, most, MOST_SURFELS))
+        surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, most, emission)
         require_surfels(surfels)
         patches = ungrouped(surfels.cells)
     else:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float16, Float32, Float64, Int
+from srbf.encode.table_steps import steps_by_cluster
 
 MOST_NODES = 2048
 LEAST_SPACING = 0.2  # m
 FINE = 4  # places per cell and axis at which it is known which corners are seen
 MOST_RANK = 128
+NODE_STEP = 2.0**-8  # of the rms of an axis
 RANK_ERROR = 0.01  # of the nodes' values, rms
 SEEN = 1e-4  # sum of weights below which a light sees no node
 CORNERS = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])
@@ -37,6 +39,11 @@ class PositionTable:
     nodes: Float32[ndarray, "N R"]
     basis: Float16[ndarray, "R F 3"]
     seen: ndarray
+
+    def in_steps(self, clusters: int) -> PositionTable:
+        """The same with values as even steps, which files pack well."""
+        basis = steps_by_cluster(self.basis.transpose(1, 0, 2), clusters).transpose(1, 0, 2)
+        return replace(self, nodes=np.round(self.nodes / NODE_STEP) * np.float32(NODE_STEP), basis=np.ascontiguousarray(basis))
 
     def manifest(self) -> dict[str, Any]:
         """Its keys of asset.json."""

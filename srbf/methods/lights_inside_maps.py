@@ -61,7 +61,7 @@ class LightsInsideMaps(LightTableMaps):
         """The cells, and the table of places, which needs all else of the asset."""
         asset.tables["cells"] = inside.cells.image()
         asset.manifest["cells"] = {"file": cls.tables["cells"]}
-        places = position_table(lambda at: cls.at_places(asset, at), inside.visible, inside.free)
+        places = position_table(lambda at: cls.at_places(asset, at), inside.visible, inside.free).in_steps(asset.clusters)
         asset.manifest |= places.manifest()
         asset.tables |= places.tables()
 

@@ -16,6 +16,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
+from srbf.encode.table_steps import steps_by_column
 from srbf.errors import InputError
 from srbf.methods.environment_table import without_environment_table
 from srbf.solve.radiosity import MOST_REFLECTED, SERIES
@@ -68,10 +69,11 @@ class Surfaces:
         feedback = basis.feedback.astype(np.float32)
         radiosity = emitted_by_objects(operator).radiosity
         emission = np.stack([basis.gather @ np.ascontiguousarray(radiosity[:, :, c]) for c in range(3)], axis=2)
+        gather = grouped(basis.gather, groups, count)
         return Surfaces(
-            grouped(basis.gather, groups, count),
-            sent,
-            feedback,
+            steps_by_column(gather[:, :, None], basis.sizes)[:, :, 0],
+            steps_by_column(sent[:, :, None], np.ones(len(sent), np.float32))[:, :, 0],  # weights have an rms of 1
+            steps_by_column(feedback, basis.sizes),
             shares,
             np.ascontiguousarray(albedo.T),
             tuple(names[i] for i in having),

@@ -9,12 +9,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float16, Float32, Float64, Int
+from srbf.arrays import Bool, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import NOWHERE, CapturedLight
 from srbf.compute.full_precision import by_channel
+from srbf.encode.table_steps import steps_by_cluster, steps_by_column
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.lights import EnvironmentLight, Light, NamedLight
@@ -41,9 +42,7 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 TRANSFER_FILE = "transfer.exr"
 MOST_SURFELS = 8000
-BITS = 10  # of a weight, sign included, by the largest of its row: what has few bits packs well
 SHAPES_LEFT_OUT = 0.25  # of an error that is asked for, on the lights that shapes are made for
-VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions: what they are multiples of
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
 TEXELS_PER_CLUSTER = 24  # at least, of a candidate
@@ -194,7 +193,8 @@ class Transfer(LightsInsideMaps):
             found = fit_for_error(self.error, judges, sizes, basis, self.components, encode, Transfer, run.say)
             asset, cells, basis = found.asset, found.cells, truncated(basis, found.rank)
         if operator.environment is not None:
-            add_environment_table(asset, _rounded(environment_columns(basis.transfer, operator.environment)), operator.environment)
+            columns = steps_by_column(environment_columns(basis.transfer, operator.environment), basis.sizes)
+            add_environment_table(asset, columns, operator.environment)
         if self.editable:
             names = tuple(told.get("objects", ()))
             Surfaces.of_basis(basis, operator, cells.patches, names, told.get("bounces")).add_to(asset)
@@ -212,10 +212,10 @@ class Transfer(LightsInsideMaps):
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
-        asset.tables["light_values"] = _even_steps(asset.tables["light_values"], asset.clusters)
+        asset.tables["light_values"] = steps_by_cluster(asset.tables["light_values"], asset.clusters)
         count = cells.patch_count
         own = np.stack([grouped(basis.transfer[:, measured, c], cells.patches, count) for c in range(3)], axis=2)
-        asset.tables["surfel_transfer"], entry = stored_values(_rounded(own))
+        asset.tables["surfel_transfer"], entry = stored_values(steps_by_column(own, basis.sizes))
         asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
         return asset
 
@@ -267,21 +267,6 @@ class Transfer(LightsInsideMaps):
 def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
     """Patches of one object each."""
     return np.unique(np.stack([patches, objects]), axis=1, return_inverse=True)[1].ravel()
-
-
-def _rounded(values: Float32[ndarray, "r S 3"]) -> Float32[ndarray, "r S 3"]:
-    """Values as multiples of a power of two for each row and color."""
-    largest = np.maximum(np.abs(values).max(axis=1, keepdims=True), np.float32(1e-30))
-    step = np.exp2(np.ceil(np.log2(largest / (2 ** (BITS - 1) - 1))))
-    return (np.round(values / step) * step).astype(np.float32)
-
-
-def _even_steps(values: Float16[ndarray, "F r c"], clusters: int) -> Float16[ndarray, "F r c"]:
-    """Values as multiples of a power of two for each cluster."""
-    of_cluster = values.astype(np.float32).reshape(clusters, -1)
-    rms = np.sqrt((of_cluster**2).mean(axis=1, keepdims=True))
-    step = np.exp2(np.round(np.log2(VALUE_STEP * np.maximum(rms, np.float32(1e-30)))))
-    return (np.round(of_cluster / step) * step).reshape(values.shape).astype(np.float16)
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:

@@ -11,7 +11,7 @@ from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
 from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, grouped_cells, lit
-from srbf.visibility.surfels import Surfels, cut_at_walls
+from srbf.visibility.surfels import GAP, Surfels, cut_at_walls
 
 MOST_POOL = 65_536  # indices of surfels are 16 bits
 LOOKS, LOOK_RAYS = 16_384, 64  # points of the view, and rays of each, by which it is known what the view gathers
@@ -36,7 +36,7 @@ def pool_of(
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well.
     """
-    surfaces, source = cut_at_walls(surfaces, occluders)
+    surfaces, source = cut_at_walls(surfaces, occluders, GAP * float(np.sqrt(surfaces.areas.sum() / count)))
     objects = objects[source]
     both = surfaces.both_sides()
     able = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))

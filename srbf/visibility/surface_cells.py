@@ -17,6 +17,7 @@ from srbf.visibility.embree import EmbreeTriangles
 OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
 STAGES = (16, 192)  # places that most surfaces are seen from
 RAYS = 1 << 20  # traced at a time
+LAYERS = 1 / 8  # of a cell's size: walls that are farther apart are not in one cell
 NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way
 FLAT = 0.01  # of a fragment's longest edge: how far a point is off it at most
 DARK = 1e-3  # albedo below which nothing is reflected
@@ -143,9 +144,18 @@ def cells_of(fragments: Fragments, size: float, apart: Int[ndarray, " T"] | None
     voxel = np.floor((centers - low) / size).astype(np.int64)
     rough = np.abs(normals).max(axis=1) < 0.99  # curved or slanted: by its direction as well
     keys = np.column_stack([voxel, facing, np.where(rough[:, None], across, 0), color, *(() if apart is None else (apart,))])
-    _, owner = np.unique(keys, axis=0, return_inverse=True)
-    owner = owner.ravel()
+    owner = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    owner = _layered(owner, np.where(rough, 0.0, np.take_along_axis(centers, major[:, None], 1)[:, 0]), size * LAYERS)
     return grouped_cells(fragments, owner), owner
+
+
+def _layered(owner: Int[ndarray, " T"], height: Float64[ndarray, " T"], gap: float) -> Int[ndarray, " T"]:
+    """Groups in parts between which lies a `gap` of heights: walls one behind another."""
+    order = np.lexsort((height, owner))
+    new = (np.diff(owner[order]) > 0) | (np.diff(height[order]) > gap)
+    found = np.empty(len(owner), np.int64)
+    found[order] = np.concatenate([[0], np.cumsum(new)]) if len(owner) else 0
+    return found
 
 
 def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:

@@ -19,7 +19,8 @@ WITNESSES = 256  # free places by which it is known what a wall parts
 REACH, REACH_RAYS = 3, 64  # bounces and rays by which sides are found that no free place sees
 LEAST_VIEW = 0.1  # share of such a side's hemisphere that lit surfaces fill
 SIDES = 1 << 14  # whose rays are traced at a time
-CUTS = 4  # halvings of a triangle that a wall parts
+CUTS = 6  # halvings of a triangle that a wall parts
+GAP = 1 / 2  # of a surfel's size: what another surface is closer to is covered
 DIM_SIZE = 2.0  # of surfels that neither reflect nor emit
 MOST_OBJECTS = 500  # beyond, objects smaller than a surfel share them
 EMISSION_STEPS = 4  # of what an object emits
@@ -100,19 +101,19 @@ def surfels_of(
 ) -> Surfels:
     """Surfels of about `size` meters of all that the free places see, larger where there would be more than `most`; None: about `most`.
 
-    None straddles a border of albedo or of emission, or a wall that stands on a surface, nor are objects mixed, but small ones where there
-    are thousands. Black surfaces have surfels of twice the size, since they may be made to emit. `surfaces`: opaque triangles of any side,
-    no edge longer than a surfel; `objects`: of each, its object's number; `emission`: radiance of both sides of each.
+    None straddles a border of albedo or of emission, a wall that stands on a surface, or the rim of what lies on it, nor are objects mixed,
+    but small ones where there are thousands. Black surfaces have surfels of twice the size, since they may be made to emit. `surfaces`:
+    opaque triangles of any side, no edge longer than a surfel; `objects`: of each, its object's number; `emission`: radiance of both sides.
     """
     if emission is None:
         emission = np.zeros((2, len(objects), 3), np.float32)
-    surfaces, source = cut_at_walls(surfaces, occluders)
+    width = float(np.sqrt(surfaces.areas.sum() / most)) if size is None else size
+    surfaces, source = cut_at_walls(surfaces, occluders, GAP * width)
     objects, emission = objects[source], emission[:, source]
     both, object_of, shines = surfaces.both_sides(), np.concatenate([objects, objects]), np.concatenate(list(emission))
     kept = np.flatnonzero(both.areas > 0)
     seen = np.zeros(len(both.corners), bool)
     seen[kept[exposed(both.at(kept), occluders, free)]] = True
-    width = float(np.sqrt(both.areas.sum() / 2 / most)) if size is None else size
     light, gap = lighting_others(both, object_of, shines, width)
     kept, hidden = kept[(reached(both, seen) | light)[kept]], gap & ~seen
     owners = np.full(len(both.corners), -1, np.int64)
@@ -122,8 +123,9 @@ def surfels_of(
         return Surfels(nothing, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark, np.zeros(0, bool))
     fragments = both.at(kept)
     witnesses = lit(fragments.centers, fragments.normals, occluders, free[:WITNESSES])
-    sides = _Sides(fragments, object_of[kept], shines[kept], hidden[kept], witnesses)
-    area = sides.fragments.areas * np.where(sides.is_dim, 1 / DIM_SIZE**2, 1.0)
+    under = covered(fragments.centers, fragments.normals, occluders, GAP * width)
+    sides = _Sides(fragments, object_of[kept], shines[kept], hidden[kept], under, witnesses)
+    area = sides.fragments.areas / sides.sizes**2
     least = float(np.sqrt(area.sum() / most))
     spacing = least if size is None else max(size, least)
     owner = sides.owners(spacing)
@@ -143,12 +145,13 @@ def surfels_of(
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sides that have surfels: `objects` (N,), `emission` (N, 3), which are `hidden`, and `seen` (N, F), from which free places."""
+    """Sides that have surfels: `objects` (N,), `emission` (N, 3), which are `hidden` and `covered`, `seen` (N, F) from which places."""
 
     fragments: Fragments
     objects: Int[ndarray, " N"]
     emission: Float32[ndarray, "N 3"]
     hidden: Bool[ndarray, " N"]
+    covered: Bool[ndarray, " N"]
     seen: Bool[ndarray, "N F"]
 
     @property
@@ -156,17 +159,23 @@ class _Sides:
         """Those that neither reflect nor emit."""
         return (self.fragments.albedo.max(axis=1) < DARK) & ~self.emission.any(axis=1)
 
+    @property
+    def sizes(self) -> Float64[ndarray, " N"]:
+        """Of their surfels, by that of the others."""
+        return np.where(self.is_dim, DIM_SIZE, 1.0)
+
     def owners(self, spacing: float) -> Int[ndarray, " N"]:
         """The surfel of every side: those of a cell that share places from which they are seen; one that none sees joins another."""
         apart, owner, count = self._apart(spacing), np.empty(len(self.objects), np.int64), 0
-        for chosen, size in ((~self.is_dim, spacing), (self.is_dim, DIM_SIZE * spacing)):
-            if chosen.any():
-                owner[chosen] = count + cells_of(self.fragments.at(chosen), size, apart[chosen])[1]
-                count = int(owner[chosen].max()) + 1
+        sizes = self.sizes
+        for size in np.unique(sizes):
+            chosen = sizes == size
+            owner[chosen] = count + cells_of(self.fragments.at(chosen), float(size) * spacing, apart[chosen])[1]
+            count = int(owner[chosen].max()) + 1
         return _parted_cells(owner, self.seen)
 
     def _apart(self, spacing: float) -> Int[ndarray, " N"]:
-        """What no surfel has two of: objects, small ones of many together unless they emit; steps of emission; hidden sides."""
+        """What no surfel has two of: objects, small ones of many together unless they emit; steps of emission; hidden and covered sides."""
         count = int(self.objects.max()) + 1
         strength = self.emission.max(axis=1)
         most = np.zeros(count)
@@ -174,7 +183,7 @@ class _Sides:
         large = np.bincount(self.objects, self.fragments.areas, count) >= spacing**2
         own = (most > 0) | large | (len(np.unique(self.objects)) <= MOST_OBJECTS)
         step = np.ceil(EMISSION_STEPS * strength / np.maximum(most, 1e-30)[self.objects]).astype(np.int64)
-        return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1) * 2 + self.hidden
+        return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1) * 4 + 2 * self.covered + self.hidden
 
 
 def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
@@ -203,9 +212,21 @@ def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
     return found
 
 
-def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles) -> tuple[Fragments, Int[ndarray, " U"]]:
-    """(triangles, those that another surface parts, so that a corner is hidden from the middle, in halves, a few times over; of which each
-    is a part)."""
+def covered(
+    points: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], occluders: EmbreeTriangles, gap: float
+) -> Bool[ndarray, " n"]:
+    """Above which points another surface lies, less than `gap` (m) along the normal."""
+    if not len(points):
+        return np.zeros(0, bool)
+    lift = OFFSET * float(np.ptp(points, axis=0).max())
+    return occluders.occluded((points + lift * normals).astype(np.float32), normals, np.full(len(points), gap))
+
+
+def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles, gap: float) -> tuple[Fragments, Int[ndarray, " U"]]:
+    """(triangles, those that another surface parts in halves, a few times over; of which each is a part).
+
+    It parts one where a corner is hidden from the middle, or is not covered, within `gap` (m), where the middle is.
+    """
     done: list[tuple[ndarray, ndarray, ndarray]] = []
     corners, albedo, source = surfaces.corners, surfaces.albedo, np.arange(len(surfaces.corners))
     lift = OFFSET * float(np.ptp(corners.reshape(-1, 3), axis=0).max(initial=0))
@@ -214,8 +235,10 @@ def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles) -> tuple[Fragm
         hidden = np.zeros(len(corners), bool)
         for side in (1.0, -1.0):
             middle = own.centers + side * lift * own.normals
+            under = covered(own.centers, side * own.normals, occluders, gap)
             for corner in range(3):
                 vector = 0.98 * (corners[:, corner] - own.centers)
+                hidden |= under != covered(own.centers + vector, side * own.normals, occluders, gap)
                 distance = np.linalg.norm(vector, axis=1)
                 direction = vector / np.maximum(distance, 1e-30)[:, None]
                 hidden |= occluders.occluded(middle.astype(np.float32), direction, distance)

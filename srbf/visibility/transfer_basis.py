@@ -50,6 +50,11 @@ class TransferBasis:
     sent: Float32[ndarray, "S r"]
     feedback: Float64[ndarray, "r r 3"]
 
+    @property
+    def sizes(self) -> Float32[ndarray, " r"]:
+        """The rms of each shape."""
+        return np.sqrt(np.mean(self.shapes**2, axis=0))
+
 
 @dataclass(frozen=True, eq=False)
 class Emitted:
