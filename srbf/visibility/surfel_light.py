@@ -23,7 +23,7 @@ from srbf.visibility.surface_cells import Cells
 if TYPE_CHECKING:
     import moderngl
 
-FACE = 512  # texels per side of a face of the shadow cube
+FACE = 1024  # texels per side of a face of the shadow cube
 
 
 class SurfelLight:

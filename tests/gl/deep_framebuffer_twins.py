@@ -42,7 +42,7 @@ def _(evaluate: Evaluate) -> None:
     for slope in ((0.0, 0.0), (0.5, -0.2), (2.0, 1.0)):  # of one over the depth, per unit of the tangent, times the depth in the middle
         plane = 1 + 0.15 * (slope[0] * middle[None, :] + slope[1] * middle[:, None])
         covered = np.where(middle[None, :] < 0, 1.5 * plane, plane)
-        uv = rng.uniform(0.05, 0.95, (200, 2))
+        uv = rng.uniform(0.001, 0.999, (200, 2))
         own = 1 + 0.15 * ((2 * uv - 1) @ np.array(slope))
         shade = np.clip(0.5 - (uv[:, 0] - 0.5) * width, 0, 1)  # how much of four texels is covered
         for heights, lift, expected in ((plane, 2e-4, 1), (plane, -5e-4, 0), (plane, -0.05, 0), (covered, 2e-4, 1 - shade)):

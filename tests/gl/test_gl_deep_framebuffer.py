@@ -30,7 +30,7 @@ from srbf.visibility.surfel_light import SurfelLight
 pytest.importorskip("embreex")
 
 TOLERANCE = 2e-3  # of the largest value; 3e-4 measured, of bounces that are left out
-EDGES, SHADOWED = 0.01, 0.03  # of the surfels, at the edge of a shadow, see a part of the light; of the largest value, with 700 surfels
+EDGES, SHADOWED = 0.01, 0.02  # of the surfels, at the edge of a shadow, see a part of the light; of the largest value, with 700 surfels
 LIGHTS: dict[str, Light] = {
     "point": PointLight((0.8, 0.7, 1.1), (1, 0.5, 0.2), falloff="inverse-square"),
     "linear": PointLight((2.4, 1.4, 0.6), (0.2, 0.5, 1), a0=2.0),
