@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -116,7 +117,7 @@ def main() -> None:
                 return clock() - started
 
             draws = draws_of(asset, context, resources)
-            took = medians({name: lambda draw=draw: timed(draw) for name, draw in draws.items()}, asked.runs)
+            took = medians({name: partial(timed, draw) for name, draw in draws.items()}, asked.runs)
         plain, still = took["direct"], took["direct"] + took["pixels"]
         whole = took["surfels"] + took["links"] + took["pixels"] + took["direct"] - took["shadow"]
         took |= {"surfels": took["surfels"] - took["shadow"], "direct": took["direct"] - took["shadow"]}

@@ -39,7 +39,7 @@ LIGHTS: dict[str, Light] = {
     "sphere": SphereLight((0.6, 1.2, 0.8), (0.2, 1, 0.4), size=0.1),
     "area": AreaLight((1.5, 1, 1.7), u=(0.6, 0, 0), v=(0, -0.3, 0)),
     "sun": DirectionalLight((0.2, 0.1, 1)),
-    "sky": EnvironmentLight(np.random.default_rng(3).uniform(0, 1, (8, 16, 3)).astype(np.float32)),
+    "environment": EnvironmentLight(np.random.default_rng(3).uniform(0, 1, (8, 16, 3)).astype(np.float32)),
 }
 
 
@@ -97,16 +97,16 @@ def test_lights_add_up_and_direct_light_joins_them(asset: Asset, relighter: Reli
 def test_a_light_that_stays_is_not_computed_again(asset: Asset, relighter: Relighter) -> None:
     passes: Any = relighter._passes
     assert isinstance(passes, PoolPasses)
-    point, spot, sky = (LIGHTS[name] for name in ("point", "spot", "sky"))
-    relighter.relight([point, spot, sky])
+    point, spot, around = (LIGHTS[name] for name in ("point", "spot", "environment"))
+    relighter.relight([point, spot, around])
     before = passes.computed
-    brighter = [replace(point, color=(0.1, 2.0, 3.0)), replace(sky, color=(2.0, 1.0, 0.5)), spot]
+    brighter = [replace(point, color=(0.1, 2.0, 3.0)), replace(around, color=(2.0, 1.0, 0.5)), spot]
     found = relighter.relight(brighter)
     assert passes.computed == before
     expected = methods.relight(asset, brighter)
     np.testing.assert_allclose(found, expected, atol=TOLERANCE * expected.max())
     moved: Any = point
-    relighter.relight([replace(moved, position=(0.9, 0.7, 1.1)), spot, sky])
+    relighter.relight([replace(moved, position=(0.9, 0.7, 1.1)), spot, around])
     assert passes.computed == before + 1
 
 
@@ -130,7 +130,7 @@ def test_irradiance_needs_no_albedo(asset: Asset, context: Any) -> None:
 
 def test_what_it_cannot_show_is_refused(asset: Asset, relighter: Relighter, context: Any) -> None:
     with pytest.raises(InputError, match="named"):
-        relighter.relight([NamedLight("Lamp")])
+        relighter.relight([NamedLight("Pendant")])
     with Relighter(replace(asset, scene=None), context=context) as bare, pytest.raises(InputError, match=r"scene\.glb"):
         bare.relight([LIGHTS["point"]])
 
