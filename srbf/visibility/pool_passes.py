@@ -53,18 +53,21 @@ class PoolPasses(Passes):
                 kept[key] = self._known.pop(key) if key in self._known else self._white(light)
         self._free += [(texture, target) for _, texture, target in self._known.values()]
         self._known = kept
-        self._sum[1].use()
-        self._sum[1].clear()
-        gl.enable_only(gl.BLEND)
-        gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
+        gl.enable_only(gl.NOTHING)
+        gl.blend_equation = gl.FUNC_ADD  # shadow maps left another
+        self._sums[0][1].clear()
         for light in lights:
-            kept[_shape(light)][1].use(0)
-            self._programs.run("deep_framebuffer_sum.frag", {}, {"light": 0, "color": light.color})
+            (former, _), (_, target) = self._sums
+            target.use()
+            former.use(0)
+            kept[_shape(light)][1].use(1)
+            self._programs.run("deep_framebuffer_sum.frag", {}, {"former": 0, "light": 1, "color": light.color})
+            self._sums.reverse()
         return True
 
     def prepared(self) -> None:
         """A pass over the pixels."""
-        self._links.pixels(self._sum[0])
+        self._links.pixels(self._sums[0][0])
 
     def check_point_lights(self) -> None:
         """Accepts all."""
@@ -89,7 +92,7 @@ class PoolPasses(Passes):
         cells = replace(Cells.of_image(pool[:2]), albedo=np.ascontiguousarray(pool[2, :, :3]))
         self._surfels = SurfelLight(self._programs, cells, asset.scene)
         self._links = LinkPasses(asset, self._programs, self._textures, bounce_terms(asset, cells))
-        self._sum = self._programs.target(self._links.cluster_size)
+        self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
 
     def _white(self, light: Light) -> tuple[Light, moderngl.Texture, moderngl.Framebuffer]:
         """The irradiance of all clusters under a light in white."""
