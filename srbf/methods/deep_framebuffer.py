@@ -80,6 +80,7 @@ class DeepFramebuffer(Method):
     tables: ClassVar[dict[str, str]] = FILES
     domains: ClassVar[tuple[str, ...]] = ("pool",)
     receivers: ClassVar[tuple[str, ...]] = ("view",)
+    exportable: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
 
     nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")

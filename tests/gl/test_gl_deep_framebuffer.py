@@ -17,6 +17,7 @@ from srbf import methods
 from srbf.asset import Asset
 from srbf.cli import app
 from srbf.errors import InputError
+from srbf.export import export
 from srbf.gl.programs import Programs
 from srbf.io.image import read_image
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
@@ -128,7 +129,9 @@ def test_irradiance_needs_no_albedo(asset: Asset, context: Any) -> None:
         np.testing.assert_allclose(relighter.relight([LIGHTS["area"]]), expected, atol=TOLERANCE * expected.max())
 
 
-def test_what_it_cannot_show_is_refused(asset: Asset, relighter: Relighter, context: Any) -> None:
+def test_what_it_cannot_show_is_refused(asset: Asset, relighter: Relighter, context: Any, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="engines can read"):
+        export(asset, "exr", tmp_path / "exr")
     with pytest.raises(InputError, match="named"):
         relighter.relight([NamedLight("Pendant")])
     with Relighter(replace(asset, scene=None), context=context) as bare, pytest.raises(InputError, match=r"scene\.glb"):

@@ -1,4 +1,4 @@
-/** The color of a black body, as lamps are sold by it. */
+/** The color of a black body by its temperature. */
 export const [COLDEST, HOTTEST] = [1700, 20_000]; // K, within the range of the fit
 
 /** sRGB #rrggbb of a black body at `kelvin`, its largest channel 255; chromaticity by the cubic fit of Kim et al. 2002, out-of-gamut colors cut. */

@@ -37,7 +37,7 @@ export class GatherWeights {
 
   constructor(
     private readonly gather: Gather,
-    shadowSize = 512,
+    shadowSize = 1024,
   ) {
     const cells = packedCells(gather.surfels);
     this.middle = cells.middle;

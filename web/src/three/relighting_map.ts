@@ -25,7 +25,7 @@ export interface RelightingMapOptions extends TargetOptions {
    * three's shadow maps of lights that cast shadows and the asset's own of all others.
    */
   weights?: "cpu" | "gpu";
-  /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`. */
+  /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`: 512, of deep framebuffers 1024, unless given. */
   shadowSize?: number;
   /** An asset whose lights shine on this one, too: what is followed, set or moved there counts here. */
   lightsOf?: SceneAsset;
