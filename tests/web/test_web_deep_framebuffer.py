@@ -79,3 +79,11 @@ def test_a_manifest_without_what_it_needs_is_refused(browser: Any, asset: Asset,
     manifest = json.loads(path.read_text())
     path.write_text(json.dumps(manifest | {key: value}))
     assert "srbf fit" in browser.response("three-lightmap", asset=url, lightSets=[[]])["error"]
+
+
+@pytest.mark.parametrize("run", ["babylon-material", "playcanvas-material"])
+def test_other_engines_show_what_rays_on_the_host_say(browser: Any, asset: Asset, url: str, run: str) -> None:
+    lights = [LIGHTS["point"], LIGHTS["spot"]]
+    shown = browser.picture(run, asset=url, lights=lights, color=(1.0, 1.0, 1.0), half=(1.0, 1.0, 0.0))
+    expected, covered = methods.relight(asset, lights), asset.images["coverage"] > 0.5
+    np.testing.assert_allclose(shown[covered], expected[covered], atol=CLOSE * expected.max())
