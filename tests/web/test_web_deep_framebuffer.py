@@ -67,6 +67,16 @@ def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run:
         np.testing.assert_allclose(picture, expected, atol=tolerance * max(expected.max(), 1e-9), err_msg=str(lights))
 
 
+def test_a_light_that_stays_is_not_computed_again(browser: Any, url: str) -> None:
+    """Recolored, joined by another, alone again; then it moves, and goes back."""
+    point: Any = PointLight((0.8, 0.7, 1.1), falloff="inverse-square")
+    spot, moved = LIGHTS["spot"], replace(point, position=(0.9, 0.7, 1.1))
+    kept = [[point], [replace(point, color=(0.1, 2.0, 0.0))], [spot, point], [point, spot, point], [point]]
+    for sets, computed in ((kept, 2), ([*kept, [moved]], 3), ([*kept, [moved], [point]], 4)):
+        said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights) for lights in sets], weights="gpu")
+        assert said["computed"] == computed
+
+
 def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:
     said = browser.response("nodes-lightmap", asset=url, lightSets=[[]], weights="gpu", backend="webgl")
     assert 'weights: "cpu"' in said["error"]
