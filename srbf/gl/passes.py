@@ -13,7 +13,7 @@ from srbf.asset import Asset
 from srbf.gl.context import Limits
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
-from srbf.lights import PointLight
+from srbf.lights import Light, PointLight
 
 if TYPE_CHECKING:
     import moderngl
@@ -43,3 +43,13 @@ class Passes(ABC):
     @abstractmethod
     def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Point and spot lights, and the distant lights' `weights` with the first of them; `units` layers per pass."""
+
+    def prepare(self, lights: Sequence[Light]) -> bool:
+        """Make ready what `prepared` draws of `lights`; True where that is all of their light, so that nothing is left to project.
+
+        It may use other targets, and leaves blending as it likes.
+        """
+        return False
+
+    def prepared(self) -> None:  # noqa: B027  most methods prepare nothing
+        """Add what `prepare` made ready; only where it said True."""

@@ -19,7 +19,7 @@ class Programs:
     """Fragment stages by name and defines; released with `resources`."""
 
     def __init__(self, context: moderngl.Context, resources: ExitStack) -> None:
-        self._context, self._resources = context, resources
+        self.context, self.resources = context, resources
         self._made: dict[tuple[str, tuple[tuple[str, int], ...]], moderngl.VertexArray] = {}
         self._corners = context.buffer(np.array([[-1, -1], [3, -1], [-1, 3]], np.float32))
         resources.callback(self._corners.release)
@@ -28,10 +28,10 @@ class Programs:
         """Draw one stage over the whole of the target in use."""
         key = (stage, tuple(defines.items()))
         if key not in self._made:
-            program = compile_program(self._context, resolve("stages/fullscreen.vert"), resolve(f"stages/{stage}", defines=defines))
-            self._resources.callback(program.release)
-            self._made[key] = self._context.vertex_array(program, [(self._corners, "2f", "corner")])
-            self._resources.callback(self._made[key].release)
+            program = compile_program(self.context, resolve("stages/fullscreen.vert"), resolve(f"stages/{stage}", defines=defines))
+            self.resources.callback(program.release)
+            self._made[key] = self.context.vertex_array(program, [(self._corners, "2f", "corner")])
+            self.resources.callback(self._made[key].release)
         vertex_array = self._made[key]
         program = vertex_array.program
         for name, content in uniforms.items():
@@ -42,6 +42,15 @@ class Programs:
             else:
                 program[name].value = content  # type: ignore[union-attr]
         vertex_array.render(vertices=3)
+
+    def target(self, size: tuple[int, int]) -> tuple[moderngl.Texture, moderngl.Framebuffer]:
+        """A texture RGBA32F of `size`, columns and rows, that is fetched by texel, and the framebuffer that draws into it."""
+        texture = self.context.texture(size, 4, dtype="f4")
+        texture.filter = (self.context.NEAREST, self.context.NEAREST)
+        self.resources.callback(texture.release)
+        framebuffer = self.context.framebuffer([texture])
+        self.resources.callback(framebuffer.release)
+        return texture, framebuffer
 
 
 def ranges(total: int, size: int) -> Iterator[tuple[int, int]]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 ON_HOST = {  # tables that no shader reads
     *("light_coefficients", "light_values", "cells", "surfel_transfer", "environment_transfer"),
     *("surface_gather", "surface_sent", "surface_feedback", "surface_objects", "surface_albedo"),
+    *("pool", "view_rows", "exchange_rows"),  # shaders read them folded
 }
 _DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalized byte
 

@@ -29,6 +29,8 @@ from srbf.visibility.surface_cells import Cells
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
+    from srbf.gl.passes import Passes
+
 MEGABYTE = 1e6
 MOST_NEAREST = 10
 LEAST_SHARE = 1 / 32  # of the rays, that a budget leaves
@@ -78,7 +80,7 @@ class DeepFramebuffer(Method):
     tables: ClassVar[dict[str, str]] = FILES
     domains: ClassVar[tuple[str, ...]] = ("pool",)
     receivers: ClassVar[tuple[str, ...]] = ("view",)
-    has_shader: ClassVar[bool] = False
+    exportable: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
 
     nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")
@@ -232,6 +234,12 @@ class DeepFramebuffer(Method):
     @classmethod
     def local_lights(cls, lights: Sequence[Light]) -> list[PointLight]:
         return []
+
+    @classmethod
+    def gl_passes(cls) -> type[Passes]:
+        from srbf.visibility.pool_passes import PoolPasses
+
+        return PoolPasses
 
     @classmethod
     def numbers_per_texel(cls, asset: Asset) -> int:

@@ -216,14 +216,19 @@ class Relighter:
             raise InputError("point and spot lights need a position map, and this asset has none; relight it by directional lights")
         if point_lights:
             self._passes.check_point_lights()
-        environments_lit = [light for light in inside if isinstance(light, EnvironmentLight)] if self._environment is not None else []
-        weights = method_of(self._asset).projected_weights(self._asset, [light for light in inside if light not in environments_lit])
+        with self._context:
+            whole = self._passes.prepare(inside)
+        left = [] if whole else inside
+        environments_lit = [light for light in left if isinstance(light, EnvironmentLight)] if self._environment is not None else []
+        weights = method_of(self._asset).projected_weights(self._asset, [light for light in left if light not in environments_lit])
         with self._context:
             by_shader = None if self._environment is None or not environments_lit else self._environment.weights(weights, environments_lit)
             self._sum_buffer.use()
             self._sum_buffer.clear()
             self._blend(True)
             at_once = units if multipass else None
+            if whole:
+                self._passes.prepared()
             if by_shader is not None:
                 self._passes.weighted(by_shader)
                 weights = 0 * weights

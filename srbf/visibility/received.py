@@ -56,8 +56,12 @@ class RayShadows:
 
 def starts_of(positions: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
     """Where shadow rays from surfaces start: a little above them, m."""
-    lift = OFFSET * float(np.ptp(positions, axis=0).max()) if len(positions) else 0.0
-    return (positions + lift * normals).astype(np.float32)
+    return (positions + lift_of(positions) * normals).astype(np.float32)
+
+
+def lift_of(positions: Float[ndarray, "n 3"]) -> float:
+    """How far above surfaces that is, m."""
+    return OFFSET * float(np.ptp(positions, axis=0).max()) if len(positions) else 0.0
 
 
 class ReceivedLight:

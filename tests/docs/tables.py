@@ -56,6 +56,7 @@ ELSEWHERE = {
     "python -m scripts.gallery *": "tests/test_gallery.py::test_it_goes_on_after_a_kill",
     "python benchmarks/torture.py *": "tests/bake/test_torture.py::test_nothing_is_lost",
     "python scripts/build_extension.py *": "tests/extension/test_zip.py::test_the_zip_builds_and_validates",
+    "blender --python lights.py *": "tests/viewer/test_shot.py::test_the_script_makes_the_lights_in_blender",
     "blender --command srbf bake *": "tests/extension/test_extension.py::test_the_command_bakes_the_open_file",
     "blender --command srbf fit *": "tests/extension/test_extension.py::test_what_the_command_adds",
     "srbf demo --scene loft *": "tests/test_demo.py::test_a_loft_from_script_to_picture",

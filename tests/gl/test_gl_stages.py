@@ -62,7 +62,8 @@ def test_every_method_has_the_same_stages() -> None:
         "point_shadow_transmittance.frag",
     ]
     environments = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
-    assert sorted([*methods, *shadows, *environments, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    pool = [f"deep_framebuffer_{part}.frag" for part in ("bounce", "clusters", "pixels", "sum", "surfels")]
+    assert sorted([*methods, *shadows, *environments, *pool, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])

@@ -23,6 +23,7 @@ const TAKEN = {
   directions: ["directional", "environment", "point", "spot", "sphere"],
   named: ["named"],
   cloud: ["point", "spot", "sphere", "area", "directional"],
+  pool: ["point", "spot", "sphere", "area", "directional"],
   surfels: ["point", "spot", "sphere", "area", "directional", "named"],
 } as const;
 

@@ -5,11 +5,11 @@ import { METHODS, methodNamed } from "./methods";
 import type { Method } from "./methods/method";
 
 export type Encoding = "half" | "float" | "uint8" | "bc7" | "bc1";
-export type LightDomain = "directions" | "named" | "cloud" | "surfels";
+export type LightDomain = "directions" | "named" | "cloud" | "surfels" | "pool";
 export type ReceiverKind = "lightmap" | "view" | "vertices" | "probes";
 
 const ENCODINGS: readonly Encoding[] = ["half", "float", "uint8", "bc7", "bc1"];
-const LIGHT_DOMAINS: readonly LightDomain[] = ["directions", "named", "cloud", "surfels"];
+const LIGHT_DOMAINS: readonly LightDomain[] = ["directions", "named", "cloud", "surfels", "pool"];
 const RECEIVER_KINDS: readonly ReceiverKind[] = ["lightmap", "view", "vertices", "probes"];
 
 /** A stored layer: value = stored * scale + bias, three channels of an RGB coefficient map, or four of scalar ones. */

@@ -74,7 +74,7 @@ export interface Look {
   readonly lambertian: boolean;
 }
 
-type Placed = PunctualLight | AreaLight | DirectionalLight;
+export type Placed = PunctualLight | AreaLight | DirectionalLight;
 
 /** The looks of a light in the asset's frame: one, or a grid of points of an area. */
 export function looksOf(light: Placed, middle: Triple): Look[] {

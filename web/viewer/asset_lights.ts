@@ -11,7 +11,7 @@ const UNMEASURED = "#9fb2c8";
 export type AddedKind = Exclude<LightState["kind"], "named">;
 
 /** Whether lights shine inside the scene. */
-export const inside = ({ manifest }: Asset): boolean => ["cloud", "surfels"].includes(lightDomainOf(manifest));
+export const inside = ({ manifest }: Asset): boolean => ["cloud", "surfels", "pool"].includes(lightDomainOf(manifest));
 
 /** Kinds of lights that one can add. */
 export function kindsOf(asset: Asset): readonly AddedKind[] {

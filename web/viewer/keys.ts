@@ -10,6 +10,8 @@ const KEYS: [string, string][] = [
   ["space", "play or pause the path"],
   ["1 … 9", "select a light; switch a light of the scene on or off"],
   ["delete", "remove the light"],
+  ["s", "the selected light alone, with others that are solo"],
+  ["ctrl z, ctrl y", "take back, do again"],
   ["double click", "put the point light above a place, or aim the spot at it"],
   ["t", "the scene, the mesh alone, or texels"],
   ["a", "the next asset"],
@@ -23,9 +25,16 @@ const KEYS: [string, string][] = [
 /** The list of keys, as HTML. */
 export const tabled = () => `<h2>Keys</h2><table>${KEYS.map(([key, what]) => `<tr><td>${key}</td><td>${what}</td></tr>`).join("")}</table>`;
 
-export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void; nextAsset(): void }): void {
+export function listen(state: State, changed: Changed, act: { reset(): void; hide(): void; undo(): void; redo(): void; help(): void; nextCompare(): void; nextMap(): void; nextView(): void; nextAsset(): void }): void {
   const heard = (event: KeyboardEvent) => {
     const target = event.target as HTMLElement;
+    const control = event.ctrlKey || event.metaKey;
+    if (control && !event.altKey && /^[zy]$/i.test(event.key) && !/^(TEXTAREA|SELECT)$/.test(target.tagName) && (target as HTMLInputElement).type !== "text") {
+      event.preventDefault();
+      if (event.key.toLowerCase() === "y" || event.shiftKey) act.redo();
+      else act.undo();
+      return;
+    }
     if (/^(INPUT|SELECT|TEXTAREA)$/.test(target.tagName) || target.role === "slider" || event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key === " " && target.tagName === "BUTTON") return;
     const step = event.shiftKey ? LARGE_STEP : STEP;
@@ -43,6 +52,9 @@ export function listen(state: State, changed: Changed, act: { reset(): void; hid
       state.lights.splice(state.selected, 1);
       state.selected = Math.min(state.selected, state.lights.length - 1);
       changed({ lights: true, panel: true });
+    } else if (event.key === "s" && state.lights[state.selected] && state.lights[state.selected].kind !== "named") {
+      const light = state.lights[state.selected];
+      light.solo = light.solo ? undefined : true;
     } else if (event.key === "t") act.nextView();
     else if (event.key === "a") act.nextAsset();
     else if (event.key === "c") act.nextCompare();

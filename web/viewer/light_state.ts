@@ -10,6 +10,10 @@ interface Common {
   color: string;
   /** Times the color, linear: irradiance of a directional light, and of a point or spot light at a0; an environment's scale. */
   intensity: number;
+  /** Whether it shines alone, with others that do. */
+  solo?: boolean;
+  /** The temperature that gave the color, K. */
+  kelvin?: number;
 }
 
 interface PointLight extends Common {
@@ -124,6 +128,13 @@ export const round = (x: number): number => Math.round(x * 1e5) / 1e5 + 0;
 
 export const rounded = (v: Triple): Triple => [round(v[0]), round(v[1]), round(v[2])];
 
+/** Those that shine: the ones that are on, or of these the solo ones where there are any. */
+export function shiningOf<L extends LightState>(lights: readonly L[]): L[] {
+  const on = lights.filter((light) => light.on);
+  const alone = on.filter(({ solo }) => solo);
+  return alone.length ? alone : on;
+}
+
 /** Linear Rec.709 of an sRGB #rrggbb times `intensity` [IEC61966]. */
 export function linearColor(light: Common): Triple {
   const channel = (at: number) => {
@@ -186,6 +197,8 @@ export function checkLight(value: unknown): LightState {
   if (typeof light.on !== "boolean") bad("true or false of on");
   if (typeof light.color !== "string" || !/^#[0-9a-f]{6}$/.test(light.color)) bad("#rrggbb of color");
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
+  if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
+  if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
   if (light.kind === "directional") triple("direction");
   else if (light.kind === "environment") {
     if (typeof light.file !== "string") bad("a name of file");

@@ -1,19 +1,23 @@
 /** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
-import { areaState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, sphereState, spotState } from "./light_state";
+import { areaState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
 import type { AddedKind } from "./asset_lights";
 import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
 import { Mixer } from "./mixer";
 import { type Changed, COMPARES, firstPath, MOST_LIGHTS, PATHS, SHOWS, type State, TERMS, TONES, VIEWS } from "./state";
 import { surfaceControls } from "./surface_controls";
+import { COLDEST, HOTTEST, temperatureColor } from "./temperature";
 
 export interface Actions {
   changed: Changed;
   chooseEnvironment(): void;
   savePng(): void;
   saveFrames(): void;
+  saveRig(): void;
+  undo(): void;
+  redo(): void;
   loadFrames(): void;
   savePath(): void;
   chooseAsset(): void;
@@ -22,7 +26,7 @@ export interface Actions {
 }
 
 export interface PanelFacts {
-  /** Coefficient maps of the asset that is shown. */
+  /** Coefficient maps of the asset that is shown, 0 where its layers are none. */
   maps: number;
   /** Kinds of lights that can be added. */
   kinds: readonly AddedKind[];
@@ -46,6 +50,8 @@ export interface PanelFacts {
 }
 
 const KINDS = { directional: "Directional", point: "Point", spot: "Spot", sphere: "Sphere", area: "Area", environment: "Environment" } as const satisfies Record<AddedKind, string>;
+
+const DAYLIGHT = 6500; // K: about white
 
 export class Panel {
   private gui: GUI | undefined;
@@ -78,6 +84,8 @@ export class Panel {
     this.gui = new GUI({ container: this.controls, title: "", autoPlace: false });
     this.lights();
     if (!this.facts.named) this.light();
+    this.gui.add(this.actions, "undo").name("Undo");
+    this.gui.add(this.actions, "redo").name("Redo");
     const { objects, paintable } = this.facts;
     if (objects.length) surfaceControls(this.gui, this.state, objects, paintable, this.actions.changed);
     if (this.facts.room) this.ball(this.facts.room);
@@ -109,7 +117,8 @@ export class Panel {
 
   private drawChips(always = false): void {
     const { lights, selected } = this.state;
-    const drawn = JSON.stringify([selected, lights.map(({ kind, color, on }) => [kind, color, on])]);
+    const shining = new Set(shiningOf(lights));
+    const drawn = JSON.stringify([selected, lights.map((light) => [light.kind, light.color, light.solo, shining.has(light)])]);
     if (!always && drawn === this.drawn) return; // replaced elements lose their focus
     this.drawn = drawn;
     const numbers = new Map<string, number>();
@@ -117,7 +126,7 @@ export class Panel {
       const number = (numbers.get(light.kind) ?? 0) + 1;
       numbers.set(light.kind, number);
       const chip = document.createElement("button");
-      chip.className = `chip${i === selected ? " selected" : ""}${light.on ? "" : " off"}`;
+      chip.className = `chip${i === selected ? " selected" : ""}${shining.has(light) ? "" : " off"}${light.solo ? " solo" : ""}`;
       chip.dataset.kind = light.kind;
       const dot = document.createElement("i");
       dot.style.background = light.color;
@@ -164,7 +173,15 @@ export class Panel {
     if (!light || !this.gui) return;
     const folder = this.gui.addFolder("Light");
     folder.add(light, "on").name("On").onChange(this.relight);
-    folder.addColor(light, "color").name("Color").onChange(this.relight);
+    this.solo(folder, light);
+    folder
+      .addColor(light, "color")
+      .name("Color")
+      .onChange(() => {
+        light.kelvin = undefined;
+        this.relight();
+      });
+    if (light.kind !== "environment") this.temperature(folder, light);
     folder.add(light, "intensity", 0, 10, 0.01).name("Intensity").onChange(this.relight);
     if (light.kind === "environment") folder.add(light, "file").name("File").disable();
     if (isPlaced(light)) this.placed(folder, light);
@@ -176,6 +193,31 @@ export class Panel {
       },
     };
     folder.add(remove, "remove").name("Remove");
+  }
+
+  private solo(folder: GUI, light: LightState): void {
+    const proxy = {
+      get solo() {
+        return light.solo === true;
+      },
+      set solo(value: boolean) {
+        light.solo = value || undefined;
+      },
+    };
+    folder.add(proxy, "solo").name("Solo").onChange(this.relight);
+  }
+
+  private temperature(folder: GUI, light: LightState): void {
+    const proxy = {
+      get kelvin() {
+        return light.kelvin ?? DAYLIGHT;
+      },
+      set kelvin(value: number) {
+        light.kelvin = value;
+        light.color = temperatureColor(value);
+      },
+    };
+    folder.add(proxy, "kelvin", COLDEST, HOTTEST, 50).name("Temperature (K)").onChange(this.relight);
   }
 
   private placed(folder: GUI, light: PlacedState): void {
@@ -260,14 +302,14 @@ export class Panel {
     if (hasDirect) folder.add(this.state, "terms", { All: TERMS[0], Direct: TERMS[1], Indirect: TERMS[2] }).name("Light").onChange(this.relight);
     folder.add(this.state, "exposure", -8, 8, 0.05).name("Exposure (stops)").onChange(this.redraw);
     folder.add(this.state, "tone", { Linear: TONES[0], AgX: TONES[1], ACES: TONES[2] }).name("Tone").onChange(this.redraw);
-    folder.add(this.state, "show", { Picture: SHOWS[0], "False color": SHOWS[1], "Negative values": SHOWS[2], "Coefficient map": SHOWS[3] }).name("Show").onChange(this.relight);
-    folder
-      .add(this.state, "map", 0, this.facts.maps - 1, 1)
-      .name("Map")
-      .onChange(() => {
-        this.state.show = "map";
-        this.relight();
-      });
+    const { maps } = this.facts;
+    const shows = { Picture: SHOWS[0], "False color": SHOWS[1], "Negative values": SHOWS[2], ...(maps ? { "Coefficient map": SHOWS[3] } : {}) };
+    folder.add(this.state, "show", shows).name("Show").onChange(this.relight);
+    const showMap = () => {
+      this.state.show = "map";
+      this.relight();
+    };
+    if (maps) folder.add(this.state, "map", 0, maps - 1, 1).name("Map").onChange(showMap);
     folder.add(this.state, "spectrum").name("Spectrum").onChange(this.redraw);
     const views = { ...(hasScene ? { Scene: VIEWS[0] } : {}), Mesh: VIEWS[1], Texels: VIEWS[2] };
     if (hasMesh) folder.add(this.state, "view", views).name("Show on").onChange(this.redraw);
@@ -304,5 +346,6 @@ export class Panel {
     folder.add(this.actions, "savePng").name("Picture (PNG)");
     folder.add(this.actions, "saveFrames").name("Lights (FRAMES.json)");
     folder.add(this.actions, "savePath").name("Path (FRAMES.json)");
+    if (!this.facts.named) folder.add(this.actions, "saveRig").name("Lights for Blender (Python)");
   }
 }

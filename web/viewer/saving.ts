@@ -1,6 +1,7 @@
-/** Files that the page saves: a PNG, and FRAMES.json for `srbf relight --lights`. */
+/** Files that the page saves: a PNG, FRAMES.json for `srbf relight --lights`, and a script for Blender. */
 import { encode } from "fast-png";
-import { aim, type LightState, linearColor, sides } from "./light_state";
+import { blenderRig } from "./blender_rig";
+import { aim, type LightState, linearColor, shiningOf, sides } from "./light_state";
 
 /** RGBA where anything is transparent, RGB otherwise. */
 export function savePng(name: string, image: { width: number; height: number; data: Uint8Array }): void {
@@ -11,8 +12,13 @@ export function savePng(name: string, image: { width: number; height: number; da
 }
 
 export function saveFrames(name: string, frames: readonly (readonly LightState[])[]): void {
-  const json = { frames: frames.map((lights) => ({ lights: lights.filter((light) => light.on).map(entry) })) };
+  const json = { frames: frames.map((lights) => ({ lights: shiningOf(lights).map(entry) })) };
   download(name, new Blob([`${JSON.stringify(json, undefined, 1)}\n`], { type: "application/json" }));
+}
+
+/** A script that makes the lights in Blender. */
+export function saveRig(name: string, lights: readonly LightState[]): void {
+  download(name, new Blob([blenderRig(lights)], { type: "text/x-python" }));
 }
 
 /** A light as srbf/schemas/frames.schema.json has it; an environment's file must lie beside FRAMES.json. */

@@ -67,7 +67,7 @@ export class Subject {
 
 /** Where an asset's weights are computed. */
 export function weightsFor({ tables }: Asset, renderer: WebGLRenderer): "gpu" | "cpu" {
-  return drawsFloats(renderer) && tables.surfels ? "gpu" : "cpu";
+  return drawsFloats(renderer) && (tables.surfels || tables.gather) ? "gpu" : "cpu";
 }
 
 function drawsFloats({ extensions }: WebGLRenderer): boolean {

@@ -11,7 +11,8 @@ import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
-import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, type PlacedState, rounded } from "./light_state";
+import { History } from "./history";
+import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
 import { listen, tabled } from "./keys";
 import { Keyframes, readFrames } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
@@ -21,7 +22,7 @@ import { Panel, type PanelFacts } from "./panel";
 import { Playback } from "./path";
 import { Receivers } from "./receivers";
 import { negated } from "./relighting";
-import { saveFrames, savePng } from "./saving";
+import { saveFrames, savePng, saveRig } from "./saving";
 import { COLORS, screenUniforms, VALUES } from "./screen";
 import { type DirectionPoint, DirectionWidget } from "./direction_widget";
 import { SpectrumPlot } from "./spectrum";
@@ -67,6 +68,7 @@ export class Viewer {
   private plotted?: Subject; // whose spectrum is drawn
   private urlTimer = 0;
   private written = "";
+  private readonly history: History;
 
   private constructor(
     private readonly loaded: Loaded,
@@ -87,6 +89,7 @@ export class Viewer {
     this.playback = new Playback(this.state, this.receivers.bounds);
     this.readUrl(location.hash);
     this.state.asset = facts.assets.indexOf(first.facts);
+    this.history = new History(this.state);
     const changed: Changed = (what = {}) => this.changed(what);
     this.comparison = new Comparison(references, this.uniforms, this.copy, this.receivers, {
       wait: () => this.wait(),
@@ -112,6 +115,9 @@ export class Viewer {
       chooseEnvironment: () => pickFile(".exr,.hdr,.png", (file) => void this.environment(file)),
       savePng: () => this.savePicture(),
       saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]]),
+      saveRig: () => saveRig("lights.py", this.state.lights),
+      undo: () => this.step(this.history.undo()),
+      redo: () => this.step(this.history.redo()),
       loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
       savePath: () => this.savePath(),
       resetCamera: () => {
@@ -148,7 +154,7 @@ export class Viewer {
 
   private panelFacts(): PanelFacts {
     return {
-      maps: this.subject.maps,
+      maps: this.subject.asset.tables.gather ? 0 : this.subject.maps,
       kinds: kindsOf(this.subject.asset),
       middle: middleOf(this.subject.asset),
       hasDirect: this.subject.hasDirect,
@@ -233,6 +239,7 @@ export class Viewer {
     this.drawNeeded = true;
     document.body.dataset.state = "busy";
     if (what.lights) this.lightsChanged = true;
+    this.history.touch();
     if (what.panel) this.panel.rebuild();
     document.body.dataset.address = "old";
     if (!this.urlTimer) {
@@ -243,6 +250,11 @@ export class Viewer {
         document.body.dataset.address = "written";
       }, URL_EVERY);
     }
+  }
+
+  /** After a step back or forward, if there was one. */
+  private step(changed: boolean): void {
+    if (changed) this.changed({ lights: true, panel: true });
   }
 
   private frame(now: number): void {
@@ -328,7 +340,7 @@ export class Viewer {
       this.comparison.off();
       this.directions.marked = -1;
       if (this.state.compare !== "off") say(`comparing needs a ${this.inCloud ? "point" : "directional"} light: add one`, "hint");
-      return [...this.state.lights.flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
+      return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
     this.directions.marked = this.comparison.compared;
@@ -463,11 +475,14 @@ export class Viewer {
     listen(this.state, changed, {
       reset: () => this.stage.resetCamera(),
       hide: () => document.body.classList.toggle("bare"),
+      undo: () => this.step(this.history.undo()),
+      redo: () => this.step(this.history.redo()),
       help: () => (help.open ? help.close() : help.showModal()),
       nextCompare: () => {
         if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
+        if (this.subject.asset.tables.gather) return;
         this.state.map = this.state.show === "map" ? (this.state.map + 1) % this.subject.maps : this.state.map;
         this.state.show = "map";
       },

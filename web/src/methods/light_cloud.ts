@@ -3,13 +3,12 @@ import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
 import { type LightValues, readLightValues, readRgbTable, rgb, summed, type TableEntry } from "../light_values";
-import type { AreaLight, DirectionalLight, PunctualLight } from "../lights";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
 import { changeable, Surfaces, type SurfacesManifest } from "../surface_changes";
-import { placed, type Surfels } from "../surfels";
+import { type Placed, placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
 import type { Fail, Method, ReadOptions, Tables } from "./method";
@@ -78,8 +77,6 @@ export const lightCloud: Method = {
     };
   },
 };
-
-type Placed = PunctualLight | AreaLight | DirectionalLight;
 
 /** The table from the last weights before them to those of the light functions. */
 const valuesOf = (surfels: Surfels | undefined): LightValues => surfels?.tables.at(-1) as LightValues;

@@ -1,6 +1,7 @@
 /** What a method is to the rest of this package. A method is one file in this folder, one line in `index.ts`, and its shader in `../shaders`. */
 import type { LightsInAssetFrame } from "../asset_frame";
 import type { AssetFiles } from "../files";
+import type { Gather } from "../gather";
 import type { ByteImage, FloatImage, HalfImage } from "../image";
 import type { Manifest } from "../manifest";
 import type { Triple } from "../matrix";
@@ -65,6 +66,8 @@ export interface Tables {
   readonly projectsPunctual?: boolean;
   /** What a GPU needs to compute the weights of lights inside a scene itself, of assets with rays. */
   readonly surfels?: Surfels;
+  /** Surfels and links, of deep framebuffers. */
+  readonly gather?: Gather;
   /** Objects that emit or are repainted, of assets fitted with `--editable`. */
   readonly surfaces?: Surfaces;
   /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What one look of a light lays on each cell of a scene's surfaces, added to that of the looks before: the arithmetic of srbf/visibility/received.py.
 // SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
-// depths (or their means, VSM). SRBF_REVERSED: the engine's depth is 1 where it is nearest.
+// depths (or their means, VSM). SRBF_MEAN_NORMALS: normals may be means over several faces. SRBF_REVERSED: the engine's depth is 1 where it is nearest.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -12,6 +12,10 @@ precision highp samplerCubeShadow;
 #include "surfels/cell_irradiance.glsl"
 #include "surfels/cell_on_cube.glsl"
 #include "surfels/cell_on_map.glsl"
+#ifdef SRBF_MEAN_NORMALS
+#include "shadow/point_shadow_place.glsl"
+#include "surfels/surfel_visibility.glsl"
+#endif
 
 uniform sampler2D places;   // less the middle of all cells, meters; area
 uniform sampler2D normals;  // unit; share of the patch's area
@@ -62,7 +66,24 @@ float unshadowed(vec4 cell, vec3 normal) {
 #endif
 }
 
-#if SRBF_SHADOW == 1
+#if SRBF_SHADOW == 1 && defined(SRBF_MEAN_NORMALS)
+// The nearest surfaces about a lifted cell, whose plane is not known.
+float visibility(vec3 place, vec3 normal) {
+    ivec2 size = textureSize(nearness, 0);
+#ifdef SRBF_DISTANT
+    vec2 at = vec2(dot(place, across), dot(place, up)) / reach * 0.5 + 0.5;
+    return srbfSurfelVisibility(nearness, ivec2(0), size.x, vec3(at, dot(place, light) + 2.0 * reach));
+#else
+    int width = size.y / 2;
+    vec3 fromLight = place - light;
+    int face = srbfCubeFace(fromLight);
+    int axis = face / 2;
+    vec3 ahead = vec3(axis == 0, axis == 1, axis == 2);  // columns run along the axis after it, rows along the one after that
+    vec3 seen = srbfPointShadowPlace(fromLight, ahead.zxy, ahead.yzx, face % 2 == 0 ? ahead : -ahead, 1.0);
+    return srbfSurfelVisibility(nearness, ivec2(face % 3, face / 3) * width, width, seen);
+#endif
+}
+#elif SRBF_SHADOW == 1
 // The nearest surface at the texel that a lifted cell falls on, against the cell's plane at the texel's middle.
 float visibility(vec3 place, vec3 normal) {
     ivec2 size = textureSize(nearness, 0);

@@ -6,10 +6,11 @@ import { SrbfError } from "../errors";
 import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { needPositions, NO_WEIGHTS, uniformVectors } from "../shader";
+import { undisturbed } from "./fullscreen";
+import { checkDrawsFloats, type GpuWeights, gpuWeights } from "./gpu_weights";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
 import { checkMaterial, type MaterialOptions, onCompile, type Patch, patchKey, patchShader } from "./material";
 import { SceneAsset, sourceOf } from "./scene_asset";
-import { SurfelWeights } from "./surfel_weights";
 import { SrbfTextures } from "./textures";
 import { assetUniforms, setFrame, type Uniforms } from "./uniforms";
 
@@ -24,7 +25,7 @@ export interface RelightingMapOptions extends TargetOptions {
    * three's shadow maps of lights that cast shadows and the asset's own of all others.
    */
   weights?: "cpu" | "gpu";
-  /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`. */
+  /** Texels per side of a face of the asset's own shadow maps, with `weights: "gpu"`: 512, of deep framebuffers 1024, unless given. */
   shadowSize?: number;
   /** An asset whose lights shine on this one, too: what is followed, set or moved there counts here. */
   lightsOf?: SceneAsset;
@@ -44,7 +45,7 @@ export class SrbfRelightingMap extends SceneAsset {
   private readonly pass?: LightmapPass;
   private readonly patched = new Map<Material, Patch>();
   private room = 1;
-  private readonly gpu?: SurfelWeights;
+  private readonly gpu?: GpuWeights;
   /** How often the lightmap was drawn. */
   protected drawings = 0;
   private drawn = "";
@@ -58,7 +59,7 @@ export class SrbfRelightingMap extends SceneAsset {
     this.textures = new SrbfTextures(asset, this.source === "maps" ? (options.filter ?? "linear") : "nearest");
     this.uniforms = assetUniforms(asset, this.textures);
     if (options.weights === "gpu") {
-      this.gpu = new SurfelWeights(asset, options.shadowSize);
+      this.gpu = gpuWeights(asset, options.shadowSize);
       this.uniforms.srbfWeights.value = this.gpu.weights;
     }
     if (this.source === "lightmap") {
@@ -142,13 +143,16 @@ export class SrbfRelightingMap extends SceneAsset {
   }
 
   /** Draw the weights of the current lights, if they have changed; returns what they depend on, nothing where three's shadows may have changed. */
-  private drawWeights(gpu: SurfelWeights, renderer: WebGLRenderer | undefined): string {
+  private drawWeights(gpu: GpuWeights, renderer: WebGLRenderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
-    const looks = this.looks(renderer, gpu.middle);
+    const lights = this.looks(renderer, gpu.middle);
     const named = this.emitting();
     gpu.setEmission(named);
-    const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named, this.asset.tables.surfaces?.version]);
-    if (!state || state !== this.weighed) gpu.draw(renderer, looks);
+    const state = lights.flat().some(({ shadow }) => shadow) ? "" : JSON.stringify([lights, named, this.asset.tables.surfaces?.version]);
+    if (!state || state !== this.weighed) {
+      checkDrawsFloats(renderer);
+      undisturbed(renderer, () => gpu.draw(renderer, lights));
+    }
     this.weighed = state;
     return state;
   }

@@ -89,11 +89,11 @@ export class SceneAsset {
     });
   }
 
-  /** The points of the current lights, less `middle`, with the shadows that three has drawn of those that it has. */
-  protected looks(renderer: Shadowing, middle: Triple): ShadowedLook[] {
+  /** The points of each of the current lights, less `middle`, with the shadows that three has drawn of those that it has. */
+  protected looks(renderer: Shadowing, middle: Triple): ShadowedLook[][] {
     const sceneFromAsset = () => this.assetFromScene().invert();
     const lights: [Light, SceneLight?][] = [...this.lights.map((light): [Light] => [light]), ...this.followedLights()];
-    return lights.flatMap(([light, own]) => {
+    return lights.map(([light, own]) => {
       const shadow = own && engineShadow(own, renderer, sceneFromAsset);
       return placed(inAssetFrame(this.asset, [light])).flatMap((one) => looksOf(one, middle).map((look) => ({ ...look, shadow })));
     });

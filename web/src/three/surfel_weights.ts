@@ -2,24 +2,22 @@
  * Weights of lights inside a scene, computed by the GPU: direct light on cells of the surfaces by shadow maps, a pass for each point of a light, and the
  * asset's tables as small passes after it. Nothing is read back.
  */
-import { type DataTexture, type IUniform, Matrix4, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import type { DataTexture, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 import type { LightValues } from "../light_values";
 import type { NamedLight } from "../lights";
 import type { Triple } from "../matrix";
-import { versine } from "../point_light";
 import blockSums from "../shaders/block_sums.glsl";
-import cellIrradiance from "../shaders/surfel_irradiance.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
 import { changeable } from "../surface_changes";
 import { packedCells, square, type Surfels } from "../surfels";
-import { type ShadowedLook, shadowUniforms } from "./engine_shadows";
+import type { ShadowedLook } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
-import { FullscreenPass, undisturbed } from "./fullscreen";
-import { OccluderMaps } from "./occluder_maps";
+import { FullscreenPass } from "./fullscreen";
 import { Repainting } from "./repainting";
+import { SurfelIrradiance } from "./surfel_irradiance";
 import { addedNumbers, PART, tableTexture } from "./table_textures";
 
 interface Table {
@@ -40,15 +38,10 @@ export function surfelsOf({ tables, manifest }: Asset): Surfels {
 
 export class SurfelWeights {
   readonly middle: Triple;
-  private readonly places: DataTexture;
-  private readonly normals: DataTexture;
   private readonly ranges: DataTexture;
-  private readonly lift: number;
-  private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
+  private readonly direct: SurfelIrradiance;
   private readonly received: WebGLRenderTarget;
   private readonly means: FullscreenPass;
-  private readonly maps: OccluderMaps;
-  private readonly passes = new Map<string, FullscreenPass>();
   private readonly tables: Table[];
   private surfaces = "";
   private version = 0;
@@ -63,14 +56,10 @@ export class SurfelWeights {
     const { weights } = asset.tables;
     const cells = packedCells(surfels);
     this.middle = cells.middle;
-    this.lift = surfels.cells.lift;
-    this.places = floatTexture(cells.places, cells.width, cells.height);
-    this.normals = floatTexture(cells.normals, cells.width, cells.height);
+    this.direct = new SurfelIrradiance(surfels, cells, shadowSize);
     this.ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
-    this.sums = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
     this.received = floatTarget(cells.rangesWidth, cells.rangesHeight);
-    this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.normals }, ranges: { value: this.ranges } });
-    this.maps = new OccluderMaps(surfels.corners, cells.middle, cells.reach, shadowSize);
+    this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.direct.normals }, ranges: { value: this.ranges } });
     let numbers = this.received.texture;
     this.tables = surfels.tables.map((values, i) => {
       const [width, height] = i === surfels.tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
@@ -85,28 +74,15 @@ export class SurfelWeights {
     return this.tables[this.tables.length - 1].target.texture;
   }
 
-  /** Draw the weights under `looks`. */
-  draw(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): void {
-    if (!renderer.extensions.has("EXT_color_buffer_float")) {
-      throw new SrbfError('expected a GPU that draws into floating-point textures for weights "gpu", found one without EXT_color_buffer_float; take weights: "cpu"');
+  /** Draw the weights under lights, each a list of looks; within `undisturbed`. */
+  draw(renderer: WebGLRenderer, lights: readonly (readonly ShadowedLook[])[]): void {
+    this.repaint(renderer);
+    this.means.uniforms.irradiance.value = this.direct.draw(renderer, lights.flat());
+    this.means.draw(renderer, this.received);
+    for (const { parts, partial, whole, target: wholes } of this.tables) {
+      parts.draw(renderer, partial);
+      whole.draw(renderer, wholes);
     }
-    undisturbed(renderer, () => {
-      this.repaint(renderer);
-      let [sum, next] = this.sums;
-      renderer.setRenderTarget(sum);
-      renderer.setClearColor(0, 0);
-      renderer.clear(true, false, false);
-      for (const look of looks) {
-        this.add(renderer, look, sum.texture, next);
-        [sum, next] = [next, sum];
-      }
-      this.means.uniforms.irradiance.value = sum.texture;
-      this.means.draw(renderer, this.received);
-      for (const { parts, partial, whole, target: wholes } of this.tables) {
-        parts.draw(renderer, partial);
-        whole.draw(renderer, wholes);
-      }
-    });
   }
 
   /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
@@ -132,44 +108,9 @@ export class SurfelWeights {
   }
 
   dispose(): void {
-    for (const one of [this.places, this.normals, this.ranges, this.received, ...this.sums, this.means, this.maps, ...this.passes.values()]) one.dispose();
+    for (const one of [this.direct, this.ranges, this.received, this.means]) one.dispose();
     for (const { parts, partial, whole, target, texture, added } of this.tables) for (const one of [parts, partial, whole, target, texture, added]) one.dispose();
     this.repainting?.dispose();
-  }
-
-  private add(renderer: WebGLRenderer, look: ShadowedLook, former: Texture, next: WebGLRenderTarget): void {
-    const shadow = look.shadow ? shadowUniforms(renderer, look.shadow, this.middle) : undefined;
-    const defines = { ...(look.distant ? { SRBF_DISTANT: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
-    const key = JSON.stringify(defines);
-    let pass = this.passes.get(key);
-    if (!pass) {
-      pass = new FullscreenPass(cellIrradiance, this.irradianceUniforms(), defines);
-      this.passes.set(key, pass);
-    }
-    const own = shadow ? {} : this.maps.draw(renderer, look.place, look.distant);
-    const values: Record<string, unknown> = {
-      former,
-      light: look.place,
-      color: look.color,
-      axis: look.axis,
-      a0: look.a0,
-      radius: look.radius,
-      falloff: look.falloff === "inverse-square" ? 1 : 0,
-      versineInner: look.cone ? versine(look.cone[0]) : 3,
-      versineOuter: look.cone ? versine(look.cone[1]) : 4,
-      lambertian: look.lambertian ? 1 : 0,
-      ...own,
-      ...shadow?.values,
-    };
-    for (const [name, value] of Object.entries(values)) pass.uniforms[name].value = value;
-    pass.draw(renderer, next);
-  }
-
-  private irradianceUniforms(): Record<string, IUniform> {
-    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up"];
-    const shadows = ["sceneFromCell", "shadowMatrix", "shadowBias", "shadowNormalBias", "shadowIntensity", "shadowDepths", "shadowMap"];
-    const uniforms: Record<string, IUniform> = Object.fromEntries([...names, ...shadows].map((name) => [name, { value: null }]));
-    return { ...uniforms, places: { value: this.places }, normals: { value: this.normals }, lift: { value: this.lift }, sceneFromCell: { value: new Matrix4() } };
   }
 }
 

@@ -21,7 +21,8 @@ export async function threeLightmap(job: Job) {
   const options = { source: "lightmap", target: job.target ?? "float", filter: "nearest", verify: true, weights: job.weights as "gpu", exact: job.exact === true, shadowSize: job.shadowSize as number } as const;
   const map = await SrbfRelightingMap.load(job.asset, options);
   const { width, height } = map.asset.manifest;
-  const target = (map as unknown as { pass: { target: THREE.WebGLRenderTarget } }).pass.target;
+  const { pass, gpu } = map as unknown as { pass: { target: THREE.WebGLRenderTarget }; gpu?: { computed?: number } };
+  const { target } = pass;
   const pictures = job.lightSets.map((lights, i) => {
     map.lights.splice(0, map.lights.length, ...lights.map(lightOfJson));
     change(job, map, i);
@@ -29,7 +30,7 @@ export async function threeLightmap(job: Job) {
     return picture(width, height, read(target, width, height));
   });
   map.dispose();
-  return { pictures };
+  return { pictures, computed: gpu?.computed };
 }
 
 /**

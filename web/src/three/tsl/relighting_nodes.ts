@@ -115,7 +115,7 @@ export class SrbfRelightingNodes extends SceneAsset {
   private drawWeights(gpu: SurfelNodes, renderer: Renderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
     if (this.asset.tables.surfaces?.change) throw new SrbfError('expected the albedo of the bake for weights "gpu" of nodes, found objects that are repainted; take weights: "cpu"');
-    const looks = this.looks(renderer, gpu.middle);
+    const looks = this.looks(renderer, gpu.middle).flat();
     const named = this.emitting();
     gpu.setEmission(named);
     const state = looks.some(({ shadow }) => shadow) ? "" : JSON.stringify([looks, named]);

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+#version 330 core
+// Direct irradiance of one point of a light on the surfels that it sees through one face of a cube: the arithmetic of
+// srbf.visibility.received. Blend ONE, ONE into a float target of a texel per surfel.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+
+#include "surfels/cell_irradiance.glsl"
+#include "shadow/cube_face.glsl"
+#include "shadow/point_shadow_place.glsl"
+#include "surfels/surfel_visibility.glsl"
+
+uniform sampler2D surfels;  // place, meters; area
+uniform sampler2D normals;
+uniform sampler2D heights;  // one over the depth of the nearest occluder
+uniform SrbfPointLight pointLight;
+uniform vec3 across;
+uniform vec3 up;
+uniform vec3 ahead;
+uniform float reach;
+uniform float lift;         // meters: of a surfel above its surface, where its shadow is looked up
+uniform int cubeFace;
+uniform float lambertian;   // 1: a part of an area, by the cosine to the light's axis; 0: a point or spot light
+uniform float weight;
+
+layout(location = 0) out vec4 irradiance;
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec4 cell = texelFetch(surfels, at, 0);
+    vec3 normal = texelFetch(normals, at, 0).xyz;
+    vec3 fromLight = -srbfLightVector(pointLight.position, pointLight.positionLow, cell.xyz + lift * normal);
+    if (srbfCubeFace(fromLight) != cubeFace) {
+        discard;
+    }
+    float amount = srbfCellIrradiance(cell, normal, pointLight, lambertian);
+    if (amount > 0.0) {
+        vec3 place = srbfPointShadowPlace(fromLight, across, up, ahead, reach);
+        amount *= srbfSurfelVisibility(heights, ivec2(0), textureSize(heights, 0).x, place);
+    }
+    irradiance = vec4(vec3(amount * weight), 1.0);
+}

@@ -1,0 +1,110 @@
+"""Passes of a deep framebuffer after direct light: bounces between surfels, sparse links to view clusters, and pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Int
+from srbf.asset import Asset
+from srbf.gl.programs import Programs
+from srbf.gl.textures import AssetTextures
+
+if TYPE_CHECKING:
+    import moderngl
+
+WIDTH = 256  # texels in a row of surfels or clusters
+
+
+@dataclass(frozen=True, eq=False)
+class LinkTextures:
+    """Packed links on the GPU: `links` as bytes, where each row's links begin there and how many they are, and the rays of a row."""
+
+    links: moderngl.Texture
+    rows: moderngl.Texture
+    rays: float
+
+    def uniforms(self, unit: int) -> dict[str, Any]:
+        """Bound to two texture units from `unit` on."""
+        self.links.use(unit)
+        self.rows.use(unit + 1)
+        return {"links": unit, "rows": unit + 1, "rays": self.rays}
+
+
+class LinkPasses:
+    """Indirect light of one deep framebuffer from direct irradiance on its surfels, on the GPU.
+
+    Parameters
+    ----------
+    asset
+        Of the method `deep-framebuffer`.
+    programs, textures
+        Of one context, which is current whenever a method is called.
+    terms
+        How many bounces are added up, 0 or more.
+    """
+
+    def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, terms: int) -> None:
+        told, tables = asset.manifest["gather"], asset.tables
+        self._programs, self._textures, self._terms = programs, textures, terms
+        self._layers = len(asset.stored)
+        self._view, self._exchange = (
+            LinkTextures(
+                textures.kept(tables[f"{name}_links"]), textures.kept(rows_image(tables[f"{name}_rows"], count)), told[f"{name}_rays"]
+            )
+            for name, count in (("view", told["clusters"]), ("exchange", told["surfels"]))
+        )
+        self._albedo = textures.kept(folded(tables["pool"][2, :, :3]))
+        reflectance = asset.images["albedo"] / np.float32(np.pi) if asset.quantity == "radiance" else np.ones((1, 1, 3), np.float32)
+        self._reflectance = textures.kept(reflectance.astype(np.float32))
+        size = self._albedo.size
+        self._radiosity = [programs.target(size), programs.target(size)]
+        self.cluster_size = (WIDTH, -(-told["clusters"] // WIDTH))
+
+    def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer) -> None:
+        """Draw the irradiance of all view clusters into `target`, of `cluster_size`, from `direct` irradiance on the surfels."""
+        if self._terms == 0:
+            target.clear()
+            return
+        radiosity = self.bounced(direct)
+        target.use()
+        radiosity.use(2)
+        self._programs.run("deep_framebuffer_clusters.frag", {}, {**self._view.uniforms(0), "light": 2})
+
+    def bounced(self, direct: moderngl.Texture) -> moderngl.Texture:
+        """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of a texel per surfel."""
+        (light, light_target), (other, other_target) = self._radiosity
+        direct.use(3)
+        self._albedo.use(4)
+        for term in range(self._terms):
+            light_target.use()
+            other.use(2)
+            values = {**self._exchange.uniforms(0), "light": 2, "direct": 3, "albedo": 4, "first": int(term == 0)}
+            self._programs.run("deep_framebuffer_bounce.frag", {}, values)
+            (light, light_target), (other, other_target) = (other, other_target), (light, light_target)
+        return other
+
+    def pixels(self, light: moderngl.Texture) -> None:
+        """Draw the pixels into the target in use, from the irradiance of the clusters."""
+        self._textures.layers().use(0)
+        light.use(1)
+        self._reflectance.use(2)
+        self._programs.run("deep_framebuffer_pixels.frag", {}, {"neighbors": 0, "layers": self._layers, "light": 1, "reflectance": 2})
+
+
+def rows_image(packed: ndarray, count: int) -> Float32[ndarray, "h w 4"]:
+    """Of packed rows: column and row of each row's first link among the links' texels, how many links it has, 0; `count` rows, folded."""
+    own = packed.reshape(-1, 3)[:count].astype(np.int64)
+    sizes: Int[ndarray, " n"] = own[:, 0] + 256 * own[:, 1]
+    first = np.cumsum(sizes) - sizes
+    columns = packed.shape[1]
+    return folded(np.stack([first % columns, first // columns, sizes, 0 * sizes], axis=1).astype(np.float32))
+
+
+def folded(values: ndarray) -> ndarray:
+    """(n, c) as an image (h, WIDTH, c), 0 behind the last."""
+    rows = max(1, -(-len(values) // WIDTH))
+    return np.pad(values, ((0, rows * WIDTH - len(values)), (0, 0))).reshape(rows, WIDTH, values.shape[1])

@@ -1,0 +1,136 @@
+"""Passes that relight a deep framebuffer: light on its surfels, bounces, links to view clusters, pixels; unmoved lights are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float64
+from srbf.asset import Asset
+from srbf.errors import ImageError, InputError
+from srbf.gl.context import Limits
+from srbf.gl.deep_framebuffer import LinkPasses
+from srbf.gl.passes import Passes
+from srbf.gl.programs import Programs
+from srbf.gl.textures import AssetTextures
+from srbf.lights import WHITE, EnvironmentLight, Light, NamedLight, PointLight
+from srbf.visibility.packed_links import unpacked
+from srbf.visibility.surface_cells import Cells
+from srbf.visibility.surfel_light import SurfelLight
+
+if TYPE_CHECKING:
+    import moderngl
+
+NEGLIGIBLE, MOST_TERMS = 1e-4, 64  # of all light, that a bounce adds and is the last; of a scene whose bounces nobody has limited
+
+
+class PoolPasses(Passes):
+    """Passes over a deep framebuffer. A light that has neither moved nor changed but in color costs one pass over the clusters.
+
+    `computed` counts the lights whose bounces were computed.
+    """
+
+    def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
+        self._asset, self._programs, self._textures = asset, programs, textures
+        self._known: dict[Any, tuple[Light, moderngl.Texture, moderngl.Framebuffer]] = {}
+        self._free: list[tuple[moderngl.Texture, moderngl.Framebuffer]] = []
+        self.computed = 0
+
+    def prepare(self, lights: Sequence[Light]) -> bool:
+        """The light of all view clusters."""
+        if any(isinstance(light, NamedLight) for light in lights):
+            raise InputError("expected lights inside the scene for a deep-framebuffer asset, found a named one; bake `light_set=named`")
+        self._make()
+        gl: Any = self._programs.context
+        kept = {}
+        for light in lights:
+            key = _shape(light)
+            if key not in kept:
+                kept[key] = self._known.pop(key) if key in self._known else self._white(light)
+        self._free += [(texture, target) for _, texture, target in self._known.values()]
+        self._known = kept
+        gl.enable_only(gl.NOTHING)
+        gl.blend_equation = gl.FUNC_ADD  # shadow maps left another
+        self._sums[0][1].clear()
+        for light in lights:
+            (former, _), (_, target) = self._sums
+            target.use()
+            former.use(0)
+            kept[_shape(light)][1].use(1)
+            self._programs.run("deep_framebuffer_sum.frag", {}, {"former": 0, "light": 1, "color": light.color})
+            self._sums.reverse()
+        return True
+
+    def prepared(self) -> None:
+        """A pass over the pixels."""
+        self._links.pixels(self._sums[0][0])
+
+    def check_point_lights(self) -> None:
+        """Accepts all."""
+
+    def distant(self, weights: Float64[ndarray, "F 3"], units: int | None) -> None:
+        """Nothing is left to project."""
+
+    def weighted(self, weights: moderngl.Texture) -> None:
+        """InputError: no light is weighed by other passes."""
+        raise InputError("expected lights inside the scene for a deep-framebuffer asset, found weights of an environment on the GPU")
+
+    def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
+        """Nothing is left."""
+
+    def _make(self) -> None:
+        if hasattr(self, "_links"):
+            return
+        asset = self._asset
+        if asset.scene is None:
+            raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
+        pool = asset.tables["pool"]
+        cells = replace(Cells.of_image(pool[:2]), albedo=np.ascontiguousarray(pool[2, :, :3]))
+        self._surfels = SurfelLight(self._programs, cells, asset.scene)
+        self._links = LinkPasses(asset, self._programs, self._textures, bounce_terms(asset, cells))
+        self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
+
+    def _white(self, light: Light) -> tuple[Light, moderngl.Texture, moderngl.Framebuffer]:
+        """The irradiance of all clusters under a light in white."""
+        gl: Any = self._programs.context
+        texture, target = self._free.pop() if self._free else self._programs.target(self._links.cluster_size)
+        direct = self._surfels.draw(replace(light, color=WHITE))
+        gl.enable_only(gl.NOTHING)
+        self._links.clusters(direct, target)
+        self.computed += 1
+        return light, texture, target
+
+
+def bounce_terms(asset: Asset, cells: Cells) -> int:
+    """How many bounces matter: those that the scene allows, or until one adds next to nothing where all surfels are lit evenly.
+
+    ImageError where the links do not fit the pool.
+    """
+    told, tables = asset.manifest["gather"], asset.tables
+    most = told.get("bounces", MOST_TERMS)
+    try:
+        exchange = unpacked(
+            tables["exchange_links"], tables["exchange_rows"], told["surfels"], told["exchange_rays"], told["surfels"]
+        ).matrix()
+    except ValueError as error:
+        raise ImageError(f"{error}; fit again") from error
+    last = cells.albedo
+    total = 0.0
+    for term in range(most):
+        part = float(last.sum(dtype=np.float64))
+        total += part
+        if part <= NEGLIGIBLE * total:
+            return term
+        last = cells.albedo * (exchange @ last)
+    return most
+
+
+def _shape(light: Light) -> Any:
+    """Equal of lights that differ in color alone."""
+    if isinstance(light, EnvironmentLight):
+        return id(light.image), light.rotation.tobytes()
+    return replace(light, color=WHITE)

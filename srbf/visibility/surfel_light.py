@@ -1,0 +1,105 @@
+"""What a light lays on the cells of a scene's surfaces, by passes of the GPU: a cube of shadow maps about each point of the light."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float64
+from srbf.gl.deep_framebuffer import folded
+from srbf.gl.programs import Programs
+from srbf.io.scene_glb import read_triangles
+from srbf.lights import AreaLight, Light, PointLight, SpotLight, triple
+from srbf.visibility.gl_resources import Resources
+from srbf.visibility.looks import WORLD, Look
+from srbf.visibility.received import SIDE, ReceivedLight, lift_of, occluders_of
+from srbf.visibility.shadow_casters import POINT_STAGES, ShadowCasters, ShadowMaps
+from srbf.visibility.surface_cells import Cells
+
+if TYPE_CHECKING:
+    import moderngl
+
+FACE = 1024  # texels per side of a face of the shadow cube
+
+
+class SurfelLight:
+    """Direct irradiance on cells as a texture of a texel per cell: the GPU's `srbf.visibility.received.ReceivedLight`.
+
+    Point, spot, sphere and area lights by shadow maps; directional and environment lights by the rays of `ReceivedLight`.
+
+    Parameters
+    ----------
+    programs
+        Of the context, which is current whenever `draw` is called.
+    cells
+        N cells.
+    scene
+        scene.glb: what casts shadows.
+    size
+        Texels per side of a face of the shadow cube.
+    """
+
+    def __init__(self, programs: Programs, cells: Cells, scene: bytes, size: int = FACE) -> None:
+        self._programs, self._cells, self._scene = programs, cells, scene
+        self._resources = Resources(programs.context)
+        programs.resources.callback(self._resources.close)
+        places = cells.places.astype(np.float64)
+        self.center: Float64[ndarray, " 3"] = (places.min(axis=0) + places.max(axis=0)) / 2  # single precision is finest about the origin
+        self._lift = lift_of(places)
+        self._places = self._resources.texture(folded(np.column_stack([places - self.center, cells.areas])))
+        self._normals = self._resources.texture(folded(cells.normals))
+        self.casters = ShadowCasters(self._resources, read_triangles(scene), self.center)
+        self.maps, self._size = ShadowMaps.of(self._resources, size), size
+        self.texture, self._target = self._resources.target(self._places.size, 4, "f4")
+        self._by_rays: ReceivedLight | None = None
+
+    def draw(self, light: Light) -> moderngl.Texture:
+        """The irradiance of one light of the asset's frame, until the next call; blending is left on and additive.
+
+        MissingLibraryError for directional and environment lights without embreex.
+        """
+        if not isinstance(light, (PointLight, AreaLight)):
+            return self._traced(light)
+        gl: Any = self._programs.context
+        self._target.use()
+        self._target.clear()
+        for point, lambertian, weight in points_of(light):
+            for uniforms in self.faces(point):
+                self._target.use()
+                for unit, texture in enumerate((self._places, self._normals, self.maps.heights[0])):
+                    texture.use(unit)
+                gl.enable_only(gl.BLEND)
+                gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
+                units = {"surfels": 0, "normals": 1, "heights": 2, "lift": self._lift, "lambertian": lambertian, "weight": weight}
+                self._programs.run("deep_framebuffer_surfels.frag", {}, {**uniforms, **units})
+        return self.texture
+
+    def faces(self, light: PointLight) -> Iterator[dict[str, Any]]:
+        """Draw one face after the other of the shadow cube about a light into `maps`; the uniforms that look it up."""
+        local = replace(light, position=triple(np.array(light.position) - self.center))
+        for uniforms in Look(local, (0.0, 0.0, 0.0), WORLD, (0, 1, 2, 3, 4, 5)).maps(self._size):
+            self.casters.draw(self.maps, POINT_STAGES, uniforms)
+            yield {**uniforms, **{f"pointLight.{name}": value for name, value in uniforms["pointLight"].items()}}
+
+    def _traced(self, light: Light) -> moderngl.Texture:
+        if self._by_rays is None:
+            self._by_rays = ReceivedLight(self._cells, occluders_of(self._scene))
+        found = folded(self._by_rays.irradiance(light).astype(np.float32))
+        self.texture.write(np.ascontiguousarray(np.pad(found, ((0, 0), (0, 0), (0, 1)))))
+        return self.texture
+
+
+def points_of(light: PointLight | AreaLight) -> Iterator[tuple[PointLight, float, float]]:
+    """(white light, 1 where it shines by the cosine to its axis, its share) of each point that stands for a light."""
+    if isinstance(light, PointLight):
+        yield light, 0.0, 1.0
+        return
+    u, v, center = np.array(light.u), np.array(light.v), np.array(light.position)
+    steps = (np.arange(SIDE) + 0.5) / SIDE - 0.5
+    for place in (center + s * u + t * v for s in steps for t in steps):
+        point = SpotLight(triple(place), a0=light.a0, falloff="inverse-square", direction=light.direction, inner=np.pi, outer=np.pi)
+        yield point, 1.0, 1 / SIDE**2

@@ -1,0 +1,99 @@
+"""Deep framebuffers on the web: passes of the GPU and rays on the host give the picture of numpy; lights that stay are kept."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from made_rooms import Room
+from made_views import view_of_room
+
+from srbf import methods
+from srbf.asset import Asset
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.methods.deep_framebuffer import DeepFramebuffer
+
+pytest.importorskip("embreex")
+
+CLOSE = 2e-3  # of the largest value; 3e-4 measured in SwiftShader, of bounces that are left out
+RIM = 1e-2  # of a directional light, at whose edge of a shadow one of 700 surfels is lit in part
+LIGHTS: dict[str, Light] = {
+    "point": PointLight((0.8, 0.7, 1.1), (1, 0.5, 0.2), falloff="inverse-square"),
+    "spot": SpotLight((2.0, 1.0, 1.5), falloff="inverse-square", direction=(0.2, 0, -1), inner=0.5, outer=0.8),
+    "sphere": SphereLight((0.6, 1.2, 0.8), (0.2, 1, 0.4), size=0.1),
+    "area": AreaLight((1.5, 1, 1.7), u=(0.6, 0, 0), v=(0, -0.3, 0)),
+    "directional": DirectionalLight((0.2, 0.1, 1)),
+}
+NAMES = {PointLight: "point", SpotLight: "spot", SphereLight: "sphere", AreaLight: "area", DirectionalLight: "directional"}
+
+
+@pytest.fixture(scope="module")
+def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    """Of a room without a lid."""
+    room = Room.box((3, 2, 2), 0.25, 0.6, lid=False)
+    return DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("view") / "capture", room, 700, 150, tested=0))
+
+
+@pytest.fixture(scope="module")
+def url(browser: Any, asset: Asset) -> str:
+    return browser.serve(asset)
+
+
+def told(*lights: Light) -> list[dict[str, Any]]:
+    return [{"kind": NAMES[type(light)], **asdict(light)} for light in lights]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        *[{"run": "three-lightmap", "weights": weights} for weights in ("gpu", "cpu")],
+        *[{"run": "nodes-lightmap", "weights": "cpu", "backend": backend} for backend in ("webgl", "webgpu")],
+    ],
+    ids=lambda run: "-".join(run.values()),
+)
+def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run: dict[str, str]) -> None:
+    """Of every kind of light, then all, then all in other colors, then none."""
+    point: Any = LIGHTS["point"]
+    every = list(LIGHTS.values())
+    recolored = [replace(point, color=(0.1, 2.0, 0.4)), *every[1:]]
+    sets = [*[[light] for light in every], every, recolored, every[:2], []]
+    drawn = browser.lightmaps(asset=url, light_sets=[told(*lights) for lights in sets], **run)
+    for picture, lights in zip(drawn, sets, strict=True):
+        expected = methods.relight(asset, lights)
+        tolerance = RIM if any(isinstance(light, DirectionalLight) for light in lights) else CLOSE
+        np.testing.assert_allclose(picture, expected, atol=tolerance * max(expected.max(), 1e-9), err_msg=str(lights))
+
+
+def test_a_light_that_stays_is_not_computed_again(browser: Any, url: str) -> None:
+    """Recolored, joined by another, alone again; then it moves, and goes back."""
+    point: Any = PointLight((0.8, 0.7, 1.1), falloff="inverse-square")
+    spot, moved = LIGHTS["spot"], replace(point, position=(0.9, 0.7, 1.1))
+    kept = [[point], [replace(point, color=(0.1, 2.0, 0.0))], [spot, point], [point, spot, point], [point]]
+    for sets, computed in ((kept, 2), ([*kept, [moved]], 3), ([*kept, [moved], [point]], 4)):
+        said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights) for lights in sets], weights="gpu")
+        assert said["computed"] == computed
+
+
+def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:
+    said = browser.response("nodes-lightmap", asset=url, lightSets=[[]], weights="gpu", backend="webgl")
+    assert 'weights: "cpu"' in said["error"]
+
+
+@pytest.mark.parametrize(("key", "value"), [("gather", {"surfels": 0}), ("pool", None), ("scene", None)])
+def test_a_manifest_without_what_it_needs_is_refused(browser: Any, asset: Asset, key: str, value: Any) -> None:
+    url = browser.serve(asset)
+    path = browser.folder(url) / "asset.json"
+    manifest = json.loads(path.read_text())
+    path.write_text(json.dumps(manifest | {key: value}))
+    assert "srbf fit" in browser.response("three-lightmap", asset=url, lightSets=[[]])["error"]
+
+
+@pytest.mark.parametrize("run", ["babylon-material", "playcanvas-material"])
+def test_other_engines_show_what_rays_on_the_host_say(browser: Any, asset: Asset, url: str, run: str) -> None:
+    lights = [LIGHTS["point"], LIGHTS["spot"]]
+    shown = browser.picture(run, asset=url, lights=lights, color=(1.0, 1.0, 1.0), half=(1.0, 1.0, 0.0))
+    expected, covered = methods.relight(asset, lights), asset.images["coverage"] > 0.5
+    np.testing.assert_allclose(shown[covered], expected[covered], atol=CLOSE * expected.max())

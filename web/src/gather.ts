@@ -1,0 +1,128 @@
+/** The links of a deep framebuffer, and the light that they carry: `srbf/visibility/packed_links.py` and `sparse_links.py`. */
+import { SrbfError } from "./errors";
+import { decodeFloat } from "./exr";
+import type { AssetFiles } from "./files";
+import { type ByteImage, type FloatImage, padToFour } from "./image";
+import type { Manifest } from "./manifest";
+import { decodePng } from "./png";
+import { Cells } from "./received_light";
+import type { Surfels } from "./surfels";
+import { readOccluders } from "./triangles";
+
+/** Keys of asset.json. */
+export interface GatherManifest extends Manifest {
+  gather?: { surfels: number; clusters: number; view_rays: number; exchange_rays: number; bounces?: number };
+  pool?: { file: string };
+  view_links?: { file: string };
+  view_rows?: { file: string };
+  exchange_links?: { file: string };
+  exchange_rows?: { file: string };
+}
+
+/** Sparse links of `count` rows, as the shader pack's `srbfLinkedLight` takes them. */
+export interface PackedLinks {
+  readonly count: number;
+  /** RGBA bytes: low and high byte of a surfel, how many of the row's rays meet it. */
+  readonly links: ByteImage;
+  /** Column and row of each row's first link, how many it has; `ACROSS` rows next to each other. */
+  readonly rows: FloatImage;
+  /** Rays of a row. */
+  readonly rays: number;
+}
+
+export interface Gather {
+  /** A cell and a patch for each surfel. */
+  readonly surfels: Surfels;
+  /** (S, 3). */
+  readonly albedo: Float32Array;
+  readonly exchange: PackedLinks;
+  readonly view: PackedLinks;
+  /** Bounces that are added up. */
+  readonly terms: number;
+}
+
+export const ACROSS = 256; // rows, or clusters, next to each other in a texture
+const [NEGLIGIBLE, MOST_TERMS] = [1e-4, 64]; // of all light, that a bounce adds and is the last; of a scene whose bounces nobody has limited
+
+/** @throws SrbfError on damaged files, and on links that do not fit the pool. */
+export async function readGather(files: AssetFiles, manifest: GatherManifest): Promise<Gather> {
+  const { surfels, clusters, view_rays, exchange_rays, bounces } = manifest.gather as Required<GatherManifest>["gather"];
+  const file = (manifest.pool as { file: string }).file;
+  const scene = manifest.scene as string;
+  const [pool, corners, view, exchange] = await Promise.all([
+    files.bytes(file).then((buffer) => decodeFloat(buffer, file)),
+    files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
+    readLinks(files, manifest, "view", clusters, view_rays, surfels),
+    readLinks(files, manifest, "exchange", surfels, exchange_rays, surfels),
+  ]);
+  if (pool.width !== surfels || pool.height !== 3) throw new SrbfError(`expected ${surfels} x 3 numbers in ${file}, found ${pool.width} x ${pool.height}`);
+  const first = pool.data.slice(0, 8 * surfels);
+  const albedo = new Float32Array(3 * surfels);
+  for (let i = 0; i < surfels; ++i) {
+    first[4 * (surfels + i) + 3] = i;
+    for (let c = 0; c < 3; ++c) albedo[3 * i + c] = pool.data[4 * (2 * surfels + i) + c];
+  }
+  const cells = new Cells({ kind: "float", width: surfels, height: 2, channels: 4, data: first }, file);
+  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, terms: termsOf(exchange, albedo, bounces ?? MOST_TERMS) };
+}
+
+/** What the clusters receive from surfels of this direct irradiance, all bounces included; both (n, 3). */
+export function gathered({ exchange, view, albedo, terms }: Gather, irradiance: Float64Array): Float64Array {
+  let radiosity = new Float64Array(irradiance.length);
+  for (let term = 0; term < terms; ++term) {
+    const arriving = term ? linked(exchange, radiosity) : radiosity;
+    radiosity = irradiance.map((direct, i) => albedo[i] * (direct + arriving[i]));
+  }
+  return linked(view, radiosity);
+}
+
+/** Light along links, (count, 3) from (S, 3): `srbfLinkedLight` of every row. */
+export function linked({ count, links, rows, rays }: PackedLinks, light: Float64Array): Float64Array {
+  const out = new Float64Array(3 * count);
+  for (let row = 0; row < count; ++row) {
+    let at = 4 * (rows.data[4 * row + 1] * links.width + rows.data[4 * row]);
+    for (const end = at + 4 * rows.data[4 * row + 2]; at < end; at += 4) {
+      const surfel = 3 * (links.data[at] + 256 * links.data[at + 1]);
+      const share = links.data[at + 2] / rays;
+      for (let c = 0; c < 3; ++c) out[3 * row + c] += share * light[surfel + c];
+    }
+  }
+  return out;
+}
+
+function termsOf(exchange: PackedLinks, albedo: Float32Array, most: number): number {
+  let last = Float64Array.from(albedo);
+  let total = 0;
+  for (let term = 0; term < most; ++term) {
+    const part = last.reduce((sum, x) => sum + x, 0);
+    total += part;
+    if (part <= NEGLIGIBLE * total) return term;
+    last = linked(exchange, last).map((x, i) => albedo[i] * x);
+  }
+  return most;
+}
+
+async function readLinks(files: AssetFiles, manifest: GatherManifest, name: "view" | "exchange", count: number, rays: number, surfels: number): Promise<PackedLinks> {
+  const of = async (part: "links" | "rows") => {
+    const { file } = manifest[`${name}_${part}`] as { file: string };
+    return decodePng(await files.bytes(file), file);
+  };
+  const [image, sizes] = await Promise.all([of("links"), of("rows")]);
+  const rows = new Float32Array(4 * ACROSS * Math.ceil(count / ACROSS));
+  let first = 0;
+  for (let i = 0; i < count; ++i) {
+    const size = sizes.data[sizes.channels * i] + 256 * sizes.data[sizes.channels * i + 1];
+    rows.set([first % image.width, Math.floor(first / image.width), size], 4 * i);
+    first += size;
+  }
+  const data = padToFour(image.data, image.channels);
+  let largest = 0;
+  for (let i = 0; i < first; ++i) largest = Math.max(largest, data[4 * i] + 256 * data[4 * i + 1]);
+  if (!(first <= image.width * image.height) || largest >= surfels) throw new SrbfError(`expected ${name} links of ${count} rows to ${surfels} surfels, found others; fit again`);
+  return {
+    count,
+    links: { kind: "uint8", width: image.width, height: image.height, channels: 4, data },
+    rows: { kind: "float", width: ACROSS, height: rows.length / (4 * ACROSS), channels: 4, data: rows },
+    rays,
+  };
+}

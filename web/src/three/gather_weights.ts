@@ -1,0 +1,128 @@
+/**
+ * The irradiance of a deep framebuffer's view clusters, computed by the GPU: direct light on its surfels, bounces between them, links to the clusters.
+ * A light that has not moved is kept, so that another color, or another light, costs one small pass. Nothing is read back.
+ */
+import { type DataTexture, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
+import bounceStage from "../../../glsl/stages/deep_framebuffer_bounce.frag";
+import clustersStage from "../../../glsl/stages/deep_framebuffer_clusters.frag";
+import sumStage from "../../../glsl/stages/deep_framebuffer_sum.frag";
+import { SrbfError } from "../errors";
+import { ACROSS, type Gather, type PackedLinks } from "../gather";
+import type { NamedLight } from "../lights";
+import type { Triple } from "../matrix";
+import { packedCells } from "../surfels";
+import type { ShadowedLook } from "./engine_shadows";
+import { floatTarget, floatTexture } from "./float_textures";
+import { FullscreenPass } from "./fullscreen";
+import { SurfelIrradiance } from "./surfel_irradiance";
+import { tableTexture } from "./textures";
+
+export class GatherWeights {
+  readonly middle: Triple;
+  /** How often the bounces of a light were computed. */
+  computed = 0;
+  private readonly direct: SurfelIrradiance;
+  private readonly albedo: DataTexture;
+  private readonly links: DataTexture[];
+  private readonly radiosity: [WebGLRenderTarget, WebGLRenderTarget];
+  /** The sum of all lights, the first; and what is drawn in turn with it. */
+  private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
+  private readonly size: [number, number];
+  private readonly bounce: FullscreenPass;
+  private readonly clusters: FullscreenPass;
+  private readonly sum: FullscreenPass;
+  /** Irradiance of the clusters by lights in white. */
+  private known = new Map<string, WebGLRenderTarget>();
+  private readonly unused: WebGLRenderTarget[] = [];
+
+  constructor(
+    private readonly gather: Gather,
+    shadowSize = 1024,
+  ) {
+    const cells = packedCells(gather.surfels);
+    this.middle = cells.middle;
+    this.direct = new SurfelIrradiance(gather.surfels, cells, shadowSize, { SRBF_MEAN_NORMALS: 1 });
+    const albedo = new Float32Array(4 * cells.width * cells.height);
+    for (let i = 0; i < gather.surfels.cells.count; ++i) albedo.set(gather.albedo.subarray(3 * i, 3 * i + 3), 4 * i);
+    this.albedo = floatTexture(albedo, cells.width, cells.height);
+    this.radiosity = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
+    this.size = [ACROSS, Math.ceil(gather.view.count / ACROSS)];
+    this.sums = [floatTarget(...this.size), floatTarget(...this.size)];
+    const [exchange, view] = [gather.exchange, gather.view].map(linkUniforms);
+    this.links = [exchange, view].flatMap(({ links, rows }) => [links.value, rows.value]);
+    this.bounce = new FullscreenPass(bounceStage, { ...exchange, light: { value: null }, direct: { value: null }, albedo: { value: this.albedo }, first: { value: 1 } });
+    this.clusters = new FullscreenPass(clustersStage, { ...view, light: { value: null } });
+    this.sum = new FullscreenPass(sumStage, { former: { value: null }, light: { value: null }, color: { value: [0, 0, 0] } });
+  }
+
+  get weights(): Texture {
+    return this.sums[0].texture;
+  }
+
+  setEmission(emitting: readonly NamedLight[]): void {
+    if (emitting.length) throw new SrbfError(`expected lights inside the scene for a deep framebuffer, found ${JSON.stringify(emitting[0].name)}`);
+  }
+
+  /** Draw the irradiance under lights, each a list of looks of one color; within `undisturbed`. */
+  draw(renderer: WebGLRenderer, lights: readonly (readonly ShadowedLook[])[]): void {
+    const shining = lights.filter((looks) => looks.length > 0);
+    const kept = new Map<string, WebGLRenderTarget>();
+    const irradiance = shining.map((looks) => {
+      const key = keyOf(looks);
+      const found = key === undefined ? undefined : (this.known.get(key) ?? kept.get(key));
+      const target = found ?? this.white(renderer, looks);
+      kept.set(key ?? `shadow ${kept.size}`, target);
+      if (key !== undefined) this.known.delete(key);
+      return target;
+    });
+    this.unused.push(...this.known.values());
+    this.known = kept;
+    let [former, next] = shining.length % 2 ? [this.sums[1], this.sums[0]] : this.sums; // the last pass ends in the first
+    renderer.setRenderTarget(former);
+    renderer.setClearColor(0, 0);
+    renderer.clear(true, false, false);
+    irradiance.forEach(({ texture }, i) => {
+      const [look] = shining[i];
+      const values = { former: former.texture, light: texture, color: look.color.map((x) => x * shining[i].length) };
+      for (const [name, value] of Object.entries(values)) this.sum.uniforms[name].value = value;
+      this.sum.draw(renderer, next);
+      [former, next] = [next, former];
+    });
+  }
+
+  dispose(): void {
+    const targets = [...this.radiosity, ...this.sums, ...this.known.values(), ...this.unused];
+    for (const one of [this.direct, this.albedo, ...this.links, ...targets, this.bounce, this.clusters, this.sum]) one.dispose();
+  }
+
+  /** Of a light in white. */
+  private white(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): WebGLRenderTarget {
+    const target = this.unused.pop() ?? floatTarget(...this.size);
+    const share = 1 / looks.length;
+    this.bounce.uniforms.direct.value = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: [share, share, share] as Triple })));
+    let [light, next] = this.radiosity;
+    for (let term = 0; term < this.gather.terms; ++term) {
+      this.bounce.uniforms.light.value = light.texture;
+      this.bounce.uniforms.first.value = term ? 0 : 1;
+      this.bounce.draw(renderer, next);
+      [light, next] = [next, light];
+    }
+    if (this.gather.terms === 0) {
+      renderer.setRenderTarget(light);
+      renderer.clear(true, false, false);
+    }
+    this.clusters.uniforms.light.value = light.texture;
+    this.clusters.draw(renderer, target);
+    ++this.computed;
+    return target;
+  }
+}
+
+/** Equal of lights that differ in color alone; undefined where an engine's shadow may have changed. */
+function keyOf(looks: readonly ShadowedLook[]): string | undefined {
+  return looks.some(({ shadow }) => shadow) ? undefined : JSON.stringify(looks.map((look) => ({ ...look, color: 1 })));
+}
+
+function linkUniforms({ links, rows, rays }: PackedLinks) {
+  return { links: { value: tableTexture(links) }, rows: { value: tableTexture(rows) }, rays: { value: rays } };
+}
