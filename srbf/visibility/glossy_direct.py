@@ -15,7 +15,7 @@ from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers, spread_points
 
-POINTS, MOST_POINTS = 4, 32  # of a pixel, and of one whose first points differ or that a light with a size lights
+POINTS, SIZED_POINTS, MOST_POINTS = 4, 32, 96  # of a pixel; of one that a light with a size lights; of one whose first points differ
 RAGGED = 0.2  # how far a pixel's first points are from their mean, over the largest of it
 DARK = 0.05  # of the mean over pixels: differences that do not count
 BATCH = 1 << 19  # samples at a time
@@ -85,7 +85,7 @@ class GlossyRays:
         return total.reshape(self._receivers.height, self._receivers.width, 3).astype(np.float32)
 
     def _of(self, light: CastingLight) -> Float64[ndarray, "G 3"]:
-        """The mean over POINTS points of every pixel, over MOST_POINTS where these differ."""
+        """The mean over POINTS points of every pixel, over more where these differ."""
         texels, step = self._pixels.texels, max(1, BATCH // POINTS)
         if not self._first:
             self._first = [self._tracer.shown(texels[start : start + step], range(POINTS)) for start in range(0, len(texels), step)]
@@ -98,12 +98,13 @@ class GlossyRays:
             farthest[part] = np.ptp(strength, axis=0)
         mean = total.max(axis=1) / np.maximum(weight, 1)
         sized = isinstance(light, (AreaLight, SphereLight)) or (isinstance(light, DirectionalLight) and self._receivers.sun_angle > 0)
+        most = SIZED_POINTS if sized else MOST_POINTS
         ragged = np.full(len(texels), sized) | (farthest > RAGGED * np.maximum(mean, DARK * mean.mean()))
         rest = np.flatnonzero(ragged)
-        step = max(1, BATCH // MOST_POINTS)
+        step = max(1, BATCH // most)
         for start in range(0, len(rest), step):
             own = rest[start : start + step]
-            found, counts = self._found(light, *self._tracer.shown(texels[own], range(POINTS, MOST_POINTS)), POINTS)
+            found, counts = self._found(light, *self._tracer.shown(texels[own], range(POINTS, most)), POINTS)
             total[own] += found.sum(axis=0)
             weight[own] += counts.sum(axis=0)
         return total / np.maximum(weight, 1)[:, None]
