@@ -22,7 +22,7 @@ def alpha_of(roughness: Float[ndarray, " n"]) -> Float64[ndarray, " n"]:
 def lobe(
     NoL: Float[ndarray, " n"], NoV: Float[ndarray, " n"], NoH: Float[ndarray, " n"], alpha: Float[ndarray, " n"]
 ) -> Float64[ndarray, " n"]:
-    """f NoL of a lobe whose Fresnel term is 1: D G2 / (4 NoV), G2 height-correlated Smith [Walter2007, Heitz2014]; 0 from below."""
+    """f NoL of a lobe whose Fresnel term is 1: D G2 / (4 NoV), G2 height-correlated Smith [Walter2007, Heitz2018]; 0 from below."""
     squared = alpha**2
     density = squared / (np.pi * (NoH**2 * (squared - 1) + 1) ** 2)
     shadowing = 1 / (1 + _masking(NoL, squared) + _masking(NoV, squared))
