@@ -2,7 +2,7 @@
 
 Lights at random free places that no bake saw, each so that the view gets light of it: points, wide spots of 35 to 50 degrees, narrow ones
 of 10 to 15, and points 5 cm off a surface in view (wall). References are rendered twice, so that their noise drops out: relative RMSE =
-sqrt(sum (a - r1)(a - r2) / sum r1 r2), of the indirect light and of the full picture with direct light by rays, median over lights; the
+sqrt(sum (a - r1)(a - r2) / sum r1 r2), of the indirect light, of the direct light by rays and of the full picture, median over lights; the
 ratio of energies of the indirect light, pooled and the one farthest from 1; megabytes of the asset's links, pool and pixels or maps; CPU
 seconds for one light; the noise of one reference. `--references FILE.npz` keeps what Cycles rendered.
 """
@@ -87,11 +87,11 @@ def main() -> None:
     capture = Capture.open(asked.capture)
     covered = capture.coverage() >= COVERED
     kept = dict(np.load(asked.references)) if asked.references is not None and asked.references.is_file() else {}
-    print(f"{'asset':>24}{'light':>8}{'indirect':>10}{'full':>8}{'energy':>8}{'worst':>8}{'MB':>8}{'CPU s':>8}{'noise':>9}")
+    print(f"{'asset':>24}{'light':>8}{'indirect':>10}{'direct':>8}{'full':>8}{'energy':>8}{'worst':>8}{'MB':>8}{'CPU s':>8}{'noise':>9}")
     for kind in asked.kinds.split(","):
         lights = placed(capture, kind, asked.lights)
         if kind not in kept:
-            images = rendered(asked.scene, settings_of(capture), lights, asked.samples, ("indirect", "direct"))
+            images = rendered(asked.scene, settings_of(capture), lights, asked.samples, ("indirect", "direct"), gloss=True)
             kept[kind] = np.stack([images["indirect"], images["direct"]], axis=2)
             if asked.references is not None:
                 np.savez(asked.references, **kept)
@@ -104,19 +104,21 @@ def main() -> None:
             seconds = (time.process_time() - started) / len(lights)
             with Added(asset, "ray") as added:
                 direct = np.stack([np.asarray(added.response([light]))[covered] for light in lights])
-            bounced, full, energies, noise = [], [], [], []
+            bounced, near_errors, full, energies, noise = [], [], [], [], []
             for own, near, first, second in zip(indirect, direct, *references, strict=True):
                 known = np.isfinite(first + second).all(axis=(0, 2))  # Cycles leaves a few pixels of spots with sharp edges as NaN
                 own, near, first, second = own[known], near[known], first[:, known], second[:, known]
                 bounced.append(error(own, first[0], second[0]))
+                near_errors.append(error(near, first[1], second[1]))
                 full.append(error(own + near, first.sum(axis=0), second.sum(axis=0)))
                 energies.append((float(own.sum()), float((first[0] + second[0]).sum() / 2)))
                 noise.append(np.sqrt(((first[0] - second[0]) ** 2).sum() / 2 / (first[0] * second[0]).sum()))
             energy = np.array([one / other for one, other in energies])
             whole = sum(one for one, _ in energies) / sum(other for _, other in energies)
             size = (asset.stored.nbytes + sum(table.nbytes for table in asset.tables.values())) / 1e6
+            errors = f"{100 * np.median(bounced):>9.1f}%{100 * np.median(near_errors):>7.2f}%{100 * np.median(full):>7.2f}%"
             print(
-                f"{path.name:>24}{kind:>8}{100 * np.median(bounced):>9.1f}%{100 * np.median(full):>7.2f}%{whole:>8.3f}"
+                f"{path.name:>24}{kind:>8}{errors}{whole:>8.3f}"
                 f"{energy[np.abs(energy - 1).argmax()]:>8.3f}{size:>8.1f}{seconds:>8.2f}{100 * np.median(noise):>8.0f}%",
                 flush=True,
             )

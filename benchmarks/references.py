@@ -24,9 +24,14 @@ def settings_of(capture: Capture) -> BakeSettings:
 
 
 def rendered(
-    scene: Path, settings: BakeSettings, lights: Sequence[Light], samples: int, channels: tuple[str, ...] = ("indirect",)
+    scene: Path,
+    settings: BakeSettings,
+    lights: Sequence[Light],
+    samples: int,
+    channels: tuple[str, ...] = ("indirect",),
+    gloss: bool = False,
 ) -> dict[str, np.ndarray]:
-    """(2, N, H, W, 3) of each channel, `indirect` or `direct`: every light, twice."""
+    """(2, N, H, W, 3) of each channel, `indirect` or `direct`: every light, twice. `gloss`: direct light includes what lobes reflect."""
     images: dict[str, list[np.ndarray]] = {channel: [] for channel in channels}
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
@@ -41,7 +46,13 @@ def rendered(
             for again in range(2)
             for i, light in enumerate(lights)
         ]
-        job = {**base_job(scene, settings, scratch), "transport": "indirect", "transmittances": {}, "requests": requests}
+        job = {
+            **base_job(scene, settings, scratch),
+            "transport": "indirect",
+            "transmittances": {},
+            "requests": requests,
+            "direct_gloss": gloss,
+        }
         with Worker(job, scratch, scratch / "bake.log", None) as worker:
             for event in worker.events(print):
                 if event["event"] == "rendered":

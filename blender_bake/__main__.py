@@ -52,6 +52,7 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     ambient: a request without a light, or null; rendered only where the scene may emit;
     lit_by: {kind: own}, suns and point lights of ours; {kind: named, groups}, the scene's own lights; {kind: cloud | patches, file}, point
     lights, and patches of the surfaces (see `emissive_patches`);
+    direct_gloss: whether direct light includes what gloss reflects; needs a view;
     viewers: unit directions that radiance is rendered toward where a request asks for it, or null;
     requests, serve: requests (see `RenderRequest`) in the job, and whether more come on stdin;
     transmittances, probes: where `transport` is indirect, the transmittances of translucent materials, by name; if null, fitted under

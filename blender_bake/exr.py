@@ -44,4 +44,10 @@ def read_passes(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
     return passes
 
 
-SHORT_NAMES = {"Diffuse Color": "DiffCol", "Diffuse Direct": "DiffDir", "Diffuse Indirect": "DiffInd"}  # Blender 4
+SHORT_NAMES = {  # Blender 4
+    "Diffuse Color": "DiffCol",
+    "Diffuse Direct": "DiffDir",
+    "Diffuse Indirect": "DiffInd",
+    "Glossy Color": "GlossCol",
+    "Glossy Direct": "GlossDir",
+}

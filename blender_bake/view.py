@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import elsewhere, materials, precision, sample_spread, soundness
+from blender_bake import elsewhere, lobes, materials, precision, sample_spread, soundness
 from blender_bake.channels import chosen
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
@@ -21,6 +21,8 @@ from blender_bake.translucency import Switch, switched
 GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the center that its position reprojects onto it
 NOT_DIFFUSE = 1e-3
 LIGHT_PASSES = ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
+DIRECT_PASSES = ("Diffuse Direct", "Diffuse Color")
+GLOSS_PASSES = ("Glossy Direct", "Glossy Color")
 
 
 class ViewReceiver:
@@ -37,7 +39,8 @@ class ViewReceiver:
         self._camera = find_camera(scene, job["receiver"].get("camera"))
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
-        self._coverage: tuple[np.ndarray, np.ndarray] | None = None  # and diffuse color times coverage, of the same samples
+        self._coverage: dict[str, np.ndarray] | None = None  # with what many samples say of the materials
+        self._gloss = GLOSS_PASSES if job.get("direct_gloss") else ()  # passes: of light that gloss reflects directly
         self._last: dict[str, np.ndarray] = {}
         self._centers: dict[str, np.ndarray] | None = None  # position, normal and hit
         self._denoiser: Denoiser | None = None
@@ -82,7 +85,10 @@ class ViewReceiver:
         }
 
     def channels(self, names: list[str]) -> dict[str, np.ndarray]:
-        """Those named of `position` and `normal` (at pixel centers, with the mask `hit`), `albedo`, `coverage` and the mask `valid`."""
+        """Those named of `position` and `normal` (at pixel centers, with the mask `hit`), `albedo`, `coverage` and the mask `valid`.
+
+        Where gloss is kept: `glossy`, what the specular lobe reflects toward the camera, and its shape, `lobe`.
+        """
         makers = {
             "position": self._position,
             "normal": lambda: self._at_centers()["normal"],
@@ -91,6 +97,8 @@ class ViewReceiver:
             "hit": lambda: self._at_centers()["hit"],
             "valid": lambda: self._measured_coverage()[0],
             "seams": lambda: None,
+            "glossy": lambda: self._measured("Glossy Color"),
+            "lobe": self._lobe,
         }
         return chosen(names, makers, self.kind)
 
@@ -100,8 +108,21 @@ class ViewReceiver:
         return center["position"]
 
     def _albedo(self) -> np.ndarray:
-        coverage, diffuse = self._measured_coverage()
-        return diffuse / np.where(coverage > 0, coverage, 1)
+        return self._measured("Diffuse Color")
+
+    def _measured(self, name: str) -> np.ndarray:
+        """A color by many samples of what is covered."""
+        coverage, _ = self._measured_coverage()
+        assert self._coverage is not None
+        return self._coverage[name][:, :, :3] / np.where(coverage > 0, coverage, 1)
+
+    def _lobe(self) -> np.ndarray:
+        """(roughness, share of the lobe with a Fresnel term, 1 where there is any)."""
+        self._measured_coverage()
+        assert self._coverage is not None
+        sums = self._coverage[lobes.AOV][:, :, :3]
+        weight = sums[:, :, 2:]
+        return np.where(weight > 0, sums / np.where(weight > 0, weight, 1), 0).astype(np.float32)
 
     def _at_centers(self) -> dict[str, np.ndarray]:
         """`position` (m), unit `normal` and `hit` (1 or 0) at pixel centers, all 0 where there is no hit; rendered once."""
@@ -140,7 +161,7 @@ class ViewReceiver:
 
         Divided by coverage and color of many samples: by its own few, a pixel that they all miss would be dark, and so would the mean.
         """
-        passes = self._last = self._render(samples, seed, LIGHT_PASSES)
+        passes = self._last = self._render(samples, seed, (*LIGHT_PASSES, *self._gloss))
         if self._irradiance:
             return self._irradiance_of(passes["Diffuse Direct"] + passes["Diffuse Indirect"], passes)
         return self._over_coverage(passes["Combined"][:, :, :3])
@@ -155,13 +176,16 @@ class ViewReceiver:
         return self._denoiser.denoise(image) * (self._measured_coverage()[0] > 0)
 
     def direct(self, samples: int, seed: int) -> np.ndarray:
-        """The direct diffuse light alone, in the units of `response`."""
-        return self._direct_of(self._render(samples, seed, ("Diffuse Direct", "Diffuse Color")))
+        """The direct diffuse light alone, and that of gloss where it is kept, in the units of `response`."""
+        return self._direct_of(self._render(samples, seed, (*DIRECT_PASSES, *self._gloss)))
 
     def _direct_of(self, passes: dict[str, np.ndarray]) -> np.ndarray:
         if self._irradiance:
             return self._irradiance_of(passes["Diffuse Direct"], passes)
-        return self._over_coverage((passes["Diffuse Direct"] * passes["Diffuse Color"])[:, :, :3])
+        found = (passes["Diffuse Direct"] * passes["Diffuse Color"])[:, :, :3]
+        if self._gloss:
+            found = found + (passes["Glossy Direct"] * passes["Glossy Color"])[:, :, :3]
+        return self._over_coverage(found)
 
     def _irradiance_of(self, light: np.ndarray, passes: dict[str, np.ndarray]) -> np.ndarray:
         """E = pi x `light`, which Cycles has divided by the diffuse color of the same samples: 0 where all of them miss.
@@ -178,9 +202,13 @@ class ViewReceiver:
     def _measured_coverage(self) -> tuple[np.ndarray, np.ndarray]:
         """(coverage (H, W, 1), diffuse color times coverage (H, W, 3)) by many samples; rendered once."""
         if self._coverage is None:
-            whole = self._render(self._coverage_samples, 0, ("Combined", "Diffuse Color"))
-            self._coverage = np.clip(whole["Combined"][:, :, 3:], 0, 1), whole["Diffuse Color"][:, :, :3]
-        return self._coverage
+            names: tuple[str, ...] = ("Combined", "Diffuse Color")
+            if self._gloss:
+                lobes.add(self._layer)
+                names = (*names, "Glossy Color", lobes.AOV)
+            self._coverage = self._render(self._coverage_samples, 0, names)
+            lobes.remove(self._layer)
+        return np.clip(self._coverage["Combined"][:, :, 3:], 0, 1), self._coverage["Diffuse Color"][:, :, :3]
 
     def _over_coverage(self, image: np.ndarray) -> np.ndarray:
         coverage, _ = self._measured_coverage()
@@ -204,6 +232,7 @@ class ViewReceiver:
         layer = self._layer
         layer.use_pass_combined = layer.use_pass_position = layer.use_pass_normal = True
         layer.use_pass_diffuse_color = layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = True
+        layer.use_pass_glossy_color = layer.use_pass_glossy_direct = bool(self._gloss)
 
     def _render(self, samples: int, seed: int, passes: tuple[str, ...], *, spread: bool = True) -> dict[str, np.ndarray]:
         sample_spread.take(self._scene, samples, seed, spread=spread)

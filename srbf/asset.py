@@ -16,6 +16,7 @@ from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED
+from srbf.channels import GLOSS
 from srbf.errors import InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers.texture_array import level_bytes, level_size
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
 MANIFEST = ASSET_MANIFEST
-GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo")
+GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo", *GLOSS)
 SCENE_FILE = "scene.glb"
 
 
@@ -56,7 +57,8 @@ class Asset:
         What the method looks up, by the manifest's key: `r_table` (n,) float32; or `light_coefficients` (F, B, 3) float32, `w_table` (rows,
         columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
     images
-        position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional.
+        position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional; of views with gloss `glossy`
+        (H, W, 3), what lobes reflect toward the camera, and `lobe` (H, W, 3), see `srbf.channels`.
     scene
         scene.glb of an indirect asset: what casts the shadows of the light to be added.
     probes
@@ -279,7 +281,7 @@ class Asset:
         return bool(((self.scale == 1) | unused).all() and not self.bias.any() and not self.stored.transpose(0, 3, 1, 2)[unused].any())
 
     def at(self, texels: Int[ndarray, " n"]) -> Asset:
-        """An asset of some texels alone, of their geometry with normals and albedo only: to relight it, not to save.
+        """An asset of some texels alone, of their geometry with normals and reflectances only: to relight it, not to save.
 
         Parameters
         ----------
@@ -299,8 +301,10 @@ class Asset:
         """
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
+        if "gloss_neighbors" in tables:
+            tables["gloss_neighbors"] = tables["gloss_neighbors"].reshape(-1, self.height * self.width, 3)[:, texels]
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
-        images = {name: image.reshape(-1, 3)[texels][None] for name, image in self.images.items() if name in ("normal", "albedo")}
+        images = {name: image.reshape(-1, 3)[texels][None] for name, image in self.images.items() if name in ("normal", "albedo", "glossy")}
         return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images=images)
 
     def bytes_per_texel(self) -> dict[str, int | float]:

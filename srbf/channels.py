@@ -42,6 +42,8 @@ CHANNELS: dict[str, Channel] = {
             "irradiance or radiance",
             real_where="valid",
         ),
+        Channel("glossy", 3, "specular reflectance toward the camera, linear Rec.709, 0 to 1"),
+        Channel("lobe", 3, "roughness, share with a Fresnel term, and 1 where there is a specular lobe"),
     )
 }
 TOP_LEVEL = (
@@ -52,6 +54,7 @@ TOP_LEVEL = (
     "ambient",
 )  # capture.json names their files by keys of its own; every other channel is in its `channels`
 GEOMETRY = ("position", "normal", "albedo", "coverage")  # what every bake asks a receiver for
+GLOSS = ("glossy", "lobe")  # and that of a deep framebuffer its view
 
 
 def file_name(name: str) -> str:

@@ -24,6 +24,7 @@ from srbf.io import files
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
 from srbf.visibility.gather_pool import MOST_POOL, pool_of
+from srbf.visibility.glossy_gather import Lobes
 from srbf.visibility.pixel_points import PixelPoints
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.surface_cells import Fragments
@@ -131,7 +132,7 @@ class GatherSet:
         """What the scene is asked."""
         return {
             "places": {"box": self.box, "count": 0, "spacing": None, "random": tested, "places": PLACES, "seed": seed},
-            "surfaces": {"cells": FRAGMENTS * self.count, "spacing": None, "gloss": True},
+            "surfaces": {"cells": FRAGMENTS * self.count, "spacing": None, "gloss": "caustics"},
         }
 
     def with_facts(self, facts: dict[str, Any], say: Callable[[str], None]) -> GatherSet:
@@ -185,13 +186,14 @@ class GatherSet:
             return
         progress(0, 1, "surfels")
         occluders = EmbreeTriangles(found.occluders)
-        pixels = PixelPoints.of_view(Receivers.of(receivers))
+        view = Receivers.of(receivers)
+        pixels, lobes = PixelPoints.of_view(view), Lobes.of(view)
         if not len(pixels.points):
             raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
         surfaces = Fragments(found.corners, found.albedo)
-        pool = pool_of(surfaces, found.objects, occluders, found.free, pixels.points, pixels.normals, self.count, seed)
+        pool = pool_of(surfaces, found.objects, occluders, found.free, pixels.points, pixels.normals, self.count, seed, lobes)
         if not pool.count:
             raise InputError("expected surfaces that light in free space can reach, found none; choose another `light_bounds`")
         clusters = cluster_count(self.clusters, len(np.unique(pixels.pixels)))
-        operator = GatherOperator.traced(pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"))
+        operator = GatherOperator.traced(pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes)
         operator.write(receivers.folder, key)

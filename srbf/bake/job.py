@@ -12,6 +12,7 @@ from srbf.bake.probes import PROBES_FILE, write_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
 from srbf.bake.viewers import viewer_directions
+from srbf.channels import GLOSS
 from srbf.sphere import point_set
 
 AMBIENT_SEED = -1  # the light index of the image without a light
@@ -31,7 +32,7 @@ def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | 
     return {
         **base_job(scene, settings, scratch),
         "serve": True,
-        "channels": list(ASKED_FOR) if first else [],
+        "channels": [*ASKED_FOR, *(GLOSS if _keeps_gloss(settings) else ())] if first else [],
         "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if shines else None,
         "probes": [light.json() for light in probes],
         "transmittances": None if prepared is None else prepared["transmittances"],
@@ -61,6 +62,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "keep_scene_lights": settings.keep_scene_lights,
         "sun_angle": settings.sun_angle,
         "transport": settings.transport,
+        "direct_gloss": _keeps_gloss(settings),
         "no_shadow": list(settings.no_shadow),
         "coverage_samples": COVERAGE_SAMPLES,
         "scratch": str(scratch.resolve()),
@@ -71,3 +73,8 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "transmittances": None,
         "requests": [request.message() for request in requests],
     }
+
+
+def _keeps_gloss(settings: BakeSettings) -> bool:
+    """Whether direct light includes what gloss reflects: of views that are relit with it."""
+    return settings.light_set is not None and settings.light_set.kind == "gather"

@@ -19,12 +19,13 @@ def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dic
     """The receivers' images that go along with an asset, dilated as its layers are."""
     images: dict[str, ndarray] = {}
     for name in GEOMETRY:
-        if name not in capture.manifest or (name == "albedo" and not needs_albedo(capture)):
+        known = name in capture.manifest or name in capture.manifest.get("channels", {})
+        if not known or (name == "albedo" and not needs_albedo(capture)):
             continue
         if name == "coverage":
             images[name] = capture.coverage()
         else:
-            image = capture.ambient() if name == "ambient" else capture.geometry(name)  # type: ignore[arg-type]
+            image = capture.ambient() if name == "ambient" else capture.channel(name)
             assert image is not None
             images[name] = dilate(image, nearest)
     return images

@@ -14,6 +14,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset, layer_entries
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
+from srbf.channels import GLOSS
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
@@ -43,6 +44,7 @@ FILES = {
     "exchange_links": "exchange_links.png",
     "exchange_rows": "exchange_rows.png",
 }
+GLOSSY_FILES = {"gloss_links": "gloss_links.png", "gloss_rows": "gloss_rows.png", "gloss_neighbors": "gloss_neighbors.png"}
 KEPT = 2  # assets whose links are ready
 
 
@@ -51,7 +53,8 @@ class DeepFramebuffer(Method):
     """A view under any lights: I(p) = sum_j c_j(p) E_j, E = W B, B = sum_k (rho F)^k rho e     [Hasan2005, eq. 3, with all bounces]
 
     e is the direct irradiance that the lights lay on a pool of surfels; F are links of these to each other, W those of view clusters to
-    them, by rays; a pixel mixes the clusters nearest to it in place and normal. The paper's gather samples belong to one cluster each and
+    them, by rays; a pixel mixes the clusters nearest to it in place and normal. Glossy pixels add their specular reflectance times what
+    their lobes gather, G B / pi, of links G by rays of the lobes' density. The paper's gather samples belong to one cluster each and
     have one bounce.
 
     Parameters
@@ -142,6 +145,8 @@ class DeepFramebuffer(Method):
         )
         scale, bias = np.ones((most, 3), np.float32), np.zeros((most, 3), np.float32)
         images = carried_images(capture, nearest)
+        if operator.gloss is None:
+            images = {name: image for name, image in images.items() if name not in GLOSS}
         manifest = common_manifest(capture, self.name, domain_of_capture(capture), images, asdict(self), {})
         manifest |= {name: {"file": file} for name, file in FILES.items()}
         manifest[self.layers] = layer_entries("neighbor", "uint8", scale, bias)
@@ -156,6 +161,13 @@ class DeepFramebuffer(Method):
         tables = {"pool": np.concatenate([operator.cells.image(), np.pad(operator.cells.albedo, ((0, 0), (0, 1)))[None]])}
         for name, links in (("view", view), ("exchange", operator.exchange)):
             tables[f"{name}_links"], tables[f"{name}_rows"] = packed(links)
+        if operator.gloss is not None:
+            gloss = operator.gloss
+            tables["gloss_links"], tables["gloss_rows"] = packed(gloss.links)
+            layers = _neighbors(gloss.nearest, gloss.weights)
+            tables["gloss_neighbors"] = layers.reshape(-1, capture.width, 3)
+            manifest |= {name: {"file": file} for name, file in GLOSSY_FILES.items()}
+            manifest["gather"] |= {"lobes": gloss.links.rows, "gloss_rays": gloss.links.rays}
         return Asset(manifest, stored, scale, bias, tables, images, scene)
 
     def _within(self, operator: GatherOperator, nearest: int, pixels: int) -> SparseLinks:
@@ -178,12 +190,17 @@ class DeepFramebuffer(Method):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["gather"]
         tables = {"pool": reader.table("pool", (3, told["surfels"]), 4)}
-        for name in ("view", "exchange"):
+        for name in ("view", "exchange", *(("gloss",) if "lobes" in told else ())):
             for part in ("links", "rows"):
                 pixels = reader.pixels(reader.manifest[f"{name}_{part}"]["file"], 3)
                 if pixels.shape[1] != COLUMNS:
                     raise ImageError(f"expected {COLUMNS} columns of {name}_{part} in {reader.folder}, found {pixels.shape[1]}; fit again")
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
+        if "lobes" in told:
+            pixels = reader.pixels(reader.manifest["gloss_neighbors"]["file"], 3)
+            if pixels.shape[1] != reader.manifest["width"] or len(pixels) % reader.manifest["height"]:
+                raise ImageError(f"expected lobes of every pixel in {reader.folder}, found {pixels.shape[1]}x{len(pixels)}; fit again")
+            tables["gloss_neighbors"] = np.round(pixels * 255).astype(np.uint8)
         return tables
 
     @classmethod
@@ -197,32 +214,31 @@ class DeepFramebuffer(Method):
 
     @classmethod
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "C 3"]:
-        """The irradiance of every view cluster, all bounces included, under all lights together."""
+        """The irradiance of every view cluster, all bounces included, under all lights together; after these, pi times the radiance that
+        every specular lobe gathers, over its reflectance."""
         if any(isinstance(light, NamedLight) for light in lights):
             raise InputError(
                 f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
             )
         if not lights:
-            return np.zeros((asset.manifest["gather"]["clusters"], 3))
+            return np.zeros((asset.manifest["gather"]["clusters"] + asset.manifest["gather"].get("lobes", 0), 3))
         ready = _ready(asset)
         irradiance = np.sum([ready.received.irradiance(light) for light in lights], axis=0).astype(np.float32)
         bounced = radiosity_of(ready.exchange, ready.albedo, irradiance, asset.manifest["gather"].get("bounces"))
-        return (ready.view @ bounced).astype(np.float64)
+        found = [links @ bounced for links in (ready.view, ready.gloss) if links is not None]
+        return np.concatenate(found).astype(np.float64)
 
     @classmethod
     def weighted(cls, asset: Asset, weights: Float64[ndarray, "b C 3"]) -> Float32[ndarray, "b H W 3"]:
         """b pictures from the irradiance of the view clusters."""
         light = weights.transpose(1, 0, 2).astype(np.float32)  # (C, b, 3)
-        total = np.zeros((asset.height, asset.width, *light.shape[1:]), np.float32)
-        share = np.zeros((asset.height, asset.width, 1, 1), np.float32)
-        for layer in asset.stored:
-            cluster = layer[:, :, 0].astype(np.int64) + 256 * layer[:, :, 1].astype(np.int64)
-            own = layer[:, :, 2, None, None].astype(np.float32)
-            total += own * light[cluster]
-            share += own
-        pictures = (total / np.maximum(share, 1)).transpose(2, 0, 1, 3)
+        clusters = asset.manifest["gather"]["clusters"]
+        pictures = _mixed(asset.stored, light[:clusters])
         if asset.quantity == "radiance":
             pictures = pictures * (cls._albedo(asset) / np.float32(np.pi))
+        if "gloss_neighbors" in asset.tables and len(light) > clusters:
+            layers = asset.tables["gloss_neighbors"].reshape(-1, asset.height, asset.width, 3)
+            pictures = pictures + _mixed(layers, light[clusters:]) * (asset.images["glossy"] / np.float32(np.pi))
         return np.ascontiguousarray(pictures)
 
     @classmethod
@@ -274,6 +290,7 @@ class _Ready:
     scene: bytes
     view: csr_array
     exchange: csr_array
+    gloss: csr_array | None
     albedo: Float32[ndarray, "S 3"]
     received: ReceivedLight
 
@@ -291,13 +308,16 @@ def _ready(asset: Asset) -> _Ready:
         told, tables = asset.manifest["gather"], asset.tables
         cells = replace(Cells.of_image(tables["pool"][:2]), albedo=np.ascontiguousarray(tables["pool"][2, :, :3]))
         try:
-            view, exchange = (
+            view, exchange, *gloss = (
                 unpacked(tables[f"{name}_links"], tables[f"{name}_rows"], rows, told[f"{name}_rays"], told["surfels"]).matrix()
-                for name, rows in (("view", told["clusters"]), ("exchange", told["surfels"]))
+                for name, rows in (("view", told["clusters"]), ("exchange", told["surfels"]), ("gloss", told.get("lobes", 0)))
+                if rows
             )
         except ValueError as error:
             raise ImageError(f"{error}; fit again") from error
-        found = _Ready(tables, asset.scene, view, exchange, cells.albedo, ReceivedLight(cells, occluders_of(asset.scene)))
+        found = _Ready(
+            tables, asset.scene, view, exchange, gloss[0] if gloss else None, cells.albedo, ReceivedLight(cells, occluders_of(asset.scene))
+        )
         _kept[key] = found
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
@@ -308,6 +328,17 @@ def _neighbors(clusters: ndarray, weights: ndarray) -> ndarray:
     """(K, P, 3) bytes: low and high byte of the cluster, weight by the pixel's largest."""
     share = weights / np.maximum(weights.max(axis=1, keepdims=True), 1e-30)
     return np.stack([clusters & 255, clusters >> 8, np.round(255 * share)], axis=2).astype(np.uint8).transpose(1, 0, 2)
+
+
+def _mixed(layers: ndarray, light: Float32[ndarray, "C b 3"]) -> Float32[ndarray, "b H W 3"]:
+    """The mean over the clusters of each pixel, of layers (K, H, W, 3) as `_neighbors` has them; 0 of pixels without."""
+    total = np.zeros((*layers.shape[1:3], *light.shape[1:]), np.float32)
+    share = np.zeros((*layers.shape[1:3], 1, 1), np.float32)
+    for layer in layers:
+        own = layer[:, :, 2, None, None].astype(np.float32)
+        total += own * light[layer[:, :, 0].astype(np.int64) + 256 * layer[:, :, 1].astype(np.int64)]
+        share += own
+    return (total / np.maximum(share, 1)).transpose(2, 0, 1, 3)
 
 
 METHOD = DeepFramebuffer

@@ -20,6 +20,7 @@ from srbf.lights import EnvironmentLight, Light, NamedLight, moved
 from srbf.methods import method_of
 from srbf.methods.kept_visibility import kept_visibility, receiver_points
 from srbf.visibility.embree import has_embree
+from srbf.visibility.glossy_direct import GlossyMaps, GlossyRays, has_gloss
 from srbf.visibility.pca_direct import PcaDirect
 from srbf.visibility.rays import RayTracer
 from srbf.visibility.receivers import Receivers
@@ -83,10 +84,16 @@ class Added:
         self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
         self._emits = isinstance(source, Asset) and method_of(source).takes_objects
         self._light: DirectLight | None = None
-        if kind == "ray":
-            self._light = RayTracer(Receivers.of(source))
-        elif kind == "shadow-map":
-            self._light = self._stack.enter_context(ShadowMapper(Receivers.of(source)))
+        self._gloss: GlossyRays | GlossyMaps | None = None
+        if kind in ("ray", "shadow-map"):
+            receivers = Receivers.of(source)
+            glossy = has_gloss(receivers)
+            if kind == "ray":
+                self._light = tracer = RayTracer(receivers)
+                self._gloss = GlossyRays(receivers, tracer) if glossy else None
+            else:
+                self._light = mapper = self._stack.enter_context(ShadowMapper(receivers))
+                self._gloss = GlossyMaps(receivers, mapper.irradiance) if glossy else None
         elif kind == "pca":
             self._light = by_receiver_depths(source)
 
@@ -98,7 +105,10 @@ class Added:
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
         """The direct light of world-space `lights`, None where none is added."""
-        return None if self._light is None else self._light.response([moved(light, self._frame) for light in lights])
+        if self._light is None:
+            return None
+        own = [moved(light, self._frame) for light in lights]
+        return self._light.response(own) if self._gloss is None else self._light.response(own) + self._gloss.response(own)
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
         """The responses to white lights from world-space `directions`, 0 where none is added."""

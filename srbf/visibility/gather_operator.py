@@ -19,6 +19,7 @@ from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
+from srbf.visibility.glossy_gather import GlossyGather, Lobes
 from srbf.visibility.pixel_points import PixelPoints
 from srbf.visibility.sparse_links import SparseLinks
 from srbf.visibility.surface_cells import Cells
@@ -39,7 +40,8 @@ Progress = Callable[[int, int], None]  # (rows done, of how many)
 class GatherOperator:
     """Links from C view clusters to a pool of S surfels, and between surfels; `nearest` (P, K) clusters of every pixel, `weights` of each.
 
-    Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters.
+    Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
+    lobes gather, where there are any.
     """
 
     cells: Cells
@@ -47,6 +49,7 @@ class GatherOperator:
     exchange: SparseLinks
     nearest: Int[ndarray, "P K"]
     weights: Float32[ndarray, "P K"]
+    gloss: GlossyGather | None = None
 
     @staticmethod
     def traced(
@@ -56,8 +59,9 @@ class GatherOperator:
         clusters: int,
         seed: int = 0,
         progress: Progress = lambda done, total: None,
+        lobes: Lobes | None = None,
     ) -> GatherOperator:
-        """By cosine rays from every cluster and surfel."""
+        """By cosine rays from every cluster and surfel, and by rays of the density of specular lobes."""
         extent = float(np.ptp(pool.cells.places, axis=0).max(initial=0))
         found = ViewClusters.of_points(pixels.points, pixels.normals, clusters, extent)
         nearest, weights = pixels.gathered(*found.mixed(pixels.points, pixels.normals, occluders))
@@ -66,7 +70,8 @@ class GatherOperator:
         view = _traced(pool, RayOrigins.even(found.places[:, None], found.normals[:, None]), rays, seed, lambda n: progress(n, total))
         origins = RayOrigins.even(*pool.spread(SURFEL_POINTS, seed))
         own = _traced(pool, origins, SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total))
-        return GatherOperator(pool.cells, view, own, nearest, weights)
+        gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2)
+        return GatherOperator(pool.cells, view, own, nearest, weights, gloss)
 
     def write(self, folder: Path, key: str) -> None:
         """pool.exr, three rows (x, y, z, area), (normal, 0), (albedo, 0), and gather.npz; `key` tells what they are of."""
@@ -77,6 +82,7 @@ class GatherOperator:
             **self.exchange.arrays("exchange"),
             "nearest": self.nearest.astype(np.uint16),
             "weights": self.weights.astype(np.float16),
+            **({} if self.gloss is None else self.gloss.arrays()),
         }
         with files.atomic_path(folder / GATHER_FILE) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, key=np.array(key), **arrays)
@@ -96,10 +102,11 @@ class GatherOperator:
             nearest, weights = arrays["nearest"].astype(np.int64), arrays["weights"].astype(np.float32)
             if own.rows != count or int(nearest.max(initial=0)) >= view.rows or nearest.shape != weights.shape:
                 raise ValueError("rows that fit each other")
+            gloss = GlossyGather.of_arrays(arrays, count)
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected links of a view in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
-        return GatherOperator(cells, view, own, nearest, weights)
+        return GatherOperator(cells, view, own, nearest, weights, gloss)
 
 
 def is_gathered(folder: Path, key: str) -> bool:

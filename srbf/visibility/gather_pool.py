@@ -8,6 +8,7 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float64, Int
 from srbf.solve.splitting import split_clusters
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.glossy_gather import Lobes
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
 from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, grouped_cells, lit
@@ -15,6 +16,7 @@ from srbf.visibility.surfels import GAP, Surfels, cut_at_walls
 
 MOST_POOL = 65_536  # indices of surfels are 16 bits
 LOOKS, LOOK_RAYS = 16_384, 64  # points of the view, and rays of each, by which it is known what the view gathers
+LOBE_RAYS, LOBE_WEIGHT = 16, 2.0  # of a specular lobe, and what they count beside cosine rays of as much light
 AGAIN, AGAIN_RAYS = 16_384, 16  # of their hits, which gather as well
 EVENLY = 0.1  # share of the pool that goes by area, whatever the view sees
 NORMAL_WEIGHT, ALBEDO_WEIGHT = 0.04, 0.02  # of the scene's longest side, beside places
@@ -30,17 +32,20 @@ def pool_of(
     normals: Float[ndarray, "P 3"],
     count: int,
     seed: int = 0,
+    lobes: Lobes | None = None,
 ) -> Surfels:
     """At most about `count` surfels of all surfaces that light reaches, small where cosine rays from the view's `points` end.
 
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
-    `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well.
+    `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well, and rays of specular
+    `lobes` do, by what these reflect.
     """
     surfaces, source = cut_at_walls(surfaces, occluders, GAP * float(np.sqrt(surfaces.areas.sum() / count)))
     objects = objects[source]
     both = surfaces.both_sides()
     able = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
-    gathered = looked_at(surfaces, points, normals, seed)[able]
+    seen = looked_at(surfaces, points, normals, seed)
+    gathered = (seen if lobes is None else seen + mirrored(surfaces, lobes, float(len(points)), seed))[able]
     witnesses = lit(both.centers[able], both.normals[able], occluders, free[:WITNESSES])
     found = witnesses.any(axis=1) | (gathered > 0)
     kept, gathered, witnesses = able[found], gathered[found], witnesses[found]
@@ -85,6 +90,21 @@ def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float
         starts = origins[hit] + distance[hit, None] * directions[hit]
         axes = facing[triangle[hit]] * np.where(back[again], -1.0, 1.0)[:, None]
     return found
+
+
+def mirrored(surfaces: Fragments, lobes: Lobes, pixels: float, seed: int = 0) -> Float64[ndarray, " U"]:
+    """How much rays of specular lobes count on each side, as of `looked_at`, of a view of so many `pixels`."""
+    rng = np.random.default_rng([seed, 1])
+    chosen = rng.permutation(len(lobes.points))[:LOOKS]
+    extent = float(np.ptp(surfaces.corners.reshape(-1, 3), axis=0).max(initial=0))
+    origins, directions, shares = lobes.rays(chosen, LOBE_RAYS, rng, OFFSET * extent)
+    strength = lobes.pixels.color[lobes.pixels.texels[chosen]].max(axis=1)
+    weight = shares * strength[:, None] * LOOK_RAYS * min(LOOKS, pixels) * len(lobes.points) / pixels / max(1, len(chosen))
+    triangle, _, _ = EmbreeTriangles(surfaces.corners).first_hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
+    met = np.flatnonzero(triangle >= 0)
+    back = np.einsum("nk,nk->n", surfaces.normals[triangle[met]], directions.reshape(-1, 3)[met]) > 0
+    count = len(surfaces.corners)
+    return np.bincount(triangle[met] + count * back, LOBE_WEIGHT * weight.ravel()[met], minlength=2 * count)
 
 
 def parted_groups(labels: Int[ndarray, " N"], seen: Bool[ndarray, "N F"]) -> Int[ndarray, " N"]:

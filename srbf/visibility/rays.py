@@ -35,6 +35,8 @@ CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
 ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environment
 ENVIRONMENT_BATCH = 1 << 18  # such rays at a time
+LEAST_BUMP, LEAST_BUMP_COS, SAME_PLACE = 1e-2, 0.2, 1e-2  # change of a normal; its cosine; off the place, over the distance to the eye
+SAME_NORMAL = 0.9  # cosine between the smooth normals of samples that a pixel's bump map turns as it does its center's
 NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
 
 
@@ -73,11 +75,18 @@ class RayTracer:
         self._pure: Int[ndarray, " P"] | None = None
         if receivers.camera is not None and receivers.quantity == "radiance":
             self._pure = self._materials_of_pixels()
+        self._bumps: tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None = None
         if receivers.camera is None:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
+        else:
+            self._bumps = self._bumped()
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; named lights add nothing."""
+        return self.irradiance(lights) * self._receivers.reflectance()
+
+    def irradiance(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        """What `response` is a reflection of."""
         height, width = self._receivers.height, self._receivers.width
         total = np.zeros((height * width, 3), np.float32)
         for light in lights:
@@ -85,7 +94,7 @@ class RayTracer:
                 total += self._of_environment(light) * np.array(light.color, np.float32)
             if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
                 total += self._irradiance(light) * np.array(light.color, np.float32)
-        return dilate(total.reshape(height, width, 3), self._nearest) * self._receivers.reflectance()
+        return dilate(total.reshape(height, width, 3), self._nearest)
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
@@ -98,6 +107,20 @@ class RayTracer:
             return self._samples(texels, numbers)
         parts = [self._samples(texels, range(number, number + 1)) for number in numbers]
         return Samples(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Samples)))
+
+    def shown(self, texels: Int[ndarray, " e"], numbers: range) -> tuple[Samples, Int[ndarray, " n"]]:
+        """`samples` of a view, and the pixel that shows the material of each alone, or its own."""
+        found = self.samples(texels, numbers)
+        if self._pure is None:
+            return found, found.texel
+        hit, _, _ = self._all.first_hit(*self._looks(found.texel, self._squares(texels, numbers)))
+        return found, self._pure_pixel(found.texel, self._receivers.triangles.material[np.maximum(hit, 0)])
+
+    def reaching(
+        self, samples: Samples, chosen: Int[ndarray, " n"], direction: Float32[ndarray, "n 3"], distance: Float64[ndarray, " n"] | None
+    ) -> Float32[ndarray, "n 3"]:
+        """What part of the light along unit vectors from the `chosen` samples reaches them, up to a `distance` (m; None: endless)."""
+        return self._shadow_rays.passed(self._origins(samples, chosen, direction), direction, distance)
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
@@ -200,12 +223,14 @@ class RayTracer:
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
+        texel, square = np.tile(texels, len(numbers)), self._squares(texels, numbers)
+        return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
+
+    def _squares(self, texels: Int[ndarray, " e"], numbers: range) -> Float64[ndarray, "n 2"]:
         square = (self._square[numbers.start : numbers.stop, None] + self._turn[None, texels, :2]) % 1  # (s, e, 2)
         if numbers.start == 0:
-            square[:FIRST_SAMPLES] = _balanced(self._turn[texels])
-        texel = np.tile(texels, len(numbers))
-        square = square.reshape(-1, 2)
-        return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
+            square[:FIRST_SAMPLES] = _balanced(self._turn[texels])[: len(numbers)]
+        return square.reshape(-1, 2)
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         found = self._lightmap.at(texel, square)
@@ -219,9 +244,40 @@ class RayTracer:
         point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
         normal, face, lift = surface_at(self._receivers.triangles, triangle, bary)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
+        normal = normal * away
+        if self._bumps is not None:
+            smooth, bump = self._bumps
+            turned = normal + self._bump_at(bump, texel, square) * (np.einsum("nc,nc->n", normal, smooth[texel]) > SAME_NORMAL)[:, None]
+            normal = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
         weight = real.astype(np.float32)
         share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
-        return Samples(texel, weight, point, normal * away, face * away, lift * away, share)
+        return Samples(texel, weight, point, normal, face * away, lift * away, share)
+
+    def _bumped(self) -> tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None:
+        """(smooth normals at the centers of pixels, what turns them into those that the bake saw); None where there are no bump maps."""
+        centers = self._seen(self._texels, np.full((len(self._texels), 2), 0.5))
+        seen = self._receivers.images["normal"].reshape(-1, 3)[self._texels]
+        same = (centers.weight > 0) & (np.einsum("nc,nc->n", seen, centers.normal) > LEAST_BUMP_COS)
+        position = self._receivers.images["position"].reshape(-1, 3)[self._texels]
+        origin, _ = self._looks(self._texels, np.full((len(self._texels), 2), 0.5))
+        far = np.linalg.norm(position - centers.point, axis=1) > SAME_PLACE * np.linalg.norm(position - origin, axis=1)
+        change = np.where((same & ~far)[:, None], seen - centers.normal, 0)
+        if np.abs(change).max(initial=0) < LEAST_BUMP:
+            return None
+        smooth, bump = np.zeros((2, self._receivers.height * self._receivers.width, 3), np.float32)
+        smooth[self._texels], bump[self._texels] = centers.normal, change
+        return smooth, bump
+
+    def _bump_at(self, bump: Float32[ndarray, "P 3"], texel: np.ndarray, square: np.ndarray) -> Float32[ndarray, "n 3"]:
+        """Between the centers of pixels, by linear interpolation."""
+        from scipy.ndimage import map_coordinates
+
+        camera, height, width = self._receivers.camera, self._receivers.height, self._receivers.width
+        assert camera is not None
+        offset = pixel_filter(camera["filter"], camera["filter_width"], square)
+        place = np.stack([texel // width + offset[:, 1], texel % width + offset[:, 0]])
+        planes = bump.reshape(height, width, 3).transpose(2, 0, 1)
+        return np.stack([map_coordinates(plane, place, order=1, mode="nearest") for plane in planes], axis=1)
 
     def _looks(self, texel: np.ndarray, square: np.ndarray) -> tuple[Float32[ndarray, "n 3"], Float32[ndarray, "n 3"]]:
         """Camera rays: origin (m) and unit direction."""
@@ -255,9 +311,12 @@ class RayTracer:
 
     def _albedo(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Float32[ndarray, "n 3"]:
         """The albedo of a material in its pixel, or in the nearest pixel with that material alone; else that of the mixture."""
+        return np.maximum(self._receivers.images["albedo"].reshape(-1, 3)[self._pure_pixel(texel, material)], 0)
+
+    def _pure_pixel(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Int[ndarray, " n"]:
+        """The nearest pixel that shows a material alone; the own where there is none beside it."""
         assert self._pure is not None
         width, height = self._receivers.width, self._receivers.height
-        image = self._receivers.images["albedo"].reshape(-1, 3)
         source = texel.copy()
         open_ = np.flatnonzero(self._pure[texel] != material)
         for right, down in NEIGHBOR_STEPS:
@@ -268,7 +327,7 @@ class RayTracer:
             found = self._pure[beside] == material[open_]
             source[open_[found]] = beside[found]
             open_ = open_[~found]
-        return np.maximum(image[source], 0)
+        return source
 
 
 def _has_size(light: CastingLight) -> bool:

@@ -11,6 +11,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.channels import GLOSS
 from srbf.errors import InputError
 from srbf.io.scene_glb import Triangles, read_triangles
 from srbf.receiver_images import Quantity
@@ -41,7 +42,7 @@ class Receivers:
             images, data, what = dict(source.images), source.scene, "asset"
         else:
             data, what = source.scene(), "capture"
-            images = {name: image for name in ("position", "normal", "albedo") if (image := source.geometry(name)) is not None}
+            images = {name: image for name in ("position", "normal", "albedo", *GLOSS) if (image := source.channel(name)) is not None}
             images["coverage"] = source.coverage()
         if data is None:
             raise InputError(f"expected the {what} to hold scene.glb, found none: direct light needs the shadow casters; bake it indirect")

@@ -67,6 +67,10 @@ class ShadowMapper:
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; environments and named lights add nothing."""
+        return self.irradiance(lights) * self._receivers.reflectance()
+
+    def irradiance(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        """What `response` is a reflection of."""
         total = np.zeros((self._receivers.height, self._receivers.width, 3), np.float32)
         for light in lights:
             if isinstance(light, DirectionalLight):
@@ -78,7 +82,7 @@ class ShadowMapper:
             else:
                 continue
             total += irradiance * np.array(light.color, np.float32)
-        return total * self._receivers.reflectance()
+        return total
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+from building import SCENES
 from light_set_commands import done, refused, scenes_in
 
+from srbf.asset import Asset
 from srbf.capture import Capture
+from srbf.io.image import read_image
+from srbf.lights import PointLight
+from srbf.methods import linear_response
+from srbf.relighting.direct_light import Added, Direct
 from srbf.visibility.gather_operator import GATHER_FILE, GatherOperator
 
 pytestmark = pytest.mark.blender
@@ -58,3 +67,48 @@ def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None
 def test_wrong_input_is_one_line(scene, tmp_path: Path, name: str, flags: list[str], status: int, words: str) -> None:
     assert words in refused(["bake", scene(name), "-o", tmp_path / "no", *VIEW, *flags, "--holdout", "0"], status)
     assert not (tmp_path / "no").exists()
+
+
+def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
+    """Direct light of lobes by rays and by shadow maps, what they reflect of the room, and the energy of both."""
+    scene, folder, asset = tmp_path / "floor.blend", tmp_path / "capture", tmp_path / "asset"
+    subprocess.run([sys.executable, str(SCENES / "glossy_floor.py"), str(scene)], check=True, capture_output=True, timeout=120)
+    done(
+        "bake",
+        scene,
+        "-o",
+        folder,
+        *VIEW[:3],
+        "32x32",
+        "--light-set",
+        "gather",
+        "--pool",
+        "8000",
+        "--seed",
+        "77",
+        "--holdout",
+        "2",
+        "--holdout-samples",
+        "256",
+    )
+    done("fit", folder, "-o", asset)
+    capture, opened = Capture.open(folder), Asset.open(asset)
+    lobes = capture.channel("lobe")
+    assert lobes is not None and opened.manifest["gather"]["lobes"] == int((lobes[:, :, 2] > 0).sum())
+    glossy = lobes[:, :, 2] > 0
+    floor = (np.abs(lobes[:, :, 0] - 0.2) < 1e-3) & (opened.images["normal"][:, :, 2] > 0.999)  # bumps are smaller than these pixels
+    assert glossy.mean() > 0.3 and lobes[:, :, 1][glossy].min() == 0  # a group's lobe has no Fresnel term
+    for index in capture.indices("holdout"):
+        x, y, z = capture.positions([index])[0].tolist()
+        light = PointLight((x, y, z), falloff="inverse-square")
+        file = capture.lights[index].direct
+        assert file is not None
+        indirect, direct = capture.image(index), read_image(folder / file, 3)
+        own = linear_response(opened, [light])
+        # the scene has no caustics: what lobes see of other lobes is left out
+        np.testing.assert_allclose(own[glossy].sum() / indirect[glossy].sum(), 1, atol=0.13)
+        kinds: tuple[tuple[Direct, float], ...] = (("ray", 0.12), ("shadow-map", 0.6))  # highlights smaller than a pixel
+        for kind, most in kinds:
+            with Added(opened, kind) as added:
+                near = np.asarray(added.response([light]))
+            assert np.sqrt(((near - direct)[floor] ** 2).sum() / (direct[floor] ** 2).sum()) < most, kind

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The shape of the specular lobe of every material as a shader output (AOV), made of the material's own nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+AOV = "srbf_lobe"  # (weight x roughness, weight x share with a Fresnel term, weight)
+DIELECTRIC = 0.08  # weight of the lobe of a Principled surface that is no metal, beside 1 of a metal
+FRESNEL = {"ShaderNodeBsdfPrincipled", "ShaderNodeBsdfMetallic"}
+PLAIN = {"ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfGlossy"}
+OUTPUTS = ("srbf lobe roughness", "srbf lobe fresnel", "srbf lobe weight")  # of node groups
+Value = Any  # a socket or a float
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """Sums over the specular lobes of a shader: weight x roughness, weight x (1 with a Fresnel term, else 0), and weight."""
+
+    roughness: Value = 0.0
+    fresnel: Value = 0.0
+    weight: Value = 0.0
+
+    @property
+    def parts(self) -> tuple[Value, Value, Value]:
+        return self.roughness, self.fresnel, self.weight
+
+
+def add(layer: bpy.types.ViewLayer) -> None:
+    """Make every material write AOV, and the layer have it as a pass; materials without nodes or gloss write 0."""
+    made = layer.aovs.add()
+    made.name, made.type = AOV, "COLOR"
+    groups: dict[str, Lobe] = {}
+    for material in bpy.data.materials:
+        tree = material.node_tree if material.use_nodes and material.users else None
+        output = tree.get_output_node("CYCLES") if tree is not None else None
+        if tree is None or output is None:
+            continue
+        found = _of_input(tree, output.inputs["Surface"], groups)
+        if found.weight == 0.0:
+            continue
+        color = tree.nodes.new("ShaderNodeCombineXYZ")
+        for target, value in zip(color.inputs, found.parts, strict=True):
+            _put(tree, value, target)
+        shown = tree.nodes.new("ShaderNodeOutputAOV")
+        shown.aov_name = AOV
+        tree.links.new(color.outputs[0], shown.inputs["Color"])
+
+
+def remove(layer: bpy.types.ViewLayer) -> None:
+    """Take the pass off again; the nodes stay, which write nothing then."""
+    found = next((aov for aov in layer.aovs if aov.name == AOV), None)
+    if found is not None:
+        layer.aovs.remove(found)
+
+
+def _of_input(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
+    return _of_shader(tree, socket.links[0].from_socket, groups) if socket.links else Lobe()
+
+
+def _of_shader(tree: bpy.types.NodeTree, shader: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
+    """Of the shader that a socket puts out."""
+    node = shader.node
+    kind = node.bl_idname
+    if kind == "NodeReroute":
+        return _of_input(tree, node.inputs[0], groups)
+    if kind == "ShaderNodeMixShader":
+        one, other = (_of_input(tree, node.inputs[i], groups) for i in (1, 2))
+        share = _value(node.inputs[0])
+        rest = _math(tree, "SUBTRACT", 1.0, share)
+        pairs = zip(one.parts, other.parts, strict=True)
+        return Lobe(*(_math(tree, "ADD", _math(tree, "MULTIPLY", rest, a), _math(tree, "MULTIPLY", share, b)) for a, b in pairs))
+    if kind == "ShaderNodeAddShader":
+        one, other = (_of_input(tree, socket, groups) for socket in node.inputs)
+        return Lobe(*(_math(tree, "ADD", a, b) for a, b in zip(one.parts, other.parts, strict=True)))
+    if kind == "ShaderNodeGroup" and node.node_tree is not None:
+        return _of_group(node, shader, groups)
+    if kind not in FRESNEL | PLAIN:
+        return Lobe()
+    weight: Value = 1.0
+    if "Metallic" in node.inputs:
+        weight = _math(tree, "ADD", DIELECTRIC, _math(tree, "MULTIPLY", 1 - DIELECTRIC, _value(node.inputs["Metallic"])))
+    return Lobe(_math(tree, "MULTIPLY", weight, _value(node.inputs["Roughness"])), weight if kind in FRESNEL else 0.0, weight)
+
+
+def _of_group(node: bpy.types.Node, shader: bpy.types.NodeSocket, groups: dict[str, Lobe]) -> Lobe:
+    """Through further outputs of the group: what is inside is made once for all its users."""
+    inner, key = node.node_tree, f"{node.node_tree.name_full}\n{shader.identifier}"
+    names = [f"{name} {shader.identifier}" for name in OUTPUTS]
+    if key not in groups:
+        output = inner.get_output_node("CYCLES") if hasattr(inner, "get_output_node") else None
+        if output is None or not output.bl_idname.endswith("GroupOutput"):
+            output = next((one for one in inner.nodes if one.bl_idname == "NodeGroupOutput" and one.is_active_output), None)
+        source = None if output is None else next((one for one in output.inputs if one.identifier == shader.identifier), None)
+        groups[key] = Lobe() if source is None else _of_input(inner, source, groups)
+        if groups[key].weight != 0.0:
+            assert output is not None
+            for name, value in zip(names, groups[key].parts, strict=True):
+                made = inner.interface.new_socket(name, in_out="OUTPUT", socket_type="NodeSocketFloat")
+                _put(inner, value, next(one for one in output.inputs if one.identifier == made.identifier))
+    return Lobe() if groups[key].weight == 0.0 else Lobe(*(node.outputs[name] for name in names))
+
+
+def _value(socket: bpy.types.NodeSocket) -> Value:
+    return socket.links[0].from_socket if socket.links else float(socket.default_value)
+
+
+def _put(tree: bpy.types.NodeTree, value: Value, socket: bpy.types.NodeSocket) -> None:
+    if isinstance(value, float):
+        socket.default_value = value
+    else:
+        tree.links.new(value, socket)
+
+
+def _math(tree: bpy.types.NodeTree, operation: str, a: Value, b: Value) -> Value:
+    """A math node; a number where both are numbers, or one is a 0 or 1 that settles it."""
+    if isinstance(a, float) and isinstance(b, float):
+        return {"ADD": a + b, "SUBTRACT": a - b, "MULTIPLY": a * b}[operation]
+    if operation == "MULTIPLY" and 0.0 in (a, b):
+        return 0.0
+    made = tree.nodes.new("ShaderNodeMath")
+    made.operation = operation
+    for value, socket in ((a, made.inputs[0]), (b, made.inputs[1])):
+        _put(tree, value, socket)
+    return made.outputs[0]
