@@ -62,17 +62,33 @@ class LinkPasses:
         self._reflectance = textures.kept(reflectance.astype(np.float32))
         size = self._albedo.size
         self._radiosity = [programs.target(size), programs.target(size)]
-        self.cluster_size = (WIDTH, -(-told["clusters"] // WIDTH))
+        own = -(-told["clusters"] // WIDTH)
+        self._spans = [(self._view, 0, own)]  # links, and the rows of the target that they fill
+        self._lobes: tuple[moderngl.TextureArray, int, moderngl.Texture] | None = None
+        if "gloss_links" in tables:
+            below = rows_image(tables["gloss_rows"], told["lobes"])
+            rows = np.pad(below, ((own, 0), (0, 0), (0, 0)))
+            links = LinkTextures(textures.kept(tables["gloss_links"]), textures.kept(rows), told["gloss_rays"])
+            self._spans.append((links, own, len(below)))
+            layers = _behind(tables["gloss_neighbors"].reshape(-1, asset.height, asset.width, 3), own * WIDTH)
+            glossy = (asset.images["glossy"] / np.float32(np.pi)).astype(np.float32)
+            self._lobes = textures.kept_layers(layers), len(layers), textures.kept(glossy)
+        self.cluster_size = (WIDTH, sum(count for _, _, count in self._spans))
 
     def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer) -> None:
-        """Draw the irradiance of all view clusters into `target`, of `cluster_size`, from `direct` irradiance on the surfels."""
+        """Draw the irradiance of all view clusters, and behind it what lobes gather, into `target`, of `cluster_size`.
+
+        `direct`: irradiance on the surfels.
+        """
         if self._terms == 0:
             target.clear()
             return
-        radiosity = self.bounced(direct)
-        target.use()
-        radiosity.use(2)
-        self._programs.run("deep_framebuffer_clusters.frag", {}, {**self._view.uniforms(0), "light": 2})
+        self.bounced(direct).use(2)
+        for links, first, count in self._spans:
+            target.viewport = (0, first, WIDTH, count)
+            target.use()
+            self._programs.run("deep_framebuffer_clusters.frag", {}, {**links.uniforms(0), "light": 2})
+        target.viewport = (0, 0, *self.cluster_size)
 
     def bounced(self, direct: moderngl.Texture) -> moderngl.Texture:
         """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of a texel per surfel."""
@@ -89,10 +105,18 @@ class LinkPasses:
 
     def pixels(self, light: moderngl.Texture) -> None:
         """Draw the pixels into the target in use, from the irradiance of the clusters."""
-        self._textures.layers().use(0)
+        own = (self._textures.layers(), self._layers, self._reflectance)
         light.use(1)
-        self._reflectance.use(2)
-        self._programs.run("deep_framebuffer_pixels.frag", {}, {"neighbors": 0, "layers": self._layers, "light": 1, "reflectance": 2})
+        for neighbors, layers, reflectance in (own, self._lobes) if self._lobes else (own,):
+            neighbors.use(0)
+            reflectance.use(2)
+            self._programs.run("deep_framebuffer_pixels.frag", {}, {"neighbors": 0, "layers": layers, "light": 1, "reflectance": 2})
+
+
+def _behind(neighbors: ndarray, first: int) -> ndarray:
+    """Layers of neighbors whose clusters are counted from `first` on."""
+    number = neighbors[..., 0] + 256 * neighbors[..., 1].astype(np.int64) + first
+    return np.stack([number & 255, number >> 8, neighbors[..., 2]], axis=-1).astype(np.uint8)
 
 
 def rows_image(packed: ndarray, count: int) -> Float32[ndarray, "h w 4"]:

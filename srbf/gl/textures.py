@@ -51,15 +51,18 @@ class AssetTextures:
             stored, most = self._asset.stored, self._limits.array_layers
             if len(stored) > most:
                 raise ShaderError(f"expected at most {most} layers on this GPU (array layers), found {len(stored)}; fit with fewer")
-            layers, height, width, channels = stored.shape
-            dtype = _DTYPES[stored.dtype.name]
-            pixels = np.ascontiguousarray(stored)
-            texture = self._context.texture_array((width, height, layers), channels, pixels, alignment=1, dtype=dtype)
-            texture.filter = (self._context.NEAREST, self._context.NEAREST)
-            texture.repeat_x = texture.repeat_y = False
-            self._resources.callback(texture.release)
-            self._layers = texture
+            self._layers = self.kept_layers(stored)
         return self._layers
+
+    def kept_layers(self, stored: ndarray) -> moderngl.TextureArray:
+        """(N, H, W, C) as an array of textures that lives as long as the asset's."""
+        layers, height, width, channels = stored.shape
+        pixels, dtype = np.ascontiguousarray(stored), _DTYPES[stored.dtype.name]
+        texture = self._context.texture_array((width, height, layers), channels, pixels, alignment=1, dtype=dtype)
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        texture.repeat_x = texture.repeat_y = False
+        self._resources.callback(texture.release)
+        return texture
 
     def layer(self, i: int) -> moderngl.Texture:
         """Layer i as a plain 2D texture, for the article's multi-pass variant."""
