@@ -30,12 +30,12 @@ def lobe(
 
 
 def sampled(
-    view: Float64[ndarray, "n c 3"], alpha: Float64[ndarray, " n"], square: Float64[ndarray, "n c 2"]
-) -> tuple[Float64[ndarray, "n c 3"], Float64[ndarray, "n c"], Float64[ndarray, "n c"]]:
+    view: Float64[ndarray, "n c 3"], alpha: Float64[ndarray, " n"], square: Float64[ndarray, "n d 2"]
+) -> tuple[Float64[ndarray, "n d 3"], Float64[ndarray, "n d"], Float64[ndarray, "n d"]]:
     """(directions of light, VoH, weights) by the distribution of visible normals [Heitz2018]; frames have the normal as z.
 
     The mean of F(VoH) times the weight, G2 / G1, is the albedo of a lobe of Fresnel term F; the weight is 0 below the surface.
-    view: unit vectors to the eye; square: points of the unit square.
+    view: unit vectors to the eye, c = d or 1 for all; square: points of the unit square.
     """
     width = alpha[:, None, None]
     stretched = view * np.concatenate([width, width, np.ones_like(width)], axis=2)
@@ -53,7 +53,7 @@ def sampled(
     return light, VoH, np.where(light[:, :, 2] > 0, (1 + seen) / (1 + seen + lit), 0.0)
 
 
-def schlick(VoH: Float[ndarray, " n"]) -> Float64[ndarray, " n"]:
+def schlick(VoH: Float[ndarray, ...]) -> Float64[ndarray, ...]:
     """How far the Fresnel term is from its value along the normal to 1 [Schlick1994]."""
     return (1 - np.clip(VoH, 0, 1)) ** 5
 

@@ -13,14 +13,14 @@ LEAST = 1e-30
 ROUNDING_NOISE = 1 / np.sqrt(12.0)  # rms, of a step
 
 
-def steps_by_cluster(functions: ndarray, clusters: int) -> Float16[ndarray, "F … c"]:
-    """Functions (F, …) as half floats, multiples of one power of two in each of the clusters, of F / clusters functions in order."""
+def steps_by_cluster(functions: ndarray, clusters: int) -> Float16[ndarray, "F N c"]:
+    """Functions (F, N, c) as half floats, multiples of one power of two in each of the clusters, of F / clusters functions in order."""
     of_cluster = functions.astype(np.float32).reshape(clusters, -1)
     rms = np.sqrt((of_cluster**2).mean(axis=1, keepdims=True))
     return _rounded(of_cluster, VALUE_STEP * rms).reshape(functions.shape).astype(np.float16)
 
 
-def steps_by_column(transfer: Float32[ndarray, "r S 3"], shapes: Float32[ndarray, " r"]) -> Float32[ndarray, "r S 3"]:
+def steps_by_column(transfer: Float32[ndarray, "r S c"], shapes: Float32[ndarray, " r"]) -> Float32[ndarray, "r S c"]:
     """Weights of r shapes from S surfels as multiples of a power of two each: of a shape of a small rms, `shapes`, coarser ones.
 
     Together they change the picture that a surfel makes by COLUMN_ERROR, rms; those of many surfels average out.

@@ -99,8 +99,8 @@ class AssetTextures:
         """The ambient image, or one black texel."""
         return self._plain("ambient", self._asset.images.get("ambient", np.zeros((1, 1, 3), np.float32)))
 
-    def kept(self, pixels: Float32[ndarray, "H W C"]) -> moderngl.Texture:
-        """Numbers as a texture that lives as long as the asset's."""
+    def kept(self, pixels: ndarray) -> moderngl.Texture:
+        """Numbers or bytes (H, W, C) as a texture that lives as long as the asset's."""
         return self._plain(f"kept {len(self._made)}", pixels)
 
     @contextmanager

@@ -50,7 +50,7 @@ class SurfelLight:
         places = cells.places.astype(np.float64)
         self.center: Float64[ndarray, " 3"] = (places.min(axis=0) + places.max(axis=0)) / 2  # single precision is finest about the origin
         self._lift = lift_of(places)
-        self._places = self._resources.texture(folded(np.column_stack([places - self.center, cells.areas])))
+        self._places = self._resources.texture(folded(np.column_stack([places - self.center, cells.areas]).astype(np.float32)))
         self._normals = self._resources.texture(folded(cells.normals))
         self.casters = ShadowCasters(self._resources, read_triangles(scene), self.center)
         self.maps, self._size = ShadowMaps.of(self._resources, size), size
