@@ -1,8 +1,8 @@
 """`python benchmarks/door.py SCENE.blend CAPTURE ASSET... --path X,Y,Z/X,Y,Z`: does a light pop where it is carried through a door?
 
 A point light walks a path in even steps. Error of a step: what the relit picture changes, less what Cycles' picture changes; rendered
-twice, so that noise drops out. Largest and mean of it and of Cycles' own change, relative to the rms of all pictures, and the ratio of
-the largest ones: 1.2 is the bar.
+twice, with the same random numbers in all steps, so that noise drops out. Largest and mean of it and of Cycles' own change, relative to
+the rms of all pictures, and the ratio of the largest ones: 1.2 is the bar.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def main() -> None:
     capture = Capture.open(asked.capture)
     covered = capture.coverage() >= COVERED
     lights = walked(asked.path, asked.steps)
-    first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples)["indirect"][:, :, covered]
+    first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples, same_noise=True)["indirect"][:, :, covered]
     scale = float(np.sqrt((first * second).mean()))
     changes = np.diff(first, axis=0), np.diff(second, axis=0)
     true = sizes(*changes, scale)

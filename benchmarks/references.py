@@ -30,8 +30,13 @@ def rendered(
     samples: int,
     channels: tuple[str, ...] = ("indirect",),
     gloss: bool = False,
+    same_noise: bool = False,
 ) -> dict[str, np.ndarray]:
-    """(2, N, H, W, 3) of each channel, `indirect` or `direct`: every light, twice. `gloss`: direct light includes what lobes reflect."""
+    """(2, N, H, W, 3) of each channel, `indirect` or `direct`: every light, twice.
+
+    `gloss`: direct light includes what lobes reflect. `same_noise`: all lights have the same random numbers, so that noise drops out of the
+    difference of lights that are next to each other.
+    """
     images: dict[str, list[np.ndarray]] = {channel: [] for channel in channels}
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
         scratch = Path(name)
@@ -39,7 +44,7 @@ def rendered(
             {
                 "light": {"index": i, **_message(light, scratch / f"environment_{i}.npy")},
                 "samples": samples,
-                "seed": 7919 * (i + len(lights) * again) + 11,
+                "seed": 7919 * ((0 if same_noise else i) + len(lights) * again) + 11,
                 "region": None,
                 "channels": list(channels),
             }

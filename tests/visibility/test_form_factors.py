@@ -8,7 +8,7 @@ import pytest
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
 from srbf.visibility.hemisphere import cosine_directions
-from srbf.visibility.surface_cells import Fragments
+from srbf.visibility.surface_cells import Fragments, cells_of
 from srbf.visibility.surfels import Surfels, surfels_of
 
 pytest.importorskip("embreex")
@@ -100,6 +100,26 @@ def test_the_back_of_what_emits_lights_the_wall_behind() -> None:
         found = surfels_of(Fragments(corners, albedo), numbers, EmbreeTriangles(corners), free, None, 200, emission)
         assert set(np.sign(found.cells.normals[found.emission.any(axis=1), 2])) == sides
         np.testing.assert_array_equal(found.hidden, found.emission.any(axis=1) & (found.cells.normals[:, 2] < 0))
+
+
+def test_what_lies_on_a_floor_parts_its_surfels() -> None:
+    """A rug 2 mm above it: under the rug is another surface than beside it, and a dark one."""
+    floor, rug = square(0, True, 4), square(0.002, True, 4) * [0.4, 0.4, 1] + [0.3, 0.3, 0]
+    free = np.random.default_rng(0).uniform([0.1, 0.1, 0.3], [0.9, 0.9, 0.9], (64, 3))
+    found = surfels(np.concatenate([floor, rug]).astype(np.float32), free, 64)
+    on_floor = found.cells.places[:, 2] < 0.001
+    assert (found.cells.normals[:, 2] > 0).all()
+    np.testing.assert_allclose(found.cells.areas[on_floor].sum(), 1 - 0.16, rtol=0.02)
+    under, beside = np.array([[0.5, 0.5, 0.001], [0.32, 0.68, 0.001]]), np.array([[0.1, 0.5, 0.001], [0.76, 0.5, 0.001]])
+    down = np.broadcast_to([0.0, 0.0, -1.0], (2, 3))
+    assert (found.seen_along(under, down) == -1).all() and (found.seen_along(beside, down) >= 0).all()
+
+
+def test_no_cell_has_two_walls_one_behind_another() -> None:
+    walls = Fragments(np.concatenate([square(0, True), square(0.1, True)]), np.full((256, 3), 0.5, np.float32))
+    owner = cells_of(walls, 0.5)[1]
+    assert not set(owner[:128]) & set(owner[128:])
+    assert len(set(owner)) == 2 * len(set(cells_of(walls.at(np.arange(128)), 0.5)[1]))
 
 
 def test_no_more_surfels_than_asked() -> None:
