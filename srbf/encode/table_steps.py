@@ -8,7 +8,7 @@ from numpy import ndarray
 from srbf.arrays import Float16, Float32
 
 VALUE_STEP = 2.0**-6  # of the rms of a cluster's functions
-COLUMN_ERROR = 0.08  # of what one surfel lays on the receivers, rms
+COLUMN_ERROR = 0.04  # of what one surfel lays on the receivers, rms; twice that shows as colored blotches in a dim room
 LEAST = 1e-30
 ROUNDING_NOISE = 1 / np.sqrt(12.0)  # rms, of a step
 
