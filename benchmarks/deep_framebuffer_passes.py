@@ -79,7 +79,7 @@ def draws_of(asset: Asset, context: Any, resources: ExitStack) -> dict[str, Call
     def pixels() -> None:
         nothing_blends()
         screen.use()
-        passes.prepared()
+        passes.pixels()
 
     def direct_at(uniforms: dict[str, Any], face: int) -> None:
         screen.use()

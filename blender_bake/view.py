@@ -39,7 +39,7 @@ class ViewReceiver:
         self._camera = find_camera(scene, job["receiver"].get("camera"))
         self._layer = bpy.context.view_layer
         self._coverage_samples = job["coverage_samples"]
-        self._coverage: dict[str, np.ndarray] | None = None  # with what many samples say of the materials
+        self._measured_passes: dict[str, np.ndarray] | None = None
         self._gloss = GLOSS_PASSES if job.get("direct_gloss") else ()  # passes: of light that gloss reflects directly
         self._last: dict[str, np.ndarray] = {}
         self._centers: dict[str, np.ndarray] | None = None  # position, normal and hit
@@ -93,9 +93,9 @@ class ViewReceiver:
             "position": self._position,
             "normal": lambda: self._at_centers()["normal"],
             "albedo": self._albedo,
-            "coverage": lambda: self._measured_coverage()[0],
+            "coverage": self._measured_coverage,
             "hit": lambda: self._at_centers()["hit"],
-            "valid": lambda: self._measured_coverage()[0],
+            "valid": self._measured_coverage,
             "seams": lambda: None,
             "glossy": lambda: self._measured("Glossy Color"),
             "lobe": self._lobe,
@@ -112,15 +112,12 @@ class ViewReceiver:
 
     def _measured(self, name: str) -> np.ndarray:
         """A color by many samples of what is covered."""
-        coverage, _ = self._measured_coverage()
-        assert self._coverage is not None
-        return self._coverage[name][:, :, :3] / np.where(coverage > 0, coverage, 1)
+        coverage = self._measured_coverage()
+        return self._materials()[name][:, :, :3] / np.where(coverage > 0, coverage, 1)
 
     def _lobe(self) -> np.ndarray:
         """(roughness, share of the lobe with a Fresnel term, 1 where there is any)."""
-        self._measured_coverage()
-        assert self._coverage is not None
-        sums = self._coverage[lobes.AOV][:, :, :3]
+        sums = self._materials()[lobes.AOV][:, :, :3]
         weight = sums[:, :, 2:]
         return np.where(weight > 0, sums / np.where(weight > 0, weight, 1), 0).astype(np.float32)
 
@@ -173,7 +170,7 @@ class ViewReceiver:
         """
         if self._denoiser is None:
             self._denoiser = Denoiser(self._scratch, self._albedo(), self._at_centers()["normal"])
-        return self._denoiser.denoise(image) * (self._measured_coverage()[0] > 0)
+        return self._denoiser.denoise(image) * (self._measured_coverage() > 0)
 
     def direct(self, samples: int, seed: int) -> np.ndarray:
         """The direct diffuse light alone, and that of gloss where it is kept, in the units of `response`."""
@@ -193,25 +190,29 @@ class ViewReceiver:
         Where a pixel is covered in part, that color is multiplied back and the color of many samples divided by, so that the mean over
         passes is right; elsewhere the ratio is kept, which has less noise on textures.
         """
-        coverage, diffuse = self._measured_coverage()
+        coverage, diffuse = self._measured_coverage(), self._materials()["Diffuse Color"][:, :, :3]
         ratio = light[:, :, :3]
         partial = (coverage < 1) & (diffuse > 0)
         expected = ratio * passes["Diffuse Color"][:, :, :3] / np.where(partial, diffuse, 1)
         return np.where(partial, expected, ratio) * np.float32(math.pi)
 
-    def _measured_coverage(self) -> tuple[np.ndarray, np.ndarray]:
-        """(coverage (H, W, 1), diffuse color times coverage (H, W, 3)) by many samples; rendered once."""
-        if self._coverage is None:
+    def _measured_coverage(self) -> np.ndarray:
+        """(H, W, 1) by many samples."""
+        return np.clip(self._materials()["Combined"][:, :, 3:], 0, 1)
+
+    def _materials(self) -> dict[str, np.ndarray]:
+        """Passes of materials by many samples, each times coverage; rendered once."""
+        if self._measured_passes is None:
             names: tuple[str, ...] = ("Combined", "Diffuse Color")
             if self._gloss:
                 lobes.add(self._layer)
                 names = (*names, "Glossy Color", lobes.AOV)
-            self._coverage = self._render(self._coverage_samples, 0, names)
+            self._measured_passes = self._render(self._coverage_samples, 0, names)
             lobes.remove(self._layer)
-        return np.clip(self._coverage["Combined"][:, :, 3:], 0, 1), self._coverage["Diffuse Color"][:, :, :3]
+        return self._measured_passes
 
     def _over_coverage(self, image: np.ndarray) -> np.ndarray:
-        coverage, _ = self._measured_coverage()
+        coverage = self._measured_coverage()
         seen = coverage > 0
         return np.where(seen, image / np.where(seen, coverage, 1), 0)
 

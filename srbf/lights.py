@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -343,6 +344,12 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
     if isinstance(light, SphereLight):
         return replace(light, size=light.size * scale, **changes)
     return replace(light, **changes)
+
+
+def refuse_named(lights: Sequence[Light], method: str) -> None:
+    """InputError where one of the lights of an asset that wants lights inside its scene is one of the scene's own, by name."""
+    if any(isinstance(light, NamedLight) for light in lights):
+        raise InputError(f"expected lights inside the scene for a {method} asset, found a named one; bake `light_set=named` to mix lights")
 
 
 def triple(value: object, name: str = "a vector") -> Triple:

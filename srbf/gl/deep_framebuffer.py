@@ -91,7 +91,7 @@ class LinkPasses:
         target.viewport = (0, 0, *self.cluster_size)
 
     def bounced(self, direct: moderngl.Texture) -> moderngl.Texture:
-        """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of a texel per surfel."""
+        """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of one texel per surfel."""
         (light, light_target), (other, other_target) = self._radiosity
         direct.use(3)
         self._albedo.use(4)

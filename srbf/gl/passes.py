@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from numpy import ndarray
@@ -44,12 +44,9 @@ class Passes(ABC):
     def point_lights(self, lights: Sequence[PointLight], weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Point and spot lights, and the distant lights' `weights` with the first of them; `units` layers per pass."""
 
-    def prepare(self, lights: Sequence[Light]) -> bool:
-        """Make ready what `prepared` draws of `lights`; True where that is all of their light, so that nothing is left to project.
+    def prepare(self, lights: Sequence[Light]) -> Callable[[], None] | None:
+        """A pass that adds all of the light of `lights`, so that nothing is left to project; None of methods that project.
 
-        It may use other targets, and leaves blending as it likes.
+        It may use other targets before it returns, and leaves blending as it likes.
         """
-        return False
-
-    def prepared(self) -> None:  # noqa: B027  most methods prepare nothing
-        """Add what `prepare` made ready; only where it said True."""
+        return None

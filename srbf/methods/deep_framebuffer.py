@@ -18,7 +18,7 @@ from srbf.channels import GLOSS
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
-from srbf.lights import Light, NamedLight, PointLight
+from srbf.lights import Light, PointLight, refuse_named
 from srbf.methods.carried import carried_images, carried_scene, common_manifest
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.visibility.gather_operator import GatherOperator
@@ -216,10 +216,7 @@ class DeepFramebuffer(Method):
     def projected_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "C 3"]:
         """The irradiance of every view cluster, all bounces included, under all lights together; after these, pi times the radiance that
         every specular lobe gathers, over its reflectance."""
-        if any(isinstance(light, NamedLight) for light in lights):
-            raise InputError(
-                f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
-            )
+        refuse_named(lights, cls.name)
         if not lights:
             return np.zeros((asset.manifest["gather"]["clusters"] + asset.manifest["gather"].get("lobes", 0), 3))
         ready = _ready(asset)

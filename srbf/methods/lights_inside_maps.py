@@ -17,9 +17,8 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.position_table import FILES, PositionTable, position_table
-from srbf.errors import InputError
 from srbf.light_domain.cloud import isotropic
-from srbf.lights import Light, NamedLight, PointLight
+from srbf.lights import Light, PointLight, refuse_named
 from srbf.methods import kept_visibility
 from srbf.methods.light_table_maps import LightTableMaps
 from srbf.visibility.cloud_lights import CloudLights
@@ -70,10 +69,8 @@ class LightsInsideMaps(LightTableMaps):
         """By rays where Embree is installed, else by compressed depths, else by the table of places, which point lights alone are in."""
         if not lights:
             return np.zeros((len(asset.tables["light_values"]), 3))
-        if not cls.takes_objects and any(isinstance(light, NamedLight) for light in lights):
-            raise InputError(
-                f"expected lights inside the scene for a {cls.name} asset, found a named one; bake `light_set=named` to mix lights"
-            )
+        if not cls.takes_objects:
+            refuse_named(lights, cls.name)
         if has_embree() or kept_visibility.has_depths(asset):
             return super().projected_weights(asset, lights)
         traced = [light for light in lights if cls.needs_rays(asset, light)]

@@ -38,7 +38,7 @@ class DirectLight(Protocol):
     """Adds what an indirect asset leaves out; lights are in the asset's frame."""
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The direct diffuse light of `lights`; environments are added by rays alone, named lights not at all."""
+        """The direct light of `lights`, that of lobes included where a view has them; rays alone add environments, none named lights."""
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""
@@ -84,16 +84,14 @@ class Added:
         self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
         self._emits = isinstance(source, Asset) and method_of(source).takes_objects
         self._light: DirectLight | None = None
-        self._gloss: GlossyRays | GlossyMaps | None = None
-        if kind in ("ray", "shadow-map"):
+        if kind == "ray":
             receivers = Receivers.of(source)
-            glossy = has_gloss(receivers)
-            if kind == "ray":
-                self._light = tracer = RayTracer(receivers)
-                self._gloss = GlossyRays(receivers, tracer) if glossy else None
-            else:
-                self._light = mapper = self._stack.enter_context(ShadowMapper(receivers))
-                self._gloss = GlossyMaps(receivers, mapper.irradiance) if glossy else None
+            tracer = RayTracer(receivers)
+            self._light = GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
+        elif kind == "shadow-map":
+            receivers = Receivers.of(source)
+            mapper = self._stack.enter_context(ShadowMapper(receivers))
+            self._light = GlossyMaps(receivers, mapper) if has_gloss(receivers) else mapper
         elif kind == "pca":
             self._light = by_receiver_depths(source)
 
@@ -105,10 +103,7 @@ class Added:
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
         """The direct light of world-space `lights`, None where none is added."""
-        if self._light is None:
-            return None
-        own = [moved(light, self._frame) for light in lights]
-        return self._light.response(own) if self._gloss is None else self._light.response(own) + self._gloss.response(own)
+        return None if self._light is None else self._light.response([moved(light, self._frame) for light in lights])
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
         """The responses to white lights from world-space `directions`, 0 where none is added."""

@@ -217,8 +217,8 @@ class Relighter:
         if point_lights:
             self._passes.check_point_lights()
         with self._context:
-            whole = self._passes.prepare(inside)
-        left = [] if whole else inside
+            draw_all = self._passes.prepare(inside)
+        left = inside if draw_all is None else []
         environments_lit = [light for light in left if isinstance(light, EnvironmentLight)] if self._environment is not None else []
         weights = method_of(self._asset).projected_weights(self._asset, [light for light in left if light not in environments_lit])
         with self._context:
@@ -227,8 +227,8 @@ class Relighter:
             self._sum_buffer.clear()
             self._blend(True)
             at_once = units if multipass else None
-            if whole:
-                self._passes.prepared()
+            if draw_all is not None:
+                draw_all()
             if by_shader is not None:
                 self._passes.weighted(by_shader)
                 weights = 0 * weights

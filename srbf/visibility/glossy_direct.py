@@ -1,8 +1,8 @@
-"""Direct light that the specular lobes of a view's pixels reflect toward its camera."""
+"""Direct light of a view whose pixels have specular lobes, which reflect it toward its camera."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy import ndarray
@@ -14,13 +14,14 @@ from srbf.unshadowed import irradiance_from
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers, spread_points
+from srbf.visibility.shadow_map import ShadowMapper
 
 POINTS, SIZED_POINTS, MOST_POINTS = 4, 32, 96  # of a pixel; of one that a light with a size lights; of one whose first points differ
 RAGGED = 0.2  # how far a pixel's first points are from their mean, over the largest of it
 DARK = 0.05  # of the mean over pixels: differences that do not count
 BATCH = 1 << 19  # samples at a time
 LEAST = 1e-4  # specular reflectance of a pixel that counts
-MOST_RATIO = 1.0  # of what shadows leave
+LEAST_COS = 1e-3  # to a light, of a pixel whose shadow is known by its irradiance
 
 
 def has_gloss(receivers: Receivers) -> bool:
@@ -69,7 +70,7 @@ class GlossyPixels:
 
 
 class GlossyRays:
-    """Direct light of lobes, by shadow rays from several points of each pixel."""
+    """Direct light by rays, that of lobes included, from several points of each pixel."""
 
     def __init__(self, receivers: Receivers, tracer: RayTracer) -> None:
         self._receivers, self._tracer, self._pixels = receivers, tracer, GlossyPixels(receivers)
@@ -77,12 +78,17 @@ class GlossyRays:
         self._first: list[tuple[Samples, ndarray]] = []
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The radiance of what lobes reflect of `lights`; environments and named lights add nothing."""
+        """The radiance of diffuse reflection and of lobes, to which environments and named lights add nothing."""
         total = np.zeros((self._receivers.height * self._receivers.width, 3))
         for light in lights:
             if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
                 total[self._pixels.texels] += self._of(light) * np.array(light.color)
-        return total.reshape(self._receivers.height, self._receivers.width, 3).astype(np.float32)
+        diffuse = self._tracer.response(lights)
+        return diffuse + total.reshape(diffuse.shape).astype(np.float32)
+
+    def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        """`response` to a white light from each of many directions."""
+        return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
     def _of(self, light: CastingLight) -> Float64[ndarray, "G 3"]:
         """The mean over POINTS points of every pixel, over more where these differ."""
@@ -130,31 +136,41 @@ class GlossyRays:
 
 
 class GlossyMaps:
-    """Direct light of lobes at the centers of pixels, dimmed as the irradiance is that `shadowed` gives: a shadow mapper's."""
+    """Direct light by a shadow mapper, that of lobes included: at the centers of pixels, dimmed as their irradiance is."""
 
-    def __init__(self, receivers: Receivers, shadowed: Callable[[Sequence[Light]], Float32[ndarray, "H W 3"]]) -> None:
-        self._receivers, self._shadowed, self._pixels = receivers, shadowed, GlossyPixels(receivers)
+    def __init__(self, receivers: Receivers, mapper: ShadowMapper) -> None:
+        self._receivers, self._mapper, self._pixels = receivers, mapper, GlossyPixels(receivers)
         texels = self._pixels.texels
         self._points, self._normals = (receivers.images[name].reshape(-1, 3)[texels] for name in ("position", "normal"))
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """The radiance of what lobes reflect of `lights`, of those with a size at their middles."""
+        """The radiance of diffuse reflection and of lobes, of lights with a size for these at their middles."""
+        irradiance = np.zeros((self._receivers.height, self._receivers.width, 3), np.float32)
         total = np.zeros((self._receivers.height * self._receivers.width, 3))
         for light in lights:
-            if not isinstance(light, (DirectionalLight, PointLight, AreaLight)):
-                continue
-            open_ = irradiance_from(light, self._points, self._normals)
-            own = np.array(light.color, np.float64)
-            seen = self._shadowed([light]).reshape(-1, 3)[self._pixels.texels] / np.maximum(open_[:, None] * own, 1e-30)
-            direction = self._toward(light)
-            NoL = np.einsum("nc,nc->n", self._normals, direction)
-            lit = np.flatnonzero((NoL > 1e-3) & (open_ > 0))
-            texels = self._pixels.texels[lit]
-            found = self._pixels.reflected(texels, self._points[lit], self._normals[lit], direction[lit])
-            total[texels] += found * (open_[lit] / NoL[lit])[:, None] * np.clip(seen[lit], 0, MOST_RATIO) * own
-        return total.reshape(self._receivers.height, self._receivers.width, 3).astype(np.float32)
+            own = self._mapper.irradiance([light])
+            irradiance += own
+            if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
+                total[self._pixels.texels] += self._of(light, own.reshape(-1, 3)[self._pixels.texels])
+        return irradiance * self._receivers.reflectance() + total.reshape(irradiance.shape).astype(np.float32)
 
-    def _toward(self, light: CastingLight) -> Float64[ndarray, "n 3"]:
+    def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        """`response` to a white light from each of many directions."""
+        return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
+
+    def _of(self, light: CastingLight, shadowed: Float32[ndarray, "G 3"]) -> Float64[ndarray, "G 3"]:
+        """What the lobes reflect of a light that gives their pixels the irradiance `shadowed`."""
+        unshadowed = irradiance_from(light, self._points, self._normals)
+        color, direction = np.array(light.color, np.float64), self._toward(light)
+        NoL = np.einsum("nc,nc->n", self._normals, direction)
+        lit = np.flatnonzero((NoL > LEAST_COS) & (unshadowed > 0))
+        reflected = self._pixels.reflected(self._pixels.texels[lit], self._points[lit], self._normals[lit], direction[lit])
+        seen = np.clip(shadowed[lit] / np.maximum(unshadowed[lit, None] * color, 1e-30), 0, 1)
+        found = np.zeros((len(NoL), 3))
+        found[lit] = reflected * (unshadowed[lit] / NoL[lit])[:, None] * seen * color
+        return found
+
+    def _toward(self, light: CastingLight) -> Float64[ndarray, "G 3"]:
         if isinstance(light, DirectionalLight):
             return np.broadcast_to(np.array(light.direction, np.float64), self._points.shape)
         vector = np.array(light.position) - self._points

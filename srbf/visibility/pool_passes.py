@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from srbf.gl.deep_framebuffer import LinkPasses
 from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
-from srbf.lights import WHITE, EnvironmentLight, Light, NamedLight, PointLight
+from srbf.lights import WHITE, EnvironmentLight, Light, PointLight, refuse_named
 from srbf.visibility.packed_links import unpacked
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfel_light import SurfelLight
@@ -40,10 +40,9 @@ class PoolPasses(Passes):
         self._free: list[tuple[moderngl.Texture, moderngl.Framebuffer]] = []
         self.computed = 0
 
-    def prepare(self, lights: Sequence[Light]) -> bool:
-        """The light of all view clusters."""
-        if any(isinstance(light, NamedLight) for light in lights):
-            raise InputError("expected lights inside the scene for a deep-framebuffer asset, found a named one; bake `light_set=named`")
+    def prepare(self, lights: Sequence[Light]) -> Callable[[], None]:
+        """The light of all view clusters, and the pass over the pixels."""
+        refuse_named(lights, self._asset.method)
         self._make()
         gl: Any = self._programs.context
         kept = {}
@@ -63,10 +62,10 @@ class PoolPasses(Passes):
             kept[_shape(light)][1].use(1)
             self._programs.run("deep_framebuffer_sum.frag", {}, {"former": 0, "light": 1, "color": light.color})
             self._sums.reverse()
-        return True
+        return self.pixels
 
-    def prepared(self) -> None:
-        """A pass over the pixels."""
+    def pixels(self) -> None:
+        """Add the picture of the lights that were prepared last to the target in use."""
         self._links.pixels(self._sums[0][0])
 
     def check_point_lights(self) -> None:

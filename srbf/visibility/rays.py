@@ -83,10 +83,6 @@ class RayTracer:
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; named lights add nothing."""
-        return self.irradiance(lights) * self._receivers.reflectance()
-
-    def irradiance(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
-        """What `response` is a reflection of."""
         height, width = self._receivers.height, self._receivers.width
         total = np.zeros((height * width, 3), np.float32)
         for light in lights:
@@ -94,7 +90,7 @@ class RayTracer:
                 total += self._of_environment(light) * np.array(light.color, np.float32)
             if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
                 total += self._irradiance(light) * np.array(light.color, np.float32)
-        return dilate(total.reshape(height, width, 3), self._nearest)
+        return dilate(total.reshape(height, width, 3), self._nearest) * self._receivers.reflectance()
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
         """`response` to a white light from each of many directions."""

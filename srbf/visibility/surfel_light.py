@@ -27,7 +27,7 @@ FACE = 1024  # texels per side of a face of the shadow cube
 
 
 class SurfelLight:
-    """Direct irradiance on cells as a texture of a texel per cell: the GPU's `srbf.visibility.received.ReceivedLight`.
+    """Direct irradiance on cells as a texture of one texel per cell: the GPU's `srbf.visibility.received.ReceivedLight`.
 
     Point, spot, sphere and area lights by shadow maps; directional and environment lights by the rays of `ReceivedLight`.
 

@@ -97,7 +97,8 @@ def test_lobes_gather_as_in_numpy(asset: Asset, context: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["point", "spot", "near a wall", "sphere"])
 def test_walls_shade_surfels_as_rays_say(divided: Asset, context: Any, kind: str) -> None:
-    light: Any = replace(LIGHTS[kind], color=(1.0, 1.0, 1.0))  # type: ignore[arg-type]
+    lit: Any = LIGHTS[kind]
+    light: Any = replace(lit, color=(1.0, 1.0, 1.0))
     pool = divided.tables["pool"]
     assert divided.scene is not None
     expected = ReceivedLight(Cells.of_image(pool[:2]), occluders_of(divided.scene)).irradiance(light)[:, 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
@@ -119,7 +118,7 @@ def test_lights_are_heard_alone_colored_by_temperature_and_taken_back(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="this Python has no bpy")
+@pytest.mark.blender
 def test_the_script_makes_the_lights_in_blender(chromium: Any, page: Callable[..., None], tmp_path: Path) -> None:
     """Where they are, where they shine, how much: a point light of P watts gives P / 4 pi r^2, a Lambertian area P / pi r^2 on its axis."""
     page(POINT, SPOT, {**AREA, "on": False, "color": "#ff0000", "intensity": 3})

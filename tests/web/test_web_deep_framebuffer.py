@@ -27,7 +27,13 @@ LIGHTS: dict[str, Light] = {
     "area": AreaLight((1.5, 1, 1.7), u=(0.6, 0, 0), v=(0, -0.3, 0)),
     "directional": DirectionalLight((0.2, 0.1, 1)),
 }
-NAMES = {PointLight: "point", SpotLight: "spot", SphereLight: "sphere", AreaLight: "area", DirectionalLight: "directional"}
+NAMES: dict[type[Light], str] = {
+    PointLight: "point",
+    SpotLight: "spot",
+    SphereLight: "sphere",
+    AreaLight: "area",
+    DirectionalLight: "directional",
+}
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +49,7 @@ def url(browser: Any, asset: Asset) -> str:
 
 
 def told(*lights: Light) -> list[dict[str, Any]]:
-    return [{"kind": NAMES[type(light)], **asdict(light)} for light in lights]  # type: ignore[index]
+    return [{"kind": NAMES[type(light)], **asdict(light)} for light in lights]
 
 
 @pytest.mark.parametrize(

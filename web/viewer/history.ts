@@ -8,7 +8,7 @@ type Step = Pick<State, "lights" | "surfaces" | "ball" | "exposure" | "tone" | "
 
 export class History {
   private readonly past: string[] = [];
-  private future: string[] = [];
+  private readonly future: string[] = [];
   private now: string;
   private timer = 0;
 
@@ -24,19 +24,20 @@ export class History {
 
   /** Back by a step; false where there is none. */
   undo(): boolean {
-    this.record();
-    const step = this.past.pop();
-    if (step === undefined) return false;
-    this.future.push(this.now);
-    return this.show(step);
+    return this.step(this.past, this.future);
   }
 
   /** Forward again. */
   redo(): boolean {
+    return this.step(this.future, this.past);
+  }
+
+  /** The last of one list is shown, and what was shown joins the other. */
+  private step(from: string[], to: string[]): boolean {
     this.record();
-    const step = this.future.pop();
+    const step = from.pop();
     if (step === undefined) return false;
-    this.past.push(this.now);
+    to.push(this.now);
     return this.show(step);
   }
 
@@ -46,7 +47,7 @@ export class History {
     if (now === this.now) return;
     this.past.push(this.now);
     if (this.past.length > MOST) this.past.shift();
-    this.future = [];
+    this.future.length = 0;
     this.now = now;
   }
 

@@ -1,6 +1,7 @@
 /** Where a coefficient map is stored, and how large its values are: what its false color is scaled to. */
-import { DataUtils } from "three";
+import { DataUtils, type Vector4 } from "three";
 import type { Asset } from "../src";
+import type { ScreenUniforms } from "./screen";
 
 const SAMPLES = 4096;
 const QUANTILE = 0.98; // a few texels may be far larger than the rest
@@ -8,9 +9,18 @@ const QUANTILE = 0.98; // a few texels may be far larger than the rest
 const known = new WeakMap<Asset, Map<number, number>>();
 
 /** The layer of coefficient map `index`, and its channel there; without one the map is all three of RGB. */
-export function mapPlace(asset: Asset, index: number): { layer: number; channel?: number } {
+function mapPlace(asset: Asset, index: number): { layer: number; channel?: number } {
   const { mapsPerLayer } = asset.method;
   return mapsPerLayer === 1 ? { layer: index } : { layer: Math.floor(index / mapsPerLayer), channel: index % mapsPerLayer };
+}
+
+/** Have the screen's uniforms show coefficient map `index`. */
+export function showMap(uniforms: ScreenUniforms, asset: Asset, index: number): void {
+  const { layer, channel } = mapPlace(asset, index);
+  uniforms.layer.value = layer;
+  uniforms.channel.value = channel ?? -1;
+  (uniforms.layerScale.value as Vector4).fromArray(asset.scale, 4 * layer);
+  (uniforms.layerBias.value as Vector4).fromArray(asset.bias, 4 * layer);
 }
 
 /** The 98 % quantile of the magnitude of coefficient map `index`; of a compressed one the largest that it can hold. */

@@ -1,7 +1,8 @@
 /** The page: its state, lights, picture, comparison, and what it saves. */
-import { NoToneMapping, type Vector4, WebGLRenderer } from "three";
+import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, SrbfError, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
+import { Address } from "./address";
 import { capturedPlaces, firstLights, inside, kindsOf, middleOf, outsideLine } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
@@ -16,7 +17,8 @@ import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, ty
 import { listen, tabled } from "./keys";
 import { Keyframes, readFrames } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
-import { mapPlace, mapRange } from "./map_range";
+import { mapRange, showMap } from "./map_range";
+import { Measures } from "./measures";
 import { element, lineOf, say } from "./messages";
 import { Panel, type PanelFacts } from "./panel";
 import { Playback } from "./path";
@@ -25,15 +27,13 @@ import { negated } from "./relighting";
 import { saveFrames, savePng, saveRig } from "./saving";
 import { COLORS, screenUniforms, VALUES } from "./screen";
 import { type DirectionPoint, DirectionWidget } from "./direction_widget";
-import { SpectrumPlot } from "./spectrum";
 import { Stage } from "./stage";
-import { type Changed, COMPARES, decodeState, encodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
+import { type Changed, COMPARES, decodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects, weightsFor } from "./subject";
 import { emitting, emittingStates, paint, surfaceFacts } from "./surface_state";
 import { Surroundings } from "./surroundings";
 
 const FRAMES_PER_SECOND = 24;
-const URL_EVERY = 350; // milliseconds: Safari allows a hundred in half a minute
 const PACES = 15; // frames whose median is shown
 const ABOVE = 0.12; // of the distance to the eye: height of a point light above the picked place
 
@@ -52,7 +52,6 @@ export class Viewer {
   private readonly panel: Panel;
   private readonly copy: Copy;
   private readonly comparison: Comparison;
-  private readonly spectrum: SpectrumPlot;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
   private outside = "";
@@ -64,10 +63,8 @@ export class Viewer {
   private error = "";
   private last = 0;
   private readonly paces: number[] = [];
-  private asking?: Subject; // whose errors are being measured
-  private plotted?: Subject; // whose spectrum is drawn
-  private urlTimer = 0;
-  private written = "";
+  private readonly address: Address;
+  private readonly measures: Measures;
   private readonly history: History;
 
   private constructor(
@@ -87,6 +84,7 @@ export class Viewer {
     this.inScene = model !== undefined && Surroundings.in(model);
     this.state = this.firstState();
     this.playback = new Playback(this.state, this.receivers.bounds);
+    this.address = new Address(this.state);
     this.readUrl(location.hash);
     this.state.asset = facts.assets.indexOf(first.facts);
     this.history = new History(this.state);
@@ -97,7 +95,6 @@ export class Viewer {
       changed: () => this.changed({ lights: true }),
       measured: () => this.status(),
     });
-    this.spectrum = new SpectrumPlot(element<HTMLCanvasElement>("spectrum"));
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
@@ -109,11 +106,15 @@ export class Viewer {
       dragBall(renderer.domElement, this.stage, this.state, roomOf(probes), changed);
     }
     this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, this.directionPoints(), changed);
+    this.measures = new Measures(this.state, this.comparison, this.directions, { wait: () => this.wait(), done: () => this.done(), changed });
     this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
       changed,
       chooseAsset: () => this.chooseAsset(),
       chooseEnvironment: () => pickFile(".exr,.hdr,.png", (file) => void this.environment(file)),
-      savePng: () => this.savePicture(),
+      savePng: () => {
+        savePng(`${facts.title}.png`, this.stage.pixels(this.shining));
+        changed();
+      },
       saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]]),
       saveRig: () => saveRig("lights.py", this.state.lights),
       undo: () => this.step(this.history.undo()),
@@ -228,7 +229,7 @@ export class Viewer {
     } catch (error) {
       say(lineOf(error));
     }
-    this.written = hash;
+    this.address.take(hash);
   }
 
   private done(): void {
@@ -241,15 +242,7 @@ export class Viewer {
     if (what.lights) this.lightsChanged = true;
     this.history.touch();
     if (what.panel) this.panel.rebuild();
-    document.body.dataset.address = "old";
-    if (!this.urlTimer) {
-      this.urlTimer = window.setTimeout(() => {
-        this.urlTimer = 0;
-        this.written = encodeState(this.state);
-        history.replaceState(undefined, "", this.written);
-        document.body.dataset.address = "written";
-      }, URL_EVERY);
-    }
+    this.address.touch();
   }
 
   /** After a step back or forward, if there was one. */
@@ -376,13 +369,12 @@ export class Viewer {
     const most = value === "map" ? mapRange(this.subject.asset, state.map) : 1;
     uniforms.toneMappingExposure.value = 2 ** state.exposure / most;
     uniforms.split.value = comparing && state.compare === "slider" ? state.split * this.renderer.domElement.clientWidth : 0;
-    this.chooseMap();
-    this.showErrors();
+    showMap(uniforms, this.subject.asset, state.map);
+    this.measures.show(this.subject, this.inCloud);
     const placed = this.inCloud && (state.errors || comparing) ? (this.loaded.references?.lights ?? []) : [];
     this.stage.gizmos.captured = capturedPlaces(placed, this.directions.errors, this.comparison.compared);
     this.stage.draw(this.shining);
     this.directions.draw();
-    this.showSpectrum();
     this.panel.refresh();
     const shown = this.comparison.direction ?? this.sun()?.direction;
     bearing(element("bearing"), shown, shown !== undefined && this.directions.inside(shown));
@@ -392,61 +384,6 @@ export class Viewer {
     for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
     (split.querySelector("i") as HTMLElement).ariaValueNow = String(Math.round(100 * state.split));
     this.status();
-  }
-
-  private chooseMap(): void {
-    const { asset } = this.subject;
-    const { layer, channel } = mapPlace(asset, this.state.map);
-    const shader = this.uniforms;
-    shader.layer.value = layer;
-    shader.channel.value = channel ?? -1;
-    (shader.layerScale.value as Vector4).fromArray(asset.scale, 4 * layer);
-    (shader.layerBias.value as Vector4).fromArray(asset.bias, 4 * layer);
-  }
-
-  /** Every baked light's error at its direction, once they are measured. */
-  private showErrors(): void {
-    const { subject } = this;
-    if (!this.state.errors) {
-      this.directions.errors = undefined;
-      return;
-    }
-    if (this.directions.errors || this.asking === subject) return;
-    this.asking = subject;
-    this.wait();
-    say("measuring every light's error …", "hint");
-    this.comparison
-      .errors(subject)
-      .then(({ psnr, texels }) => {
-        if (this.subject !== subject) return;
-        this.directions.errors = psnr;
-        const [worst, best] = [Math.min(...psnr), Math.max(...psnr)].map((value) => value.toFixed(1));
-        say(this.inCloud ? `PSNR of every captured point light over ${texels} texels: ${worst} dB red to ${best} dB blue` : `PSNR of every baked light over ${texels} texels; rings mark held-out lights`, "hint");
-        this.changed({});
-      })
-      .catch((error) => {
-        this.state.errors = false;
-        say(lineOf(error));
-      })
-      .finally(() => {
-        this.asking = undefined;
-        this.done();
-      });
-  }
-
-  private showSpectrum(): void {
-    element("spectrum").hidden = !this.state.spectrum;
-    if (!this.state.spectrum || this.plotted === this.subject) return;
-    this.plotted = this.subject;
-    this.wait();
-    this.spectrum
-      .draw(this.subject)
-      .catch((error) => {
-        this.plotted = undefined;
-        this.state.spectrum = false;
-        say(lineOf(error));
-      })
-      .finally(() => this.done());
   }
 
   private status(): void {
@@ -461,7 +398,7 @@ export class Viewer {
     }).observe(element("stage"));
     new ResizeObserver(() => changed()).observe(element("directions"));
     window.addEventListener("hashchange", () => {
-      if (location.hash === this.written) return;
+      if (!this.address.take(location.hash)) return;
       this.readUrl(location.hash);
       if (this.loaded.facts.assets[this.state.asset] !== this.subject.facts) this.chooseAsset();
       this.stage.resetTo();
@@ -554,11 +491,6 @@ export class Viewer {
     } finally {
       this.done();
     }
-  }
-
-  private savePicture(): void {
-    savePng(`${this.loaded.facts.title}.png`, this.stage.pixels(this.shining));
-    this.changed({});
   }
 
   private savePath(): void {

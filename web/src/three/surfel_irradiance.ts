@@ -30,7 +30,7 @@ export class SurfelIrradiance {
     this.maps = new OccluderMaps(surfels.corners, cells.middle, cells.reach, shadowSize);
   }
 
-  /** The irradiance of all `looks` together, a texel per cell; within `undisturbed`. */
+  /** The irradiance of all `looks` together, one texel per cell; within `undisturbed`. */
   draw(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): Texture {
     let [sum, next] = this.sums;
     renderer.setRenderTarget(sum);
