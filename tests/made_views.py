@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from made_rooms import Room, divided, write_room
 
+from srbf.asset import Asset
 from srbf.bake.gather_set import FoundSurfaces, GatherSet
 from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import write_image
+from srbf.methods.deep_framebuffer import GLOSSY_FILES
 
 
 def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
@@ -47,3 +50,24 @@ def view_of_room(
     capture = Capture.open(folder)
     light_set.trace(capture, 7, lambda done, total, what: None)
     return Capture.open(folder)
+
+
+def with_lobes(asset: Asset) -> Asset:
+    """An asset of a view some of whose pixels are glossy, which gather along the links of its own clusters."""
+    rng = np.random.default_rng(6)
+    told = asset.manifest["gather"]
+    neighbors = np.array(asset.stored[:4])
+    neighbors[..., 2] = rng.integers(0, 2, neighbors.shape[:3]) * rng.integers(1, 256, neighbors.shape[:3])
+    glossy = rng.uniform(0, 1, (asset.height, asset.width, 3)).astype(np.float32)
+    gather = {**told, "lobes": told["clusters"], "gloss_rays": told["view_rays"] // 2}
+    named = {name: {"file": file} for name, file in GLOSSY_FILES.items()}
+    tables = {
+        **asset.tables,
+        "view_links": asset.tables["view_links"].copy(),  # what is kept of an asset is known by them
+        "gloss_links": asset.tables["view_links"],
+        "gloss_rows": asset.tables["view_rows"],
+        "gloss_neighbors": neighbors.reshape(-1, asset.width, 3),
+    }
+    images = {**asset.images, "glossy": glossy, "lobe": np.full_like(glossy, 0.5)}
+    manifest = {**asset.manifest, **named, "glossy": "glossy.exr", "lobe": "lobe.exr", "gather": gather}
+    return replace(asset, manifest=manifest, tables=tables, images=images)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room
+from made_views import view_of_room, with_lobes
 from typer.testing import CliRunner
 
 from srbf import methods
@@ -72,23 +72,7 @@ def test_a_light_is_that_of_numpy(asset: Asset, relighter: Relighter, kind: str)
 
 
 def test_lobes_gather_as_in_numpy(asset: Asset, context: Any) -> None:
-    rng = np.random.default_rng(6)
-    told = asset.manifest["gather"]
-    glossy = rng.uniform(0, 1, (asset.height, asset.width, 3)).astype(np.float32)
-    neighbors = np.array(asset.stored[:4])
-    neighbors[..., 2] = rng.integers(0, 2, neighbors.shape[:3]) * rng.integers(1, 256, neighbors.shape[:3])  # some pixels have none
-    shiny = replace(
-        asset,
-        manifest={**asset.manifest, "gather": {**told, "lobes": told["clusters"], "gloss_rays": told["view_rays"] // 2}},
-        tables={
-            **asset.tables,
-            "view_links": asset.tables["view_links"].copy(),
-            "gloss_links": asset.tables["view_links"],
-            "gloss_rows": asset.tables["view_rows"],
-            "gloss_neighbors": neighbors.reshape(-1, asset.width, 3),
-        },
-        images={**asset.images, "glossy": glossy},
-    )
+    shiny = with_lobes(asset)
     expected = methods.relight(shiny, [LIGHTS["point"], LIGHTS["spot"]])
     assert expected.max() > 1.2 * methods.relight(asset, [LIGHTS["point"], LIGHTS["spot"]]).max()
     with Relighter(shiny, context=context) as relighter:

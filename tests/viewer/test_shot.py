@@ -13,13 +13,15 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room
+from made_views import view_of_room, with_lobes
 from test_page import HEIGHT, STEP, WIDTH, ZOOM, lights_of, shown_as
 
 from srbf.asset import Asset
 from srbf.lights import AreaLight, Light, PointLight
 from srbf.methods import relight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
+from srbf.viewer import page_manifest
+from srbf.viewer.contents import contents_of, read
 
 pytest.importorskip("embreex")
 
@@ -142,3 +144,10 @@ def test_the_script_makes_the_lights_in_blender(chromium: Any, page: Callable[..
         assert np.linalg.det(np.array(one[4])[:3, :3]) == pytest.approx(1, abs=1e-5)
     inner, outer = np.cos(np.radians([20, 35]))
     assert size == pytest.approx(np.radians(70), rel=1e-5) and blend == pytest.approx((inner - outer) / (1 - outer), rel=1e-5)
+
+
+def test_the_page_says_that_it_shows_no_gloss(asset: Asset, tmp_path: Path) -> None:
+    for name, made in (("plain", asset), ("shiny", with_lobes(asset))):
+        made.save(tmp_path / name)
+    notes = {name: json.loads(read(contents_of([tmp_path / name])[page_manifest.NAME]))["notes"] for name in ("plain", "shiny")}
+    assert not notes["plain"] and any("gloss" in note for note in notes["shiny"])
