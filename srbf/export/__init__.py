@@ -94,7 +94,9 @@ def export(
     """
     check_target(target)
     if not method_of(asset).exportable:
-        raise InputError(f"expected an asset that engines can read, found a {asset.method} one; relight it by numpy, or fit another method")
+        raise InputError(
+            f"expected an asset that engines can read, found a {asset.method} one; relight it by `srbf relight`, or fit another method"
+        )
     check_replaceable(folder, force, MANIFEST)
     with atomic_folder(folder, force, MANIFEST) as temporary:
         write: Target = import_module(TARGETS[target]).write

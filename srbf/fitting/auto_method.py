@@ -38,7 +38,9 @@ def check_budget(budget: int | None, psnr: float | None, error: float | None = N
         raise InputError(f"expected a `{other}` or a `psnr`, found both")
     check_error(error)
     if budget is not None and budget < LEAST_BUDGET:
-        raise InputError(f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, found {budget}")
+        raise InputError(
+            f"expected a `budget` of at least {LEAST_BUDGET} bytes per texel, or megabytes of a deep framebuffer, found {budget}"
+        )
     if psnr is not None and not np.isfinite(psnr):
         raise InputError(f"expected `psnr` in dB, found {psnr:g}")
 
