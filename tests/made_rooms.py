@@ -17,9 +17,10 @@ from srbf.capture import Capture
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import label_cells, ungrouped
+from srbf.visibility.patches import label_cells
 from srbf.visibility.receivers import Receivers
 from srbf.visibility.surface_cells import Cells, Fragments, lit
+from srbf.visibility.surfel_parts import parts_of
 from srbf.visibility.surfels import surfels_of
 from srbf.visibility.transfer_operator import OPERATOR_FILE, SURFELS_FILE, TransferOperator
 
@@ -231,7 +232,7 @@ def room_of_surfels(folder: Path, room: Room, count: int, tested: int = 12) -> C
     surfels = surfels_of(Fragments(corners, albedo.astype(np.float32)), red.astype(np.int64), occluders, room.free, None, count)
     told = {"count": surfels.count, "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": ["Walls", "Red wall"]}
     capture = write_room(folder, room, lights, images, room.patches(64), surfels=told)
-    write_image(folder / "patches.exr", ungrouped(surfels.cells).cells.image(), "float")
+    write_image(folder / "patches.exr", parts_of(surfels).image(), "float")
     TransferOperator.traced(surfels, Receivers.of(capture), is_lightmap=False).write(folder, "made")
     return Capture.open(folder)
 

@@ -128,6 +128,7 @@ class FoundPlaces:
 
     def _surfel_arrays(self, surfels: Surfels) -> dict[str, ndarray]:
         return {
+            "surfel_cells": surfels.cells.image(),
             "surfel_corners": surfels.corners,
             "surfel_owners": surfels.owners.astype(np.int32),
             "surfel_objects": surfels.objects.astype(np.int32),
@@ -146,7 +147,7 @@ class FoundPlaces:
         found = FoundPlaces(stored["train"], stored["random"], stored["free"], (x0, y0, z0, x1, y1, z1), patches)
         if "surfel_owners" not in stored:
             return found
-        cells = replace(patches.cells, albedo=stored["surfel_albedo"])
+        cells = replace(Cells.of_image(stored["surfel_cells"]), albedo=stored["surfel_albedo"])
         owners, objects = (stored[f"surfel_{name}"].astype(np.int64) for name in ("owners", "objects"))
         surfels = Surfels(cells, stored["surfel_corners"], owners, objects, stored["surfel_emission"], stored["surfel_hidden"])
         bounces = int(stored["bounces"])
@@ -255,7 +256,7 @@ class CloudSet:
 
 
 def _surfel_keys(found: FoundPlaces) -> dict[str, Any]:
-    told = {"count": len(found.patches.cells.places), "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": list(found.objects)}
+    told = {"count": found.patches.count, "file": SURFELS_FILE, "operator": OPERATOR_FILE, "objects": list(found.objects)}
     return {"surfels": told if found.bounces is None else {**told, "bounces": found.bounces}}
 
 

@@ -24,8 +24,9 @@ from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.patches import patches_of, ungrouped
+from srbf.visibility.patches import patches_of, unemitting
 from srbf.visibility.surface_cells import Fragments
+from srbf.visibility.surfel_parts import parts_of
 from srbf.visibility.surfels import surfels_of
 
 SHOWN = 8  # names in a line
@@ -212,7 +213,7 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
             most = int(np.clip(surfaces.areas.sum() / SURFEL_SIZE**2, most, MOST_SURFELS))
         surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, most, emission)
         require_surfels(surfels)
-        patches = ungrouped(surfels.cells)
+        patches = unemitting(parts_of(surfels))
     else:
         patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)
     if patches.count == 0:
@@ -220,9 +221,7 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
             "expected surfaces that reflect light around the free places, found none; choose another `light_bounds`, or make them diffuse"
         )
     train, random = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("train", "random"))
-    lights = {"patches": f"{patches.count} patches", "cloud": f"{len(train)} point lights"}.get(
-        light_set.kind, f"{len(patches.cells.places)} surfels"
-    )
+    lights = {"patches": f"{patches.count} patches", "cloud": f"{len(train)} point lights"}.get(light_set.kind, f"{patches.count} surfels")
     say(
         f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
         f"{places['skipped']} places are in or near geometry"
@@ -234,8 +233,6 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
             "another box"
         )
     box = (x0, y0, z0, x1, y1, z1)
-    if surfels is not None:
-        surfels = replace(surfels, cells=replace(patches.cells, albedo=surfels.cells.albedo))
     return replace(
         light_set, found=FoundPlaces(train, random, free, box, patches, surfels, names if surfels is not None else (), found.get("bounces"))
     )

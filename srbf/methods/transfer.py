@@ -19,6 +19,7 @@ from srbf.encode.table_steps import steps_by_cluster, steps_by_column
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.lights import EnvironmentLight, Light, NamedLight
+from srbf.methods import kept_visibility
 from srbf.methods.environment_table import FILES as TABLE_FILES
 from srbf.methods.environment_table import (
     add_environment_table,
@@ -170,7 +171,8 @@ class Transfer(LightsInsideMaps):
             return found.with_patches(_parted(found.patches, operator.objects)) if self.editable else found  # an object emits by itself
 
         told = capture.manifest["surfels"]
-        received = ReceivedLight(operator.cells, inside.occluders)
+        parts = self._parts(inside, operator)
+        received = ReceivedLight(parts, inside.occluders)
         lit = training_light(operator, received, inside.free, self.seed)
         most = max(1, min(MOST_RANK, MOST_BYTES // (12 * capture.width * capture.height)))
         asked = None if self.rank == "auto" else int(self.rank)
@@ -198,12 +200,18 @@ class Transfer(LightsInsideMaps):
         if self.editable:
             names = tuple(told.get("objects", ()))
             Surfaces.of_basis(basis, operator, cells.patches, names, told.get("bounces")).add_to(asset)
-        inside = replace(inside, cells=cells)
+        inside = replace(inside, cells=_of_groups(parts, measured, cells.patches))
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)
         self.add_visibility(asset, inside)
         return asset
+
+    def _parts(self, inside: CloudLights, operator: TransferOperator) -> Cells:
+        """Where light is measured, the surfel of each as its patch: several points of a surfel, or one where compressed depths are kept."""
+        count = len(operator.objects)
+        several = self.visibility == kept_visibility.NONE and inside.cells.patch_count == count
+        return inside.cells if several else operator.cells.with_patches(np.arange(count))
 
     def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
@@ -262,6 +270,13 @@ class Transfer(LightsInsideMaps):
     def summary(cls, asset: Asset) -> str:
         told = asset.manifest["surfel_transfer"]
         return f"{told['surfels']} surfels, rank {told['rank']}, {asset.clusters} clusters of {asset.components} components"
+
+
+def _of_groups(parts: Cells, measured: Bool[ndarray, " S"], groups: Int[ndarray, " M"]) -> Cells:
+    """Parts of the M `measured` surfels, in the group that each of these is in."""
+    group = np.full(len(measured), -1, np.int64)
+    group[measured] = groups
+    return parts.with_patches(group[parts.patches]).at(measured[parts.patches])
 
 
 def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:

@@ -46,12 +46,15 @@ class Judges:
     def of(
         capture: Capture, operator: TransferOperator, received: ReceivedLight, bounces: Sequence[Bounces], free: Float64[ndarray, "F 3"]
     ) -> Judges:
-        """The capture's validation lights, or else point lights at free places, where there are enough those that no shape is made for."""
+        """The capture's validation lights, or else point lights at free places, where there are enough those that no shape is made for.
+
+        `received`: on cells of which the patches are the surfels.
+        """
         validation = capture.indices("validation")
         order = np.random.default_rng(0).permutation(len(free))  # as `training_light` takes them, by default
         places = capture.positions(validation) if validation else free[(order[PLACED:] if len(order) > PLACED else order)[:LIGHTS]]
         lights = [PointLight((x, y, z), falloff="inverse-square") for x, y, z in places.tolist()]
-        irradiance = np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+        irradiance = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
         texels = sampled_texels(capture, TEXELS)
         factors = operator.receivers[texels]
         weight = np.ones((len(texels), 1, 3), np.float32)

@@ -54,10 +54,10 @@ def patches_of(surfaces: Fragments, occluders: EmbreeTriangles, free: Float64[nd
     return Patches(cells.with_patches(labels), sides, labels[owner])
 
 
-def ungrouped(cells: Cells) -> Patches:
-    """Every cell a patch of its own; nothing emits."""
+def unemitting(cells: Cells) -> Patches:
+    """Cells by which light is measured alone: nothing emits."""
     nothing = Fragments(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
-    return Patches(cells.with_patches(np.arange(len(cells.places))), nothing, np.zeros(0, np.int64))
+    return Patches(cells, nothing, np.zeros(0, np.int64))
 
 
 def surfel_groups(cells: Cells, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"], count: int, seed: int = 0) -> Cells:

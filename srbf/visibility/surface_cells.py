@@ -176,7 +176,7 @@ def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
     order = np.lexsort((off, owner))
     nearest = order[np.searchsorted(owner[order], np.arange(count))]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    on_surface = np.bincount(owner, _contain(fragments, middle[owner]), count) > 0
+    on_surface = np.bincount(owner, contain(fragments, middle[owner]), count) > 0
     return Cells(
         np.where(on_surface[:, None], middle, centers[nearest]).astype(np.float32),
         normal.astype(np.float32),
@@ -186,7 +186,7 @@ def grouped_cells(fragments: Fragments, owner: Int[ndarray, " T"]) -> Cells:
     )
 
 
-def _contain(fragments: Fragments, points: Float64[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
+def contain(fragments: Fragments, points: Float64[ndarray, "T 3"]) -> Bool[ndarray, " T"]:
     """Whether each fragment has its point, within FLAT of its size."""
     corners, normals = fragments.corners.astype(np.float64), fragments.normals
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)

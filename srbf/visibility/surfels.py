@@ -138,7 +138,7 @@ def surfels_of(
     of_cell[owner], in_gap[owner] = sides.objects, sides.hidden
     own = np.maximum(np.bincount(owner, sides.fragments.areas, count), 1e-30)
     flux = np.stack([np.bincount(owner, sides.fragments.areas * sides.emission[:, c], count) for c in range(3)], axis=1)
-    cells = grouped_cells(sides.fragments, owner)
+    cells = grouped_cells(sides.fragments, owner).with_patches(np.arange(count))
     radiance = (flux / own[:, None]).astype(np.float32)
     return Surfels(cells, surfaces.corners, owners.reshape(2, -1), of_cell, radiance, in_gap)
 
@@ -243,13 +243,13 @@ def cut_at_walls(surfaces: Fragments, occluders: EmbreeTriangles, gap: float) ->
                 direction = vector / np.maximum(distance, 1e-30)[:, None]
                 hidden |= occluders.occluded(middle.astype(np.float32), direction, distance)
         done.append((corners[~hidden], albedo[~hidden], source[~hidden]))
-        corners, albedo, source = _halves(corners[hidden]), np.repeat(albedo[hidden], 2, axis=0), np.repeat(source[hidden], 2)
+        corners, albedo, source = halves(corners[hidden]), np.repeat(albedo[hidden], 2, axis=0), np.repeat(source[hidden], 2)
     done.append((corners, albedo, source))
     every = [np.concatenate(part) for part in zip(*done, strict=True)]
     return Fragments(every[0], every[1]), every[2]
 
 
-def _halves(corners: Float32[ndarray, "T 3 3"]) -> Float32[ndarray, "U 3 3"]:
+def halves(corners: Float32[ndarray, "T 3 3"]) -> Float32[ndarray, "U 3 3"]:
     """Every triangle cut through the middle of its longest edge; the halves of one follow each other."""
     edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
     turn = (edges.argmax(axis=1)[:, None] + np.arange(3)) % 3

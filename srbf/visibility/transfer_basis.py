@@ -65,7 +65,10 @@ class Emitted:
 
 
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
-    """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments."""
+    """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments.
+
+    `received`: on cells of which the patches are the surfels.
+    """
     rng = np.random.default_rng(seed)
     cells = operator.cells
     placed = free[rng.permutation(len(free))[:PLACED]]
@@ -79,7 +82,7 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         dx, dy, dz = (direction / np.linalg.norm(direction)).tolist()
         outer = float(rng.uniform(*CONE))
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
-    inside = np.stack([received.irradiance(light)[:, 0] for light in lights], axis=1).astype(np.float32)
+    inside = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
     return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
 
 
