@@ -19,6 +19,7 @@ from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
 from srbf.visibility.environment_rays import EnvironmentSampler
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
+from srbf.visibility.outlines import outlines
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
 from srbf.visibility.shadow import rounded_share
 from srbf.visibility.shadow_rays import RAY_OFFSET, ShadowRays
@@ -76,10 +77,12 @@ class RayTracer:
         if receivers.camera is not None and receivers.quantity == "radiance":
             self._pure = self._materials_of_pixels()
         self._bumps: tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None = None
+        self._outlines = np.zeros(height * width, bool)
         if receivers.camera is None:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
         else:
             self._bumps = self._bumped()
+            self._outlines = outlines(receivers.images["position"], receivers.images["normal"]).ravel()
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; named lights add nothing."""
@@ -128,7 +131,7 @@ class RayTracer:
         partly = (weight > 0) & (weight < FIRST_SAMPLES)
         refined = np.zeros(len(weight), bool)
         for _ in range(SPREAD_ROUNDS if _has_size(light) else 1):
-            new = self._texels[((sums.ragged() | partly) & ~refined)[self._texels]]
+            new = self._texels[((sums.ragged() | partly | self._outlines) & ~refined)[self._texels]]
             self._refine(sums, light, new, range(FIRST_SAMPLES, self._count))
             refined[new] = True
         edges = np.flatnonzero(refined & sums.edges())
