@@ -13,6 +13,7 @@ import numpy as np
 from blender_bake.emission_switch import emits
 from blender_bake.fragment_albedo import EMISSION, GRAY, Attributes, Kinds, even_albedo, faces_front, varies, varying_albedo
 from blender_bake.ipc import Events, WorkerError
+from blender_bake.reflected import reflection_alone
 from blender_bake.scene_file import Shown, corners_of, rendered, show_as_rendered
 from blender_bake.translucency import _passes
 from blender_bake.without_triangles import is_only_volume
@@ -65,7 +66,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     """All surfaces that render and that diffuse rays see, as T fragments: triangles with no edge longer than `longest` meters.
 
     corners (T, 3, 3) float32 in the world, wound so that normals point as they render; albedo (T, 3) float32, diffuse color by Cycles: 0 of
-    metal, glass and black, with `gloss` also what gloss reflects, as if it were diffuse; object (T,) int32 of `names`, a list; transparent
+    metal, glass and black, without translucency, with `gloss` also what gloss reflects, as if it were diffuse; object (T,) int32 of
+    `names`, a list; transparent
     (T,) bool: of a material that light passes; occluders (O, 3, 3) float32: the undivided triangles that cast shadows and are not
     transparent; emission (T, 3) float32, radiance of the front, and one_sided (T,) bool: of a material whose back may emit less, see
     `faces_front`; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
@@ -78,7 +80,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     divided = _divide(shapes, placed, longest)
     if divided > 1.001 * longest:
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
-    transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
+    with reflection_alone():
+        transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
     _shine(scene, shapes)
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from blender_bake.channels import chosen
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
 from blender_bake.ipc import Events, WorkerError
+from blender_bake.reflected import reflection_alone
 from blender_bake.request import RenderRequest
 from blender_bake.translucency import Switch, switched
 
@@ -207,7 +209,8 @@ class ViewReceiver:
             if self._gloss:
                 lobes.add(self._layer)
                 names = (*names, "Glossy Color", lobes.AOV)
-            self._measured_passes = self._render(self._coverage_samples, 0, names)
+            with reflection_alone() if self._gloss else nullcontext():
+                self._measured_passes = self._render(self._coverage_samples, 0, names)
             lobes.remove(self._layer)
         return self._measured_passes
 

@@ -247,6 +247,37 @@ def large() -> dict[str, Any]:
     }
 
 
+def cloth() -> dict[str, Any]:
+    """A square of cloth that reflects 0.4 and lets 0.3 through, its color linked; and whether the link is there afterwards."""
+    import bpy
+
+    from blender_bake import surfaces
+
+    scene = new_scene()
+    material = bpy.data.materials.new("Cloth")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    diffuse, through = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeBsdfTranslucent")
+    diffuse.inputs["Color"].default_value = (0.4, 0.4, 0.4, 1)
+    color = nodes.new("ShaderNodeRGB")
+    color.outputs[0].default_value = (0.3, 0.3, 0.3, 1)
+    links.new(color.outputs[0], through.inputs["Color"])
+    both, output = nodes.new("ShaderNodeAddShader"), nodes.new("ShaderNodeOutputMaterial")
+    links.new(diffuse.outputs[0], both.inputs[0])
+    links.new(through.outputs[0], both.inputs[1])
+    links.new(both.outputs[0], output.inputs["Surface"])
+    add("Curtain", mesh_of("Curtain", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)], material))
+    found = surfaces.fragments(scene, 1.0, Silent())  # type: ignore[arg-type]
+    return {"albedo": found["albedo"], "linked": np.array(len(through.inputs["Color"].links))}
+
+
+def test_light_that_cloth_lets_through_is_not_reflected() -> None:
+    found = in_blender(cloth)
+    np.testing.assert_allclose(found["albedo"], 0.4, atol=2e-3)
+    assert found["linked"] == 1
+
+
 def test_large_scenes_are_divided_less() -> None:
     found = in_blender(large)
     assert 50_000 < found["ground"] <= 400_000 and 2 < found["longest"] < 10
