@@ -8,7 +8,7 @@ from srbf.visibility.outlines import outlines
 def plane(height: float, width: int = 6) -> tuple[np.ndarray, np.ndarray]:
     """Positions and normals of a floor at a height, seen from above, a pixel a meter wide."""
     y, x = np.mgrid[0:width, 0:width].astype(np.float32)
-    return np.stack([x, y, np.full_like(x, height)], axis=2), np.broadcast_to(np.float32([0, 0, 1]), (width, width, 3)).copy()
+    return np.stack([x, y, np.full_like(x, height)], axis=2), np.broadcast_to(np.array([0, 0, 1], np.float32), (width, width, 3)).copy()
 
 
 def test_one_plane_has_none() -> None:

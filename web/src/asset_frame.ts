@@ -2,16 +2,19 @@
 import type { Asset } from "./asset";
 import { environmentSamples } from "./environment";
 import { SrbfError } from "./errors";
-import { type AreaLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
+import { type AreaLight, type EnvironmentLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
 import { lightDomainOf } from "./manifest";
-import type { Triple } from "./matrix";
+import type { Matrix4, Triple } from "./matrix";
 
 /** A unit direction from the surface to the light, in the asset's frame, and its irradiance. */
 export type DistantLight = readonly [direction: Triple, color: Triple];
 
 export interface LightsInAssetFrame {
-  /** Directional lights and the texels of environments, made as they are asked for, once. */
+  /** Directional lights and, of assets of directions, the texels of environments, made as they are asked for, once. */
   readonly distant: Iterable<DistantLight>;
+  /** Environments around lights inside a scene, in the asset's world. */
+  readonly environments: readonly EnvironmentLight[];
+  readonly assetFromWorld: Matrix4;
   /** Point, spot and sphere lights. */
   readonly punctual: readonly PunctualLight[];
   readonly areas: readonly AreaLight[];
@@ -24,23 +27,26 @@ const TAKEN = {
   named: ["named"],
   cloud: ["point", "spot", "sphere", "area", "directional"],
   pool: ["point", "spot", "sphere", "area", "directional"],
-  surfels: ["point", "spot", "sphere", "area", "directional", "named"],
+  surfels: ["point", "spot", "sphere", "area", "directional", "environment", "named"],
 } as const;
 
 /** `lights` are in the asset's world. @throws SrbfError on kinds that the asset cannot be relit by. */
 export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, lights: readonly Light[]): LightsInAssetFrame {
   const { assetFromWorld, manifest } = asset;
-  const taken: readonly string[] = TAKEN[lightDomainOf(manifest)];
+  const domain = lightDomainOf(manifest);
+  const taken: readonly string[] = TAKEN[domain];
   const other = lights.find((light) => !taken.includes(light.kind));
   if (other) throw new SrbfError(`expected lights of ${taken.join(", ")} for this asset, found a ${other.kind} one; bake the scene with that light set`);
   function* distant(): Generator<DistantLight> {
     for (const light of lights) {
       if (light.kind === "directional") yield [moved(light, assetFromWorld).direction, light.color];
-      if (light.kind === "environment") yield* environmentSamples(light, manifest.domain, assetFromWorld);
+      if (light.kind === "environment" && domain === "directions") yield* environmentSamples(light, manifest.domain, assetFromWorld);
     }
   }
   return {
     distant: distant(),
+    environments: domain === "directions" ? [] : lights.filter((light) => light.kind === "environment"),
+    assetFromWorld,
     punctual: lights.filter(isPunctual).map((light) => moved(light, assetFromWorld)),
     areas: lights.filter((light) => light.kind === "area").map((light) => moved(light, assetFromWorld)),
     named: lights.filter((light) => light.kind === "named"),

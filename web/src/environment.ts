@@ -1,20 +1,32 @@
 /** An equirectangular map as many directional lights: `srbf.light_geometry.environment_samples`. */
 import type { DistantLight } from "./asset_frame";
 import type { EnvironmentLight } from "./lights";
-import { determinant, type Matrix4, turned } from "./matrix";
+import { determinant, type Matrix4, type Triple, turned } from "./matrix";
 
 const UPRIGHT = 1e-8; // how far the rotated zenith may be from (0, 0, 1), as in numpy.allclose
+
+/** A texel of a map: its unit direction in the asset's frame, and its solid angle (sr). */
+export interface EnvironmentTexel {
+  readonly direction: Triple;
+  readonly solidAngle: number;
+  readonly row: number;
+  readonly column: number;
+}
 
 /**
  * Unit direction of every texel in the asset's frame, and its radiance times solid angle (sr). On the hemisphere only what is above the asset's
  * horizon counts; where the map is upright, a row that straddles the horizon is cut there.
  */
-export function* environmentSamples(
-  light: EnvironmentLight,
-  domain: "sphere" | "hemisphere",
-  assetFromWorld: Matrix4,
-): Generator<DistantLight> {
+export function* environmentSamples(light: EnvironmentLight, domain: "sphere" | "hemisphere", assetFromWorld: Matrix4): Generator<DistantLight> {
   const { width, height, pixels, color } = light;
+  for (const { direction, solidAngle, row, column } of environmentTexels(width, height, domain, assetFromWorld)) {
+    const at = 3 * (row * width + column);
+    yield [direction, [pixels[at] * solidAngle * color[0], pixels[at + 1] * solidAngle * color[1], pixels[at + 2] * solidAngle * color[2]]];
+  }
+}
+
+/** The texels of a map of this size. */
+export function* environmentTexels(width: number, height: number, domain: "sphere" | "hemisphere", assetFromWorld: Matrix4): Generator<EnvironmentTexel> {
   const scale = Math.cbrt(determinant(assetFromWorld));
   const rotation = assetFromWorld.map((row) => row.map((value) => value / scale));
   const up = rotation[2];
@@ -24,18 +36,17 @@ export function* environmentSamples(
     const angle = Math.PI / 2 - row * (Math.PI / height);
     return cut ? Math.max(angle, 0) : angle;
   };
-  for (let r = 0; r < height; ++r) {
-    const top = elevation(r);
-    const bottom = elevation(r + 1);
+  for (let row = 0; row < height; ++row) {
+    const top = elevation(row);
+    const bottom = elevation(row + 1);
     const solidAngle = (Math.sin(top) - Math.sin(bottom)) * ((2 * Math.PI) / width);
     if (solidAngle === 0) continue;
     const center = (top + bottom) / 2;
-    for (let c = 0; c < width; ++c) {
-      const azimuth = (0.5 - (c + 0.5) / width) * 2 * Math.PI;
+    for (let column = 0; column < width; ++column) {
+      const azimuth = (0.5 - (column + 0.5) / width) * 2 * Math.PI;
       const direction = turned(rotation, [Math.cos(center) * Math.cos(azimuth), Math.cos(center) * Math.sin(azimuth), Math.sin(center)]);
       if (domain === "hemisphere" && !upright && direction[2] <= 0) continue;
-      const at = 3 * (r * width + c);
-      yield [direction, [pixels[at] * solidAngle * color[0], pixels[at + 1] * solidAngle * color[1], pixels[at + 2] * solidAngle * color[2]]];
+      yield { direction, solidAngle, row, column };
     }
   }
 }

@@ -1,4 +1,5 @@
 /** The light cloud: indirect light of lights inside the scene, from the responses to patches of its surfaces [Kristensen2005]. */
+import { type EnvironmentManifest, EnvironmentTable } from "../environment_table";
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
@@ -7,14 +8,15 @@ import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
-import { changeable, Surfaces, type SurfacesManifest } from "../surface_changes";
+import { shapeWeights } from "../shape_weights";
+import { Surfaces, type SurfacesManifest } from "../surface_changes";
 import { type Placed, placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
 import type { Fail, Method, ReadOptions, Tables } from "./method";
 
 /** Keys of asset.json that this method adds. */
-interface LightCloudManifest extends ComponentsManifest, PositionManifest, SurfacesManifest {
+interface LightCloudManifest extends ComponentsManifest, PositionManifest, SurfacesManifest, EnvironmentManifest {
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
@@ -36,10 +38,11 @@ export const lightCloud: Method = {
 
   async read(files: AssetFiles, manifest: LightCloudManifest, { exact = false }: ReadOptions = {}): Promise<Tables> {
     const functions = functionsOf(manifest);
-    const [parts, table, rays] = await Promise.all([
+    const [parts, table, rays, environment] = await Promise.all([
       readWeightedComponents(files, manifest),
       manifest.position_table && PositionTable.read(files, manifest, functions),
       hasRays(manifest) ? Rays.read(files, manifest, functions) : undefined,
+      EnvironmentTable.read(files, manifest),
     ]);
     const { surfels, surfaces } = rays ?? {};
     let version = 0; // of the surfaces
@@ -57,6 +60,7 @@ export const lightCloud: Method = {
       projectsPunctual: true,
       surfels,
       surfaces,
+      environment,
       projectedWeights(lights) {
         const out = new Float64Array(3 * functions);
         const used = new Map<string, Float64Array>();
@@ -71,7 +75,8 @@ export const lightCloud: Method = {
           for (let i = 0; i < out.length; ++i) out[i] += weights[i] * light.color[i % 3];
         }
         known = used;
-        if (lights.named.length) summed(valuesOf(surfels), changeable(surfaces).emission(lights.named)).forEach((weight, i) => (out[i] += weight));
+        const added = shapeWeights({ surfaces, environment }, lights);
+        if (added) summed(valuesOf(surfels), added).forEach((weight, i) => (out[i] += weight));
         return out;
       },
     };

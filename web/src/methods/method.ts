@@ -1,5 +1,6 @@
 /** What a method is to the rest of this package. A method is one file in this folder, one line in `index.ts`, and its shader in `../shaders`. */
 import type { LightsInAssetFrame } from "../asset_frame";
+import type { EnvironmentTable } from "../environment_table";
 import type { AssetFiles } from "../files";
 import type { Gather } from "../gather";
 import type { ByteImage, FloatImage, HalfImage } from "../image";
@@ -68,6 +69,8 @@ export interface Tables {
   readonly surfels?: Surfels;
   /** Surfels and links, of deep framebuffers. */
   readonly gather?: Gather;
+  /** Environments by the directions that the surfels see, of assets of transfer in open scenes. */
+  readonly environment?: EnvironmentTable;
   /** Objects that emit or are repainted, of assets fitted with `--editable`. */
   readonly surfaces?: Surfaces;
   /** Sum over lights of color times light function: RGB for each function, (F, 3), F = width * height of `weights`. */

@@ -8,7 +8,7 @@ import clustersStage from "../../../glsl/stages/deep_framebuffer_clusters.frag";
 import sumStage from "../../../glsl/stages/deep_framebuffer_sum.frag";
 import { SrbfError } from "../errors";
 import { ACROSS, type Gather, type PackedLinks } from "../gather";
-import type { NamedLight } from "../lights";
+import type { ShapeLights } from "../shape_weights";
 import type { Triple } from "../matrix";
 import { packedCells } from "../surfels";
 import type { ShadowedLook } from "./engine_shadows";
@@ -59,8 +59,8 @@ export class GatherWeights {
     return this.sums[0].texture;
   }
 
-  setEmission(emitting: readonly NamedLight[]): void {
-    if (emitting.length) throw new SrbfError(`expected lights inside the scene for a deep framebuffer, found ${JSON.stringify(emitting[0].name)}`);
+  setShapes({ named }: ShapeLights): void {
+    if (named.length) throw new SrbfError(`expected lights inside the scene for a deep framebuffer, found ${JSON.stringify(named[0].name)}`);
   }
 
   /** Draw the irradiance under lights, each a list of looks of one color; within `undisturbed`. */

@@ -2,8 +2,8 @@
 import type { Texture, WebGLRenderer } from "three";
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
-import type { NamedLight } from "../lights";
 import type { Triple } from "../matrix";
+import type { ShapeLights } from "../shape_weights";
 import type { ShadowedLook } from "./engine_shadows";
 import { GatherWeights } from "./gather_weights";
 import { SurfelWeights } from "./surfel_weights";
@@ -15,8 +15,8 @@ export interface GpuWeights {
   readonly weights: Texture;
   /** Draw the weights under lights, each a list of looks; within `undisturbed`. */
   draw(renderer: WebGLRenderer, lights: readonly (readonly ShadowedLook[])[]): void;
-  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
-  setEmission(emitting: readonly NamedLight[]): void;
+  /** Take the objects that emit, and environments. @throws SrbfError where there are some that the asset does not know. */
+  setShapes(lights: ShapeLights): void;
   dispose(): void;
 }
 

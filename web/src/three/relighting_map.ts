@@ -6,6 +6,7 @@ import { SrbfError } from "../errors";
 import { receiversFrom } from "../manifest";
 import { pointLightRoom } from "../point_light";
 import { needPositions, NO_WEIGHTS, uniformVectors } from "../shader";
+import { shapeState } from "../shape_weights";
 import { undisturbed } from "./fullscreen";
 import { checkDrawsFloats, type GpuWeights, gpuWeights } from "./gpu_weights";
 import { type Added, LightmapPass, type TargetOptions } from "./lightmap_pass";
@@ -146,9 +147,9 @@ export class SrbfRelightingMap extends SceneAsset {
   private drawWeights(gpu: GpuWeights, renderer: WebGLRenderer | undefined): string {
     if (!renderer) throw new SrbfError('expected a renderer to draw weights with, found none; call update(renderer), or take weights: "cpu"');
     const lights = this.looks(renderer, gpu.middle);
-    const named = this.emitting();
-    gpu.setEmission(named);
-    const state = lights.flat().some(({ shadow }) => shadow) ? "" : JSON.stringify([lights, named, this.asset.tables.surfaces?.version]);
+    const shapes = this.shapeLights();
+    gpu.setShapes(shapes);
+    const state = lights.flat().some(({ shadow }) => shadow) ? "" : JSON.stringify([lights, shapeState(shapes), this.asset.tables.surfaces?.version]);
     if (!state || state !== this.weighed) {
       checkDrawsFloats(renderer);
       undisturbed(renderer, () => gpu.draw(renderer, lights));

@@ -1,14 +1,16 @@
 /** What both renderers' classes share: an asset with lights in a three.js scene. */
-import { type Light as ThreeLight, Matrix4 } from "three";
+import { type Light as ThreeLight, Matrix4, type Texture } from "three";
 import type { Asset } from "../asset";
 import { inAssetFrame } from "../asset_frame";
 import { SrbfError } from "../errors";
-import { type Light, moved, type NamedLight, namedLight } from "../lights";
+import { type Light, moved, namedLight } from "../lights";
 import { asDesigned, put, setNamedLight } from "../named_lights";
 import { multiplied, type Triple, Z_UP_FROM_Y_UP } from "../matrix";
 import { type FrameValues, frameValues } from "../shader";
+import type { ShapeLights } from "../shape_weights";
 import { changeable } from "../surface_changes";
 import { looksOf, placed } from "../surfels";
+import { environmentOf } from "./environment";
 import { engineShadow, type ShadowedLook, type Shadowing } from "./engine_shadows";
 import { rowsOf, threeMatrix } from "./rows";
 import { checkKind, lightOf, type SceneLight } from "./scene_lights";
@@ -61,6 +63,18 @@ export class SceneAsset {
     return this;
   }
 
+  /**
+   * Let an equirectangular map of three's shine from all around, `scene.environment` say, by its radiance times `intensity`; none ends it. Bounces alone
+   * of an indirect asset: three adds what comes straight from the map.
+   *
+   * @throws SrbfError on other textures; `update` does on assets that know no environment.
+   */
+  setEnvironment(map?: Texture | null, intensity = 1): this {
+    const others = this.lights.filter((light) => light.kind !== "environment");
+    this.lights.splice(0, this.lights.length, ...others, ...(map ? [environmentOf(map, intensity)] : []));
+    return this;
+  }
+
   /** Read three.js lights at every `update`. @throws SrbfError on kinds other than directional, point, spot and area. */
   follow(...lights: ThreeLight[]): this {
     for (const light of lights) {
@@ -99,9 +113,9 @@ export class SceneAsset {
     });
   }
 
-  /** The objects that emit. */
-  protected emitting(): NamedLight[] {
-    return this.lights.filter((light) => light.kind === "named");
+  /** The objects that emit, and environments. */
+  protected shapeLights(): ShapeLights {
+    return inAssetFrame(this.asset, this.lights.filter((light) => light.kind === "named" || light.kind === "environment"));
   }
 
   /** The current lights' numbers for shaders. */

@@ -6,12 +6,11 @@ import type { DataTexture, Texture, WebGLRenderer, WebGLRenderTarget } from "thr
 import type { Asset } from "../asset";
 import { SrbfError } from "../errors";
 import type { LightValues } from "../light_values";
-import type { NamedLight } from "../lights";
 import type { Triple } from "../matrix";
 import blockSums from "../shaders/block_sums.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
-import { changeable } from "../surface_changes";
+import { type ShapeLights, shapeState, shapeWeights } from "../shape_weights";
 import { packedCells, square, type Surfels } from "../surfels";
 import type { ShadowedLook } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
@@ -43,7 +42,8 @@ export class SurfelWeights {
   private readonly received: WebGLRenderTarget;
   private readonly means: FullscreenPass;
   private readonly tables: Table[];
-  private surfaces = "";
+  private readonly ranks: number;
+  private shapes = "";
   private version = 0;
   private repainting?: Repainting;
 
@@ -60,6 +60,7 @@ export class SurfelWeights {
     this.ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
     this.received = floatTarget(cells.rangesWidth, cells.rangesHeight);
     this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.direct.normals }, ranges: { value: this.ranges } });
+    this.ranks = surfels.tables[0].functions;
     let numbers = this.received.texture;
     this.tables = surfels.tables.map((values, i) => {
       const [width, height] = i === surfels.tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
@@ -85,15 +86,14 @@ export class SurfelWeights {
     }
   }
 
-  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
-  setEmission(emitting: readonly NamedLight[]): void {
-    const { surfaces } = this.asset.tables;
-    const state = JSON.stringify([emitting, surfaces?.version]);
-    if (state === this.surfaces) return;
-    this.surfaces = state;
-    if (!surfaces && emitting.length === 0) return;
+  /** Take the objects that emit, and environments. @throws SrbfError where there are some that the asset does not know. */
+  setShapes(lights: ShapeLights): void {
+    const { tables } = this.asset;
+    const state = `${shapeState(lights)} ${tables.surfaces?.version}`;
+    if (state === this.shapes) return;
+    this.shapes = state;
     const { added } = this.tables[0];
-    addedNumbers(added, changeable(surfaces).emission(emitting));
+    addedNumbers(added, shapeWeights(tables, lights) ?? new Float64Array(3 * this.ranks));
   }
 
   /** The first table with the albedo that its objects have now. */

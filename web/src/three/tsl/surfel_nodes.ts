@@ -4,10 +4,9 @@ import * as tsl from "three/tsl";
 import type { Renderer } from "three/webgpu";
 import type { Asset } from "../../asset";
 import type { LightValues } from "../../light_values";
-import type { NamedLight } from "../../lights";
 import type { Triple } from "../../matrix";
 import { versine as versineOf } from "../../point_light";
-import { changeable } from "../../surface_changes";
+import { type ShapeLights, shapeState, shapeWeights } from "../../shape_weights";
 import { packedCells, square } from "../../surfels";
 import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
@@ -41,7 +40,8 @@ export class SurfelNodes {
   private readonly tables: Pass[];
   private readonly textures: DataTexture[];
   private readonly added: DataTexture[] = [];
-  private emission = "[]";
+  private readonly ranks: number;
+  private shapes = "";
 
   /** @throws SrbfError on an asset without cells. */
   constructor(
@@ -64,6 +64,7 @@ export class SurfelNodes {
     const received = target(cells.rangesWidth, cells.rangesHeight);
     const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, normals, ranges, cells.width), received);
     this.means = [mean(0), mean(1)];
+    this.ranks = surfels.tables[0].functions;
     this.tables = this.tablePasses(surfels.tables, received);
   }
 
@@ -72,12 +73,12 @@ export class SurfelNodes {
     return this.tables[this.tables.length - 1].target.texture;
   }
 
-  /** Take the objects that emit. @throws SrbfError where there are some on an asset whose surfaces cannot change. */
-  setEmission(emitting: readonly NamedLight[]): void {
-    const state = JSON.stringify(emitting);
-    if (state === this.emission) return;
-    this.emission = state;
-    addedNumbers(this.added[0], changeable(this.asset.tables.surfaces).emission(emitting));
+  /** Take the objects that emit, and environments. @throws SrbfError where there are some that the asset does not know. */
+  setShapes(lights: ShapeLights): void {
+    const state = shapeState(lights);
+    if (state === this.shapes) return;
+    this.shapes = state;
+    addedNumbers(this.added[0], shapeWeights(this.asset.tables, lights) ?? new Float64Array(3 * this.ranks));
   }
 
   draw(renderer: Renderer, looks: readonly ShadowedLook[]): void {
