@@ -27,6 +27,7 @@ SOURCES = {  # of train lights, by light set
     "cloud": "point lights in free space",
     "patches": "patches of the surfaces",
     "gather": "links of view clusters to a pool of surfels in place of train lights",
+    "cubemap": "directions of a cubemap in place of train lights, by rays",
     "surfels": "form factors of surfels in place of train lights",
 }
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from srbf.bake.cubemap_set import CubemapSet
 from srbf.bake.folder import STATE
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, MOST_SURFELS, SURFEL_SIZE, CloudSet, FoundPlaces, NamedSet
@@ -169,7 +170,7 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
     if light_set is None or light_set.is_known:
         return bake
     tested = settings.validation + settings.holdout
-    if isinstance(light_set, (CloudSet, GatherSet)):
+    if isinstance(light_set, (CloudSet, GatherSet, CubemapSet)):
         require_scene(bake.scene)
         key = light_set.key(files.sha256_of(bake.scene), tested, settings.seed, settings.scene)
         kept = light_set.read(bake.folder / LIGHT_SET_FILE, key)
@@ -188,6 +189,8 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
         known = replace(light_set, entries=entries)
     elif isinstance(light_set, GatherSet):
         known = light_set.with_facts(found, say)
+    elif isinstance(light_set, CubemapSet):
+        known = light_set.with_surfels(_with_places(light_set.surfels, found, settings.seed, say))
     else:
         known = _with_places(light_set, found, settings.seed, say)
     return replace(bake, settings=replace(settings, light_set=known))
