@@ -19,7 +19,7 @@ from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
 from srbf.light_domain import Directions, domain_of_capture
-from srbf.methods.clustered_eigen_map import ClusteredEigenMap
+from srbf.methods.clustered_eigen_map import LEAST_TEXELS, TRIED_CLUSTERS, ClusteredEigenMap
 from srbf.methods.protocol import Method, check_error
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
@@ -115,9 +115,10 @@ def _of_cubemap(capture: Capture, size: int, psnr: float | None, error: float | 
         other = "psnr" if error is None else "error"
         raise InputError(f"expected a `budget` for a capture under a cubemap, found `{other}`; or choose a method and its settings")
     numbers, texels = 3 * len(capture.indices("train")), int((capture.coverage() >= COVERED).sum())
-    clustered = [method for method in _candidates(capture, size, texels, numbers) if isinstance(method, ClusteredEigenMap)]
-    fitting = [method for method in clustered if method.clusters <= CUBEMAP_CLUSTERS]
-    return fitting[-1] if fitting else next(iter(_candidates(capture, size, texels, numbers)))
+    many = ClusteredEigenMap.candidates(size, max(texels, LEAST_TEXELS * TRIED_CLUSTERS[0]), numbers)
+    clusters = int(np.clip(texels // LEAST_TEXELS, 1, CUBEMAP_CLUSTERS))
+    first = next(iter(many), None)
+    return next(iter(_candidates(capture, size, texels, numbers))) if first is None else replace(first, clusters=clusters)
 
 
 def _candidates(capture: Capture, size: int, texels: int, numbers: int) -> Iterable[Method]:

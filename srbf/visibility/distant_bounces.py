@@ -16,26 +16,23 @@ from srbf.visibility.element_tracer import ElementTracer
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
 from srbf.visibility.received import starts_of
-from srbf.visibility.refined_visibility import levels_of, nearest_of, typical_spacing
 from srbf.visibility.surfels import Surfels
 
 POINTS = 16  # of a surfel
 LEFT_OUT = 0.01  # of the receivers' bounces under all directions, rms, that the shapes leave out
 MOST_RANK = 256
-JUDGES = 1024  # receivers that the shapes are made for
-SHARE = 1 / 8  # of the receivers, which sparse sampling traces at most
-NEAREST = 4  # receivers that one which is not traced takes its bounces from
+JUDGES, JUDGING = 1024, 1024  # receivers that the shapes are made for, and rays from each
 SPARSE = 0.1  # share of the surfels that exchange light, below which products leave out the others
 BLOCK = 1 << 14  # receivers between two reports of progress
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Rays from each receiver, from each surfel, and whether every receiver and every direction is traced."""
+    """Rays from each receiver and from each surfel, and whether every direction of the cubemap is traced, or one of half its side."""
 
     receiver_rays: int
     surfel_rays: int
-    whole: bool
+    every_direction: bool
 
     @staticmethod
     def full(receivers: int) -> Effort:
@@ -44,8 +41,8 @@ class Effort:
 
     @staticmethod
     def sparse() -> Effort:
-        """A share of the receivers, and a quarter of the directions [Huang2010, section 4.2]."""
-        return Effort(768, 1024, False)
+        """A quarter of the directions, since bounces are smooth [Huang2010, section 4.2], and a few rays to each receiver."""
+        return Effort(256, 512, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +97,11 @@ def traced(
 
     The shapes are the leading axes of what JUDGES receivers get from all directions: T = G K e, G their form factors, K the bounces, e the
     direct light on the surfels. With V (N, r) the right singular vectors, shapes = G K e V and weights = V^T, so that no product has S N S
-    terms. An effort that is not whole traces SHARE of the receivers, from coarse to fine, and a cubemap of half the side.
+    terms.
     """
     from scipy.sparse import csr_array
 
     count = len(origins.weights)
-    chosen = np.arange(count) if effort.whole else _coarse(origins, seed)
     spread = RayOrigins.even(*surfels.spread(POINTS, seed))
     exchange = form_factors(surfels, spread, effort.surfel_rays // POINTS, seed + 1)
     exchange.data[surfels.hidden[np.repeat(np.arange(surfels.count), np.diff(exchange.indptr))] | surfels.hidden[exchange.indices]] = 0
@@ -114,14 +110,14 @@ def traced(
     if most_bounces is not None and most_bounces < SERIES and np.count_nonzero(flux) < SPARSE * flux.size:
         flux = csr_array(flux)
     bounces = [Bounces(flux, surfels.cells.albedo[:, c].astype(np.float64), most_bounces) for c in range(3)]
-    known = cubemap if effort.whole or cubemap.side < 4 else Cubemap(cubemap.side // 2)
+    known = cubemap if effort.every_direction or cubemap.side < 4 else Cubemap(cubemap.side // 2)
     lit, more = light_on_surfels(surfels, known.directions, occluders)
     rays += more
-    judges = chosen[np.random.default_rng(seed).permutation(len(chosen))[:JUDGES]]
+    judges = np.random.default_rng(seed).permutation(count)[:JUDGES]
     of_each = origins.weights.shape[1]
     per_point = max(1, effort.receiver_rays // of_each)
-    judged = form_factors(surfels, _at(origins, judges), per_point, seed + 2).toarray()
-    rays += len(judges) * of_each * per_point
+    judged = form_factors(surfels, _at(origins, judges), JUDGING, seed + 2).toarray()
+    rays += len(judges) * of_each * JUDGING
     gathered = [np.asarray(one.gathered(judged), np.float32) for one in bounces]  # (J, S) of each color
     pictures = [own @ lit for own in gathered]  # (J, N)
     right = _leading(pictures)
@@ -129,13 +125,11 @@ def traced(
         return DistantBounces.none(count, cubemap.count), Mixture.none(surfels.count)
     mixture = np.sum([one.radiosity(np.asarray(lit @ v, np.float32)) for one, v in zip(bounces, right, strict=True)], axis=0)
     shapes = np.zeros((count, mixture.shape[1]), np.float32)
-    for start in range(0, len(chosen), BLOCK):
-        rows = chosen[start : start + BLOCK]
+    for start in range(0, count, BLOCK):
+        rows = np.arange(start, min(start + BLOCK, count))
         shapes[rows] = product(form_factors(surfels, _at(origins, rows), per_point, seed + 3 + start), mixture)
-        progress(start + len(rows), len(chosen))
-    rays += len(chosen) * of_each * per_point
-    if len(chosen) < count:
-        _fill(shapes, origins, chosen)
+        progress(start + len(rows), count)
+    rays += count * of_each * per_point
     weights = np.stack([v.T for v in right], axis=2)
     if known is not cubemap:
         texels, shares = known.bilinear(cubemap.directions)
@@ -145,25 +139,6 @@ def traced(
     inverse = np.linalg.pinv(of_judges.astype(np.float64), rcond=1e-4).astype(np.float32)
     transfer = np.stack([inverse @ own for own in gathered], axis=2)
     return DistantBounces(shapes, weights.astype(np.float32), rays), Mixture(transfer.astype(np.float32))
-
-
-def _coarse(origins: RayOrigins, seed: int) -> Int[ndarray, " n"]:
-    """Receivers of the coarser levels, SHARE of all, or JUDGES."""
-    most = max(JUDGES, int(SHARE * len(origins.weights)))
-    places, normals = origins.points[:, 0], origins.normals[:, 0]
-    found = np.concatenate([rows for _, rows in levels_of(places, normals, seed)])
-    return np.sort(found[:most])
-
-
-def _fill(shapes: Float32[ndarray, "R r"], origins: RayOrigins, known: Int[ndarray, " n"]) -> None:
-    """Means of the NEAREST known rows, by one over the squared distance in place and normal."""
-    places, normals = (np.asarray(array[:, 0], np.float32) for array in (origins.points, origins.normals))
-    rest = np.setdiff1d(np.arange(len(shapes)), known)
-    size = float(np.sqrt(len(shapes) / max(1, len(known)))) * typical_spacing(places.astype(np.float64))
-    near, apart = nearest_of(places, normals, rest, known, size, NEAREST)
-    weight = 1 / np.maximum(apart, 1e-3 * size) ** 2
-    weight /= weight.sum(axis=1, keepdims=True)
-    shapes[rest] = np.einsum("nk,nkr->nr", weight.astype(np.float32), shapes[near], optimize=True)
 
 
 def _leading(pictures: list[Float32[ndarray, "J N"]]) -> list[Float32[ndarray, "N r"]]:

@@ -1,4 +1,4 @@
-"""Sparse sampling of visibility beside brute force: all elements, none that vary, order, seeds, receivers that are inside, alike, or alone."""
+"""Sparse sampling of visibility beside brute force: nothing that varies, order, seeds, receivers that are inside, alike, or alone."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ pytest.importorskip("embreex")
 
 CUBEMAP = Cubemap(8)
 SIDE = 40
+UP = np.array([0, 0, 1], np.float32)
 Sample = Callable[[ElementTracer, Cubemap, int], SampledVisibility]
 SAMPLERS = pytest.mark.parametrize("sample", [refined, pytest.param(sparsely_sampled, marks=pytest.mark.slow)])
 ALIKE = 0.02  # of the elements of equal receivers that may differ, since some are dense and some are not
@@ -28,7 +29,7 @@ def grid(side: int = SIDE) -> tuple[np.ndarray, np.ndarray]:
     """Places of a square of 4 m at z = 0, and their normals."""
     x, y = np.meshgrid(*[np.linspace(-2, 2, side)] * 2)
     places = np.stack([x.ravel(), y.ravel(), np.full(x.size, 1e-4)], axis=1)
-    return places.astype(np.float32), np.tile(np.float32([0, 0, 1]), (x.size, 1))
+    return places.astype(np.float32), np.tile(UP, (x.size, 1))
 
 
 def tracer_of(corners: np.ndarray, order: np.ndarray | None = None, cubemap: Cubemap = CUBEMAP, side: int = SIDE) -> ElementTracer:
@@ -65,7 +66,7 @@ def test_asking_for_every_element_is_brute_force() -> None:
     bits = np.zeros((tracer.count, tracer.row_bytes), np.uint8)
     rows = np.random.default_rng(0).permutation(tracer.count)
     for part in np.array_split(rows, 3):
-        tracer.add_seen(bits, part, np.full((len(part), tracer.row_bytes), 255, np.uint8)[:, :] & tracer.above_bits(part))
+        tracer.add_seen(bits, part, tracer.above_bits(part))
     np.testing.assert_array_equal(bits, tracer_of(BALL).all_seen())
     row, column = np.divmod(np.arange(0, tracer.count * CUBEMAP.count, 97), CUBEMAP.count)
     single = tracer.seen(row, column) & (tracer.directions[column, 2] > 0)
@@ -104,7 +105,7 @@ def test_the_order_of_receivers_changes_little_and_a_seed_nothing(sample: Sample
 @SAMPLERS
 def test_receivers_inside_geometry_see_nothing_and_duplicates_agree(sample: Sample) -> None:
     places, normals = grid()
-    inside = np.tile(np.float32([0, 0, 0.9]), (40, 1))
+    inside = np.tile(np.array([0, 0, 0.9], np.float32), (40, 1))
     starts = np.concatenate([places, inside, np.repeat(places[:1], 40, axis=0)])
     facing = np.concatenate([normals, normals[:80]])
     tracer = ElementTracer(starts, facing, CUBEMAP.directions.astype(np.float32), EmbreeTriangles(BALL))
@@ -118,8 +119,8 @@ def test_receivers_inside_geometry_see_nothing_and_duplicates_agree(sample: Samp
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_a_few_receivers_far_apart(sample: Sample, count: int) -> None:
     """None has neighbors near it: each is sampled by itself."""
-    places = np.float32([[1000.0 * i, 0, 1e-4] for i in range(count)])
-    normals = np.tile(np.float32([0, 0, 1]), (count, 1))
+    places = np.array([[1000.0 * i, 0, 1e-4] for i in range(count)], np.float32)
+    normals = np.tile(UP, (count, 1))
     tracer = ElementTracer(places, normals, CUBEMAP.directions.astype(np.float32), EmbreeTriangles(BALL))
     found = sample(tracer, CUBEMAP, 0)
     assert found.bits.shape == (count, tracer.row_bytes) and under_suns(found.bits, tracer.all_seen(), tracer) < 0.2
@@ -138,7 +139,8 @@ def test_a_quarter_of_the_directions_is_asked_for_where_nothing_changes() -> Non
     tracer = tracer_of(quad([90, 90, -1], [91, 90, -1], [91, 91, -1], [90, 91, -1]))
     bits, changed = (np.zeros((tracer.count, tracer.row_bytes), np.uint8) for _ in range(2))
     asked = coarse_rows(tracer, CUBEMAP, np.arange(9), bits, changed)
-    assert asked == 9 * CUBEMAP.coarse.sum() + np.count_nonzero(changed) or asked >= 9 * CUBEMAP.coarse.sum()
+    flat = np.unpackbits(changed[:9], axis=1).sum()
+    assert 9 * CUBEMAP.coarse.sum() <= asked and flat == 0
     np.testing.assert_array_equal(bits[:9], tracer.above_bits(np.arange(9)))
 
 
