@@ -29,7 +29,7 @@ class CapturedLight:
     `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
     `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
     as the file of a mask or as flat indices (row by row from the top); None: all of them. `column`: the texel of a cubemap that it is,
-    whose image is made from `file` on request.
+    whose image is made on request, and `file` its name alone.
     """
 
     place: tuple[float, float, float]

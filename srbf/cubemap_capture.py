@@ -22,7 +22,7 @@ BLOCK = 64  # images made at a time
 def train_lights(told: dict[str, Any]) -> list[CapturedLight]:
     """The lights that the key `cubemap` of a manifest stands for: a directional one of each texel, in order."""
     directions = Cubemap(int(told["side"])).directions.tolist()
-    return [CapturedLight((x, y, z), "train", told["visibility"], column=i) for i, (x, y, z) in enumerate(directions)]
+    return [CapturedLight((x, y, z), "train", f"{told['visibility']}#{i}", column=i) for i, (x, y, z) in enumerate(directions)]
 
 
 class CubemapCapture(Capture):

@@ -16,6 +16,7 @@ from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, write_arrays
 from srbf.errors import ImageError, ManifestError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
+from srbf.info import describe
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.lights import DirectionalLight
@@ -83,6 +84,9 @@ def test_every_texel_is_a_train_light(capture: Capture) -> None:
     assert isinstance(capture, CubemapCapture) and capture.is_cubemap and capture.kind == "directional"
     assert len(capture.indices("train")) == 6 * SIDE**2 and capture.indices("holdout") == [6 * SIDE**2, 6 * SIDE**2 + 1]
     np.testing.assert_allclose(capture.directions(capture.indices("train")), Cubemap(SIDE).directions)
+    told = describe(capture.folder)
+    assert told["lights"] == {"train": 6 * SIDE**2, "validation": 0, "holdout": 2} and told["cubemap"]["side"] == SIDE
+    assert len({light.file for light in capture.lights}) == len(capture.lights)
 
 
 def test_images_are_visibility_times_cosine_and_bounces(capture: Capture) -> None:

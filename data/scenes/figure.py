@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A figure on a ground of 29,241 vertices, as all-frequency transport is measured on: `python figure.py NAME OUT.blend`.
 
-`head` (7,958 vertices), `stone` (a bumpy ball of 10,242), `large` (the head with 31,658) and `bench` (seats of thin slats, and lamps).
+`head` (7,958 vertices), `stone` (a bumpy ball of 10,242), `large` (the head with 31,658) and `bench` (seats of thin slats, and posts).
 The objects are called Figure and Ground; both are diffuse.
 """
 
@@ -88,7 +88,7 @@ def part(x, y, z, width, depth, height):
 
 
 def bench():
-    """Two benches of slats, back to back, and a lamp beside each."""
+    """Two benches of slats, back to back, and a post beside each."""
     boxes = []
     for side in (-1, 1):
         boxes += [(0, side * (0.15 + 0.09 * i), 0.42, 1.8, 0.05, 0.03) for i in range(5)]

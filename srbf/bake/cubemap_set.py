@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,10 +14,13 @@ from srbf.bake.point_lights import Box, parse_box
 from srbf.capture import Capture
 from srbf.cubemap import Cubemap
 from srbf.errors import InputError
+from srbf.visibility.distant_bounces import Effort, light_on_surfels
+from srbf.visibility.embree import EmbreeTriangles
 
 Sampling = Literal["auto", "full", "neighbors", "l1"]
 WORD = "cubemap:"
 SURFELS = 3000  # about, between which light bounces
+PROBES = 100  # directions whose rays are timed for an estimate
 
 
 @dataclass(frozen=True)
@@ -108,3 +112,16 @@ class CubemapSet:
         return trace_cubemap(
             receivers, found.surfels, found.bounces, found.checksum, Cubemap(self.side), self.sampling, roles, seed, progress, say
         )
+
+
+def seconds_of_rays(light_set: CubemapSet, receivers: int) -> float:
+    """How long all rays of a `full` bake take, from those of a few directions at the surfels; `sparse` ones take less."""
+    found = light_set.surfels.found
+    assert found is not None and found.surfels is not None
+    directions = Cubemap(light_set.side).directions
+    began = time.perf_counter()
+    _, traced = light_on_surfels(found.surfels, directions[:: max(1, len(directions) // PROBES)], EmbreeTriangles(found.surfels.corners))
+    each = (time.perf_counter() - began) / max(1, traced)
+    effort = Effort.full(receivers)
+    bounced = receivers * effort.receiver_rays + found.surfels.count * effort.surfel_rays
+    return each * (receivers * len(directions) / 2 + bounced)

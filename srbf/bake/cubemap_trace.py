@@ -159,7 +159,7 @@ class _Stages:
             )
         arrays: dict[str, ndarray] = {
             "shapes": bounces.shapes.astype(np.float16),
-            "weights": bounces.weights.astype(np.float32),
+            "weights": bounces.weights.astype(np.float16),
             "transfer": mixture.transfer.astype(np.float16),
             "rays": np.array(bounces.rays),
             "cpu_seconds": np.array(time.process_time() - began),

@@ -12,7 +12,7 @@ from srbf.basis.gaussian import weight
 from srbf.basis.light_functions import LightFunctions
 from srbf.sphere import mean_spacing
 
-SPREAD = 0.7  # of the directions' mean spacing: wide enough for no dips between them, narrow enough to be well-conditioned
+SPREAD = 0.9  # of the directions' mean spacing: wide enough for no dips between them, narrow enough to be well-conditioned
 RIDGE = 0.02  # on the diagonal of the Gaussians' matrix, whose entries are 1 there: takes off what overshoots at shadow edges
 
 

@@ -131,6 +131,7 @@ def traced(
         progress(start + len(rows), count)
     rays += count * of_each * per_point
     weights = np.stack([v.T for v in right], axis=2)
+    scale = np.float32(np.sqrt(known.count))  # weights of a mean square of 1 over directions and colors together, as half floats hold them
     if known is not cubemap:
         texels, shares = known.bilinear(cubemap.directions)
         weights = np.einsum("rnkc,nk->rnc", weights[:, texels], shares, optimize=True)
@@ -138,7 +139,7 @@ def traced(
     of_judges = judged @ mixture
     inverse = np.linalg.pinv(of_judges.astype(np.float64), rcond=1e-4).astype(np.float32)
     transfer = np.stack([inverse @ own for own in gathered], axis=2)
-    return DistantBounces(shapes, weights.astype(np.float32), rays), Mixture(transfer.astype(np.float32))
+    return DistantBounces(shapes / scale, (scale * weights).astype(np.float32), rays), Mixture((scale * transfer).astype(np.float32))
 
 
 def _leading(pictures: list[Float32[ndarray, "J N"]]) -> list[Float32[ndarray, "N r"]]:

@@ -41,7 +41,7 @@ def whole(scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def same(one: Path, other: Path) -> None:
-    """All that two captures hold, but for how long they took."""
+    """All that two captures hold, except how long they took."""
     assert (one / "capture.json").read_bytes() == (other / "capture.json").read_bytes()
     for name in (VISIBILITY_FILE, BOUNCES_FILE):
         with np.load(one / name) as a, np.load(other / name) as b:

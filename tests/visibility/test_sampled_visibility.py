@@ -1,4 +1,4 @@
-"""Sparse sampling of visibility beside brute force: nothing that varies, order, seeds, receivers that are inside, alike, or alone."""
+"""Sparse sampling of visibility beside brute force: nothing that varies, order, seeds, receivers that are inside, equal, or alone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIDE = 40
 UP = np.array([0, 0, 1], np.float32)
 Sample = Callable[[ElementTracer, Cubemap, int], SampledVisibility]
 SAMPLERS = pytest.mark.parametrize("sample", [refined, pytest.param(sparsely_sampled, marks=pytest.mark.slow)])
-ALIKE = 0.02  # of the elements of equal receivers that may differ, since some are dense and some are not
+EQUAL_ROWS = 0.02  # of the elements of equal receivers that may differ, since some are dense and some are not
 GOOD = {"refined": 0.03, "sparsely_sampled": 0.15}  # relative RMSE under suns, of few receivers and wide texels
 
 
@@ -112,7 +112,7 @@ def test_receivers_inside_geometry_see_nothing_and_duplicates_agree(sample: Samp
     found = sample(tracer, CUBEMAP, 0).bits
     assert not found[len(places) : len(places) + 40].any()
     corner = np.unpackbits(found[len(places) + 40 :], axis=1)
-    assert (corner != corner[0]).mean() < ALIKE and corner.any()
+    assert (corner != corner[0]).mean() < EQUAL_ROWS and corner.any()
 
 
 @SAMPLERS
