@@ -86,7 +86,7 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
         count = settings.width * settings.height if facts["receivers"][0]["kind"] == "lightmap" else facts["receivers"][0]["count"]
         count = facts.get("covered_texels", count)
         train, at = Cubemap(settings.light_set.side).count, "a ray"
-        roles = Counter(validation=settings.validation, holdout=settings.holdout)
+        roles.update({"validation": settings.validation, "holdout": settings.holdout})
         time = seconds_of_rays(settings.light_set, count)
         disk = count * train // 8
     first, *more = facts["receivers"]
