@@ -95,24 +95,20 @@ def read_transport(folder: Path, told: dict[str, Any], texels: int) -> CubemapTr
 @lru_cache(maxsize=2)
 def _read(paths: tuple[Path, ...], stamps: tuple[int, ...], side: int, texels: int) -> CubemapTransport:
     visibility, bounces = (stored_arrays(path) for path in paths)
+    cubemap = Cubemap(side)
+    if visibility is None or bounces is None:
+        raise _damaged(paths[0].parent)
     try:
-        assert visibility is not None and bounces is not None
-        found = CubemapTransport(
-            Cubemap(side),
-            texels,
-            visibility["receivers"].astype(np.int64),
-            visibility["normals"],
-            visibility["bits"],
-            bounces["shapes"].astype(np.float32),
-            bounces["weights"].astype(np.float32),
-        )
-        count, directions = len(found.receivers), found.cubemap.count
-        shapes = (found.bits.shape, found.normals.shape, found.shapes.shape[0], found.weights.shape[1:])
-        if shapes != ((count, -(-directions // 8)), (count, 3), count, (directions, 3)) or found.receivers.max(initial=0) >= texels:
-            raise _damaged(paths[0].parent)
-    except (AssertionError, KeyError) as error:
+        receivers, normals, bits = (visibility[name] for name in ("receivers", "normals", "bits"))
+        shapes, weights = (bounces[name].astype(np.float32) for name in ("shapes", "weights"))
+    except KeyError as error:
         raise _damaged(paths[0].parent) from error
-    return found
+    count, directions = len(receivers), cubemap.count
+    expected = ((count, -(-directions // 8)), (count, 3), (count, len(weights)), (len(weights), directions, 3))
+    found = (bits.shape, normals.shape, shapes.shape, weights.shape)
+    if found != expected or receivers.max(initial=0) >= texels:
+        raise _damaged(paths[0].parent)
+    return CubemapTransport(cubemap, texels, receivers.astype(np.int64), normals.astype(np.float32), bits, shapes, weights)
 
 
 def _damaged(folder: Path) -> ImageError:

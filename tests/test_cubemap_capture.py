@@ -173,7 +173,7 @@ def test_damaged_files_are_named_in_one_line(capture: Capture, name: str, damage
             "made",
             bits=np.zeros((3, 3), np.uint8),
             receivers=np.arange(3),
-            normals=np.zeros((3, 3)),
+            normals=np.zeros((3, 3), np.float32),
             shapes=np.zeros((3, 1)),
             weights=np.zeros((1, 3, 3)),
         )
