@@ -84,6 +84,10 @@ class Capture(ReceiverImages):
         schemas.check_version(manifest, "srbf-capture", path)
         schemas.check(manifest, "capture", str(path))
         lights = [CapturedLight.of_manifest(entry, f"light {i} in {path}") for i, entry in enumerate(manifest["lights"])]
+        if "cubemap" in manifest:
+            from srbf.cubemap_capture import CubemapCapture, train_lights
+
+            lights = [*train_lights(manifest["cubemap"]), *lights]
         if not (lights or "surfels" in manifest or "gather" in manifest):
             raise ManifestError(f"expected one or more lights in {path}, found none; bake or import again")
         texels = manifest["width"] * manifest["height"]
@@ -104,6 +108,9 @@ class Capture(ReceiverImages):
         named = [file for _, file in channels_of(manifest, str(path)).values()]
         for name in [*named, *(manifest[key] for key in ("scene", "seams") if key in manifest)]:
             files.inside(folder, name, path)
+        if "cubemap" in manifest:
+            files.inside(folder, manifest["cubemap"]["bounces"], path)
+            return CubemapCapture(folder, manifest, tuple(lights))
         return Capture(folder, manifest, tuple(lights))
 
     @property
@@ -116,6 +123,11 @@ class Capture(ReceiverImages):
         if "surfels" in self.manifest:
             return "surfel"
         return self.lights[0].kind if self.lights else "directional"
+
+    @property
+    def is_cubemap(self) -> bool:
+        """Whether its train lights are the texels of a cubemap, whose images are made on request."""
+        return "cubemap" in self.manifest
 
     def require_directional(self, what: str) -> None:
         """InputError where the lights are not directional, which `what` needs."""

@@ -28,7 +28,8 @@ class CapturedLight:
     the scene has it set: its `objects` shine. A patch is a part of the surfaces that reflects irradiance 1, by its number `patch`.
     `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
     `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
-    as the file of a mask or as flat indices (row by row from the top); None: all of them.
+    as the file of a mask or as flat indices (row by row from the top); None: all of them. `column`: the texel of a cubemap that it is,
+    whose image is made on request, and `file` its name alone.
     """
 
     place: tuple[float, float, float]
@@ -41,6 +42,7 @@ class CapturedLight:
     objects: tuple[str, ...] = ()
     patch: int | None = None
     harmonics: tuple[str, ...] = ()
+    column: int | None = None
 
     @staticmethod
     def of_manifest(entry: Mapping[str, Any], where: str) -> CapturedLight:

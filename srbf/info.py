@@ -37,6 +37,8 @@ def describe(path: Path) -> dict[str, Any]:
 def describe_capture(capture: Capture) -> dict[str, Any]:
     """Size, lights by role, receiver and disk of a capture; every image's header is read."""
     for light in capture.lights:
+        if light.column is not None:  # which has no image
+            continue
         size_of(capture.folder / light.file)
         if light.direct is not None:
             size_of(capture.folder / light.direct)
@@ -49,6 +51,7 @@ def describe_capture(capture: Capture) -> dict[str, Any]:
         "height": capture.height,
         "lights": {role: len(capture.indices(role)) for role in ROLES},
         **_samples(capture),
+        **({"cubemap": capture.manifest["cubemap"]} if capture.is_cubemap else {}),
         **({"unfinished": True} if (capture.folder / UNFINISHED).is_file() else {}),
         **_kinds(capture),
         **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
@@ -77,7 +80,7 @@ def _kinds(capture: Capture) -> dict[str, Any]:
 def _samples(capture: Capture) -> dict[str, Any]:
     """The fewest samples per texel that a light of each role has, where the capture says so."""
     lights = capture.manifest["lights"]
-    if not all("samples" in light for light in lights):
+    if capture.is_cubemap or not all("samples" in light for light in lights):
         return {}
     return {
         "samples": {role: min(light["samples"] for light in lights if light["role"] == role) for role in ROLES if capture.indices(role)}

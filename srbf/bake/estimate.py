@@ -13,12 +13,14 @@ from typing import Any
 import numpy as np
 
 from srbf.bake.checks import bytes_needed
+from srbf.bake.cubemap_set import CubemapSet, seconds_of_rays
 from srbf.bake.job import base_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
 from srbf.bake.worker import Worker
+from srbf.cubemap import Cubemap
 from srbf.io.image import write_image
 
 PROBE_SAMPLES = 4  # more than that of the other probe: enough to separate the fixed cost per light from the cost per sample
@@ -27,6 +29,7 @@ SOURCES = {  # of train lights, by light set
     "cloud": "point lights in free space",
     "patches": "patches of the surfaces",
     "gather": "links of view clusters to a pool of surfels in place of train lights",
+    "cubemap": "directions of a cubemap in place of train lights, by rays",
     "surfels": "form factors of surfels in place of train lights",
 }
 
@@ -78,13 +81,21 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     else:
         train_from = settings.domain if settings.light_list is None else "from the light list"
         train_from += f", a sun of {np.degrees(settings.sun_angle):.3g} degrees"
+    train, at = roles["train"], _samples(bake)
+    if isinstance(settings.light_set, CubemapSet):
+        count = settings.width * settings.height if facts["receivers"][0]["kind"] == "lightmap" else facts["receivers"][0]["count"]
+        count = facts.get("covered_texels", count)
+        train, at = Cubemap(settings.light_set.side).count, "a ray"
+        roles.update({"validation": settings.validation, "holdout": settings.holdout})
+        time = seconds_of_rays(settings.light_set, count)
+        disk = count * train // 8
     first, *more = facts["receivers"]
     receiver = ", ".join(f"{key} {value}" for key, value in first.items() if key != "kind") + (f" and {len(more)} more" if more else "")
     covered = f", {facts['covered_texels']} texels covered" if "covered_texels" in facts else ""
     return [
         f"scene      {bake.scene} (Blender {facts['blender']})",
         f"receiver   {first['kind']}: {receiver}, {settings.width}x{settings.height}{covered}, {settings.quantity}",
-        f"lights     {roles['train']} train at {_samples(bake)}, {roles['validation']} validation and "
+        f"lights     {train} train at {at}, {roles['validation']} validation and "
         f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
         f"time       about {_duration(time)} {'per sample of all lights ' if bake.is_open_ended else ''}on this machine as loaded now",

@@ -18,6 +18,7 @@ from srbf.bake.images import PREPARED, SCENE_FILE, SEAMS
 from srbf.bake.light_sets import LIGHT_SET_FILE, PATCHES_FILE
 from srbf.bake.shard import Shard
 from srbf.channels import CHANNELS, file_name
+from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE
 from srbf.errors import BakeError, ManifestError, MissingLibraryError, OutputExistsError
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
@@ -41,6 +42,8 @@ BEFORE_IMAGES = (
     PATCHES_FILE,
     SURFELS_FILE,
     OPERATOR_FILE,
+    VISIBILITY_FILE,
+    BOUNCES_FILE,
     "lights",
     "direct",
     "harmonics",
@@ -56,6 +59,8 @@ WRITTEN = (
     PATCHES_FILE,
     SURFELS_FILE,
     OPERATOR_FILE,
+    VISIBILITY_FILE,
+    BOUNCES_FILE,
     ACCUMULATION,
     FORMER,
     SCRATCH,

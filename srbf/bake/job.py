@@ -45,6 +45,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
     What a light set and probes know of the scene goes into files in `scratch`.
     """
     light_set, probes = settings.light_set, settings.receiver.probes
+    traced = light_set is not None and light_set.kind == "cubemap"
     lit_by: dict[str, Any] = {"kind": "own"}
     if isinstance(light_set, NamedSet):
         lit_by = {"kind": "named", "groups": list(light_set.groups)}
@@ -61,7 +62,7 @@ def base_job(scene: Path, settings: BakeSettings, scratch: Path, requests: Seque
         "quantity": settings.quantity,
         "keep_scene_lights": settings.keep_scene_lights,
         "sun_angle": settings.sun_angle,
-        "transport": settings.transport,
+        "transport": "indirect" if traced else settings.transport,  # which sends scene.glb
         "direct_gloss": _keeps_gloss(settings),
         "no_shadow": list(settings.no_shadow),
         "coverage_samples": COVERAGE_SAMPLES,

@@ -33,7 +33,8 @@ def capture_manifest(
         source["uv"] = "uv.json"
     if curve:
         source["validation_curve"] = curve
-    apart = settings.transport == "indirect"
+    traced = settings.light_set is not None and settings.light_set.kind == "cubemap"
+    apart = settings.transport == "indirect" or traced
     return {
         "format": "srbf-capture",
         "version": 1,

@@ -9,6 +9,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+from srbf.bake.cubemap_set import CubemapSet
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import NamedSet
 from srbf.bake.run import Bake
@@ -115,6 +116,8 @@ def _light_set(light_set: LightSet | None) -> dict[str, Any]:
     box = None if light_set.box is None else ",".join(map(repr, light_set.box))
     if isinstance(light_set, GatherSet):
         return {"light-set": light_set.kind, "pool": light_set.count, "view-clusters": light_set.clusters, "light-bounds": box}
+    if isinstance(light_set, CubemapSet):
+        raise InputError("expected a bake of rendered lights for a farm, found `light_set` cubemap, which one process traces; bake it here")
     if light_set.kind == "surfels":
         density = None if light_set.spacing is None else round(light_set.spacing**-2, 6)
         return {"light-set": light_set.kind, "surfels-per-m2": density, "light-bounds": box}

@@ -232,6 +232,7 @@ class _Passes:
         self._facts: dict[str, Any] | None = None
         self._failed: dict[int, str] = {}
         self._said: set[str] = set()
+        self._traced: dict[str, Any] = {}  # keys of the manifest that only traced rays tell
         self._started = time.monotonic()
         self._mutex = threading.Lock()
 
@@ -254,7 +255,8 @@ class _Passes:
             if self._shard is None or self._shard.is_preparation:
                 assert self._images.prepared is not None
                 manifest = capture_manifest(self._settings, self._identity, self._images.prepared, [], 0, [])
-                trace_operator(Capture(self._folder, manifest, ()), self._settings, self._reporter.progress, self._reporter.say)
+                receivers = Capture(self._folder, manifest, ())
+                self._traced = trace_operator(receivers, self._settings, self._reporter.progress, self._reporter.say)
             try:
                 self._passes(pool)
             except KeyboardInterrupt:
@@ -415,12 +417,12 @@ class _Passes:
         if self._shard is not None:
             return
         lights = [(light, self._accumulation.samples(light)) for light in self._lights if self._accumulation.passes(light)]
-        traced = self._settings.light_set is not None and self._settings.light_set.kind in ("surfels", "gather")
+        traced = self._settings.light_set is not None and self._settings.light_set.kind in ("surfels", "gather", "cubemap")
         reached = [self._goal] if traced else [samples for light, samples in lights if light.role == "train"]
         if reached and self._images.prepared is not None:
             curve = stopping.record(self._curve)
             manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)
-            files.write_json(self._folder / MANIFEST, manifest)
+            files.write_json(self._folder / MANIFEST, {**manifest, **self._traced})
 
     def _record(self, blender: str) -> None:
         """Mark the folder as a bake begun. BakeError where another Blender began it, whose output would differ."""

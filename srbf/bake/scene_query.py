@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from srbf.bake.cubemap_set import CubemapSet
 from srbf.bake.folder import STATE
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, MOST_SURFELS, SURFEL_SIZE, CloudSet, FoundPlaces, NamedSet
@@ -170,7 +171,7 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
     if light_set is None or light_set.is_known:
         return bake
     tested = settings.validation + settings.holdout
-    if isinstance(light_set, (CloudSet, GatherSet)):
+    if isinstance(light_set, (CloudSet, GatherSet, CubemapSet)):
         require_scene(bake.scene)
         key = light_set.key(files.sha256_of(bake.scene), tested, settings.seed, settings.scene)
         kept = light_set.read(bake.folder / LIGHT_SET_FILE, key)
@@ -189,13 +190,15 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
         known = replace(light_set, entries=entries)
     elif isinstance(light_set, GatherSet):
         known = light_set.with_facts(found, say)
+    elif isinstance(light_set, CubemapSet):
+        known = light_set.with_surfels(_with_places(light_set.surfels, found, settings.seed, say, distant=True))
     else:
         known = _with_places(light_set, found, settings.seed, say)
     return replace(bake, settings=replace(settings, light_set=known))
 
 
-def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Callable[[str], None]) -> CloudSet:
-    """The set with free places and patches, from the facts of its scene."""
+def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Callable[[str], None], distant: bool = False) -> CloudSet:
+    """The set with free places and patches, from the facts of its scene; `distant`: no light of it is inside the scene."""
     arrays, places = found["arrays"], found["places"]
     x0, y0, z0, x1, y1, z1 = places["box"]
     free = np.array(places["places"], np.float64).reshape(-1, 3)
@@ -226,7 +229,7 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
         f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
         f"{places['skipped']} places are in or near geometry"
     )
-    if places.get("open_share", 0) > OPEN:
+    if places.get("open_share", 0) > OPEN and not distant:
         say(
             f"the scene is open: {places['open_share']:.0%} of rays from the free places leave it; lights are captured in that box "
             f"alone, and {'environments by what surfels see' if surfels is not None else 'distant light is not'}: `light_bounds` gives "

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from srbf.bake.cubemap_set import CubemapSet
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import CloudSet, NamedSet, PlacedLight
 from srbf.bake.point_lights import PointGrid
@@ -26,7 +27,7 @@ Kind = Literal["lightmap", "vertices", "view", "probes"]
 Rendered = Literal["response", "direct", "indirect", "denoised", "toward"]  # images of a light that a worker renders
 Unwrap = Literal["smart", "lightmap-pack", "keep"]
 LARGEST_SIDE = 16384
-LightSet = NamedSet | CloudSet | GatherSet
+LightSet = NamedSet | CloudSet | GatherSet | CubemapSet
 
 
 @dataclass(frozen=True)
@@ -324,6 +325,8 @@ class BakeSettings:
         if light_set.kind == "gather" and (self.receiver.kind != "view" or self.quantity != "radiance"):
             found = self.receiver.kind if self.receiver.kind != "view" else self.quantity
             raise InputError(f"expected the radiance of a view with {what}, found {found}; use `light_set=surfels`")
+        if light_set.kind == "cubemap" and self.receiver.kind not in ("lightmap", "vertices"):
+            raise InputError(f"expected a receiver lightmap:OBJECT or vertices:OBJECT with {what}, found {self.receiver.kind}")
         if light_set.kind in ("patches", "surfels", "gather") and self.transport != "indirect":
             raise InputError(f"expected `transport=indirect` with {what}, found combined: what surfaces reflect is indirect light")
 

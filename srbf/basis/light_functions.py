@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64
 from srbf.basis.gaussian import weight
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+MANY_CENTERS, NARROW = 1024, 0.15  # centers from which on, and spreads (rad) below which, weights are sparse
+REACH = 5.5  # spreads from a center, beyond which its weight is below 3e-7
+BATCH = 1 << 11  # directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +37,14 @@ class LightFunctions:
         """All functions at unit directions: N B exponentials for each distinct spread."""
         values = np.empty((len(directions), len(self.spreads), 3))
         for chosen, weights in self._by_spread(directions):
-            coefficients = self.coefficients[chosen].transpose(1, 0, 2).reshape(len(self.centers), -1)  # (B, 3 f)
+            coefficients = self._by_center if chosen.all() else self.coefficients[chosen].transpose(1, 0, 2).reshape(len(self.centers), -1)
             values[:, chosen] = (weights @ coefficients).reshape(len(directions), -1, 3)
         return values
+
+    @cached_property
+    def _by_center(self) -> Float32[ndarray, "B M"]:
+        """All coefficients, 3 F of a center in a row."""
+        return np.ascontiguousarray(self.coefficients.transpose(1, 0, 2).reshape(len(self.centers), -1))
 
     def project(self, directions: Float[ndarray, "N 3"], colors: Float[ndarray, "N 3"]) -> Float64[ndarray, "F 3"]:
         """sum_n color_n w_f(direction_n): the total weights of many lights, or of the texels of an environment map."""
@@ -39,7 +53,23 @@ class LightFunctions:
             projected[chosen] = np.einsum("fbc,bc->fc", self.coefficients[chosen], weights.T @ colors, optimize=True)
         return projected
 
-    def _by_spread(self, directions: Float[ndarray, "N 3"]) -> Iterator[tuple[Bool[ndarray, " F"], Float64[ndarray, "N B"]]]:
+    def _by_spread(self, directions: Float[ndarray, "N 3"]) -> Iterator[tuple[Bool[ndarray, " F"], Float64[ndarray, "N B"] | csr_array]]:
+        if len(self.centers) >= MANY_CENTERS and (self.spreads < NARROW).all():
+            for spread in np.unique(self.spreads):
+                yield self.spreads == spread, nearby_weights(directions, self.centers, float(spread))
+            return
         cosines = np.asarray(directions, np.float64) @ self.centers.T
         for spread in np.unique(self.spreads):
             yield self.spreads == spread, weight(cosines, float(spread))
+
+
+def nearby_weights(directions: Float[ndarray, "N 3"], centers: Float64[ndarray, "B 3"], spread: float) -> csr_array:
+    """(N, B) float64: the weights of centers within REACH spreads of each direction; those farther away are 0."""
+    from scipy.sparse import csr_array, vstack
+
+    parts = []
+    for start in range(0, max(1, len(directions)), BATCH):
+        cosines = np.asarray(directions[start : start + BATCH], np.float64) @ centers.T
+        row, column = np.nonzero(cosines > np.cos(REACH * spread))
+        parts.append(csr_array((weight(cosines[row, column], spread), (row, column)), shape=cosines.shape))
+    return vstack(parts, format="csr")

@@ -8,6 +8,8 @@ from typing import Literal
 
 import typer
 
+from srbf.bake.cubemap_set import WORD, CubemapSet
+from srbf.bake.cubemap_trace import totals
 from srbf.bake.estimate import estimate
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import parse_light_set
@@ -21,7 +23,7 @@ from srbf.bake.worker_pool import WorkerPoolSettings
 from srbf.cli import bake_parameters as flag
 from srbf.cli.flags import flags_alone
 from srbf.cli.parameters import Blender, Output
-from srbf.cli.terminal import json_progress_lines, note, progress_bar
+from srbf.cli.terminal import json_line, json_progress_lines, note, progress_bar
 from srbf.cli.values import Size
 
 DEFAULT_SIZE = 256  # texels on the longer side
@@ -51,6 +53,8 @@ def bake(
     pool: flag.PoolSize = None,
     view_clusters: flag.ViewClusterCount = None,
     operator: flag.OperatorOf = "rays",
+    sparse: flag.Sparse = None,
+    sparse_by: flag.SparseBy = "neighbors",
     grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
@@ -87,6 +91,8 @@ def bake(
         inside: LightSet | None = None
         if light_set == GatherSet.kind:
             inside = GatherSet.parse(pool, view_clusters, light_bounds)
+        elif light_set is not None and light_set.startswith(WORD):
+            inside = CubemapSet.parse(light_set, sparse, sparse_by, light_bounds)
         elif light_set is not None and not by_grid:
             inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2, operator)
     if not (named or collection):
@@ -101,13 +107,16 @@ def bake(
     ):
         if value and (light_set is None or (by_grid and name != "--light-bounds")):
             raise typer.BadParameter(f"expected --light-set named, cloud, patches or surfels with {name}, found {light_set or 'none'}")
+    if not isinstance(inside, CubemapSet) and (sparse is not None or sparse_by != "neighbors"):
+        given = "--sparse-by" if sparse is None else "--sparse" if sparse else "--full"
+        raise typer.BadParameter(f"expected --light-set cubemap:SIDE with {given}, found {light_set or 'none'}")
     gathers = light_set == GatherSet.kind
     for name, value in (("--pool", pool), ("--view-clusters", view_clusters)):
         if value is not None and not gathers:
             raise typer.BadParameter(f"expected --light-set gather with {name}, found {light_set or 'none'}")
     for name, value in (("--light-group", light_group), ("--patches", patches), ("--grid", grid), ("--surfels-per-m2", surfels_per_m2)):
-        if value and gathers:
-            raise typer.BadParameter(f"expected --light-set gather without {name}, found both; leave it out")
+        if value and (gathers or isinstance(inside, CubemapSet)):
+            raise typer.BadParameter(f"expected --light-set {light_set} without {name}, found both; leave it out")
     workers_of = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
@@ -170,6 +179,8 @@ def bake(
         with json_progress_lines() if json_progress else progress_bar("bake") as update:
             baked = job.run(Reporter(update, note), force, restart, shard)
         note(f"{_done(shard)} {job.folder}" if baked else f"{job.folder} is complete already")
+        if json_progress and (told := totals(job.folder)) is not None:
+            json_line(told)
 
 
 def _done(shard: Shard | None) -> str:
@@ -183,6 +194,10 @@ def _check_spread(job: Bake, shard: Shard | None, farm: Literal["openjd"] | None
     given = [name for name, value in (("--dask", job.dask), ("--shard", shard), ("--farm", farm)) if value is not None]
     if len(given) > 1:
         raise typer.BadParameter(f"expected one way to spread the work, found {' and '.join(given)}; leave one")
+    if given and isinstance(job.settings.light_set, CubemapSet):
+        raise typer.BadParameter(
+            f"expected --light-set cubemap:SIDE without {given[0]}, found both: one process traces its rays; leave it out"
+        )
     if job.dask is not None and job.pool.workers > 1:
         raise typer.BadParameter("expected --workers without --dask, found both; start as many dask workers instead")
     if job.is_open_ended and (shard is not None or farm is not None):

@@ -87,7 +87,8 @@ LightSet = Annotated[
         help="Other lights than directions. named: the scene's own, each by itself. cloud: --lights point lights in its free space. "
         "patches: parts of its surfaces, for any light inside. "
         "surfels: light between its surfaces, by rays, for any light. "
-        "gather: the same for a view, in detail. point:SPACING: point lights that fill a box, so many meters apart.",
+        "gather: the same for a view, in detail. cubemap:SIDE: distant lights from 6 SIDE x SIDE directions, by rays. "
+        "point:SPACING: point lights that fill a box, so many meters apart.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -144,6 +145,23 @@ OperatorOf = Annotated[
     typer.Option(
         "--operator",
         help="surfels: what traces the light that they send: rays, or Cycles, one patch of surfels at a time (--light-set patches).",
+        rich_help_panel=LIGHTS,
+    ),
+]
+Sparse = Annotated[
+    bool | None,
+    typer.Option(
+        "--sparse/--full",
+        help="cubemap: trace the elements that neighbors do not tell, or all. Default: sparse from 16.8 million on.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+SparseBy = Annotated[
+    Literal["neighbors", "l1"],
+    typer.Option(
+        "--sparse-by",
+        help="cubemap: what tells them. neighbors: coarser receivers that agree; l1: sparse combinations of dense rows.",
         rich_help_panel=LIGHTS,
     ),
 ]

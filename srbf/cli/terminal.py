@@ -73,6 +73,12 @@ def progress_bar(what: str) -> Iterator[Callable[..., None]]:
         yield update
 
 
+def json_line(value: Any) -> None:
+    """One JSON object on stderr, as progress for a program to read."""
+    sys.stderr.write(json.dumps(value, allow_nan=False) + "\n")
+    sys.stderr.flush()
+
+
 @contextmanager
 def json_progress_lines() -> Iterator[Callable[..., None]]:
     """Progress for a program to read: on stderr, a JSON line each, with the seconds left by the rate so far (null at first)."""
@@ -85,7 +91,6 @@ def json_progress_lines() -> Iterator[Callable[..., None]]:
             began = (now, done)
         gained = done - began[1]
         left = None if gained <= 0 else round((total - done) * (now - began[0]) / gained, 1)
-        sys.stderr.write(json.dumps({"done": done, "total": total, "what": text, "seconds_left": left}) + "\n")
-        sys.stderr.flush()
+        json_line({"done": done, "total": total, "what": text, "seconds_left": left})
 
     yield update

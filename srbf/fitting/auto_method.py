@@ -19,6 +19,7 @@ from srbf.errors import InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.evaluation.errors_by_role import psnr as psnr_of
 from srbf.light_domain import Directions, domain_of_capture
+from srbf.methods.clustered_eigen_map import LEAST_TEXELS, TRIED_CLUSTERS, ClusteredEigenMap
 from srbf.methods.protocol import Method, check_error
 from srbf.registry import all_methods
 from srbf.solve.kernel_ridge import KernelPath
@@ -28,6 +29,7 @@ LEAST_BUDGET = 4  # one image of four bytes
 MOST_SIZE = 68  # bytes per texel that are tried for a number of decibels
 TRIED_TEXELS = 1 << 13
 LEAST_LIGHTS = 8  # that a choice without validation lights needs
+CUBEMAP_CLUSTERS = 64  # at most: every cluster's functions have a number per direction
 WORTH = 0.2  # dB that more clusters or more bytes must bring to be chosen
 
 
@@ -64,6 +66,10 @@ def within_budget(
     budget below LEAST_BUDGET, or on psnr beside budget or error.
     """
     check_budget(budget, psnr, error)
+    if capture.is_cubemap:
+        chosen = _of_cubemap(capture, budget or DEFAULT_BUDGET, psnr, error)
+        say(f"chose {chosen}")
+        return _with(chosen, settings)
     if capture.kind in ("surfel", "pool"):  # any light is known, and bytes alone decide
         if psnr is not None:
             raise InputError("expected a `budget` for a capture of surfels, found `psnr`: it has no train lights to measure by")
@@ -101,6 +107,18 @@ def within_budget(
         say(f"expected an error of {error:.2%} on held-out lights of a sample, found {reached.error:.2%} at least; taking that")
     say(f"chose {method}" if error is None else f"chose {method}: relative RMSE {reached.error:.2%} on held-out lights of a sample")
     return _with(method, settings)
+
+
+def _of_cubemap(capture: Capture, size: int, psnr: float | None, error: float | None) -> Method:
+    """Clusters within a size: with thousands of lights, trials of other methods take hours. InputError on another aim."""
+    if psnr is not None or error is not None:
+        other = "psnr" if error is None else "error"
+        raise InputError(f"expected a `budget` for a capture under a cubemap, found `{other}`; or choose a method and its settings")
+    numbers, texels = 3 * len(capture.indices("train")), int((capture.coverage() >= COVERED).sum())
+    many = ClusteredEigenMap.candidates(size, max(texels, LEAST_TEXELS * TRIED_CLUSTERS[0]), numbers)
+    clusters = int(np.clip(texels // LEAST_TEXELS, 1, CUBEMAP_CLUSTERS))
+    first = next(iter(many), None)
+    return next(iter(_candidates(capture, size, texels, numbers))) if first is None else replace(first, clusters=clusters)
 
 
 def _candidates(capture: Capture, size: int, texels: int, numbers: int) -> Iterable[Method]:

@@ -13,6 +13,7 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.encode.clustered_components import clustered_components
+from srbf.encode.cubemap_functions import functions_between
 from srbf.encode.light_function_fit import functions_through
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.weighted_rows import LightSpace
@@ -149,7 +150,8 @@ class ClusteredEigenMap(CoefficientMaps):
         if self.components > 3 * len(train):
             raise InputError(f"expected at most {3 * len(train)} components for {len(train)} lights, found {self.components}")
         # From every row: clusters are of places, and those of a few strips of rows serve the rows between badly.
-        sample = TexelSample.of(capture, max(SAMPLE_TEXELS, TEXELS_PER_CLUSTER * self.clusters), share=1.0)
+        least = 0 if capture.is_cubemap else SAMPLE_TEXELS  # whose rows are of thousands of lights
+        sample = TexelSample.of(capture, max(least, TEXELS_PER_CLUSTER * self.clusters), share=1.0)
         domain = domain_of_capture(capture, self.domain)
         found = clustered_components(
             capture,
@@ -161,7 +163,10 @@ class ClusteredEigenMap(CoefficientMaps):
             run.on_image,
             lambda images: run.progress(images, 2 * len(train)),
         )
-        functions, fit = functions_through(sample, found.functions, domain, self.spread, self.ridge)
+        if capture.is_cubemap and self.spread == self.ridge == "auto":
+            functions, fit = functions_between(sample.coordinates[: sample.train], found.functions)
+        else:
+            functions, fit = functions_through(sample, found.functions, domain, self.spread, self.ridge)
         return coefficient_maps_asset(self, capture, domain, found.components, functions, fit, found, run.stitch)
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from srbf.solve import pca
 from srbf.solve.pca import principal_axes
 
 FLOAT32 = 2e-5  # axes are float32, from a Gram matrix of float32 products
@@ -34,6 +35,17 @@ def test_axes_that_the_rows_lack_are_zero(shape: tuple[int, int]) -> None:
     assert (values[:3] > 0).all() and (values[3:] < 1e-6 * values[0]).all()
     np.testing.assert_allclose((rows @ axes.T) @ axes, rows, atol=1e-4)
     assert not axes[min(shape) :].any()
+
+
+def test_large_rows_give_the_axes_of_their_gram_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By random mixtures, where the spectrum falls as that of transport does."""
+    rng = np.random.default_rng(2)
+    rows = (rng.normal(size=(300, 40)) * 0.8 ** np.arange(40) @ rng.normal(size=(40, 250))).astype(np.float32)
+    expected, energies = principal_axes(rows, 8)
+    monkeypatch.setattr(pca, "LARGE", 200)
+    axes, values = principal_axes(rows, 8)
+    np.testing.assert_allclose(values, energies, rtol=1e-3)
+    np.testing.assert_allclose(np.linalg.svd(axes @ expected.T)[1], 1, atol=1e-3)  # of the same space
 
 
 def test_nothing_to_find() -> None:

@@ -1,0 +1,262 @@
+"""The stages of a bake under a cubemap, each a file that a resumed bake keeps: visibility, bounces, images of the lights that test them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from srbf.arrays import Float32, Float64, Int
+from srbf.capture import Capture
+from srbf.cubemap import Cubemap
+from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
+from srbf.errors import InputError
+from srbf.io import files
+from srbf.io.image import write_image
+from srbf.receiver_images import MANIFEST
+from srbf.sphere import random_directions
+from srbf.visibility.distant_bounces import DistantBounces, Effort, Mixture, light_on_surfels, traced
+from srbf.visibility.element_tracer import ElementTracer
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.form_factors import RayOrigins
+from srbf.visibility.lightmap_points import LightmapPoints
+from srbf.visibility.receivers import Receivers
+from srbf.visibility.refined_visibility import SampledVisibility, refined
+from srbf.visibility.shadow_rays import RAY_OFFSET
+from srbf.visibility.sparse_transport import sparsely_sampled
+from srbf.visibility.surfels import Surfels
+
+WORTHWHILE = 1 << 24  # elements, from which on `auto` samples a part of them
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """R receivers of a capture: flat indices of their texels, where rays start (m), unit normals."""
+
+    texels: Int[ndarray, " R"]
+    starts: Float32[ndarray, "R 3"]
+    normals: Float32[ndarray, "R 3"]
+
+    @staticmethod
+    def of(receivers: Receivers, is_lightmap: bool) -> Points:
+        """Covered texels: their middles on the surface, or the vertices that they list. InputError where nothing is covered."""
+        coverage = receivers.images["coverage"].ravel()
+        texels = np.flatnonzero(coverage > 0)
+        if not len(texels):
+            raise InputError(
+                "expected receivers, found none: no texel of the lightmap is covered; give the object a UV layer that has an area"
+            )
+        if is_lightmap:
+            found = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit).at(
+                texels, np.full((len(texels), 2), 0.5)
+            )
+            places, normals = found.point + found.lift, found.normal
+        else:
+            places, normals = (receivers.images[name].reshape(-1, 3)[texels] for name in ("position", "normal"))
+        unit = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+        offset = RAY_OFFSET * (1 + np.abs(places).max(axis=1, keepdims=True))
+        return Points(texels, (places + offset * unit).astype(np.float32), unit.astype(np.float32))
+
+
+@dataclass(eq=False)
+class _Stages:
+    """One run of the stages, in the folder of a capture without lights."""
+
+    capture: Capture
+    surfels: Surfels
+    bounces: int | None
+    cubemap: Cubemap
+    sampling: str
+    seed: int
+    key: str
+    progress: Progress
+    say: Callable[[str], None]
+
+    @cached_property
+    def receivers(self) -> Receivers:
+        return Receivers.of(self.capture)
+
+    @cached_property
+    def points(self) -> Points:
+        return Points.of(self.receivers, self.is_lightmap)
+
+    @property
+    def is_lightmap(self) -> bool:
+        described = [self.capture.manifest.get("receiver"), *self.capture.manifest.get("receivers", [])]
+        return any(one is not None and one["kind"] == "lightmap" for one in described)
+
+    @cached_property
+    def occluders(self) -> EmbreeTriangles:
+        triangles = self.receivers.triangles
+        if triangles.filters.any():
+            self.say("translucent materials let all distant light through here: an element of a cubemap's visibility is seen or not")
+        return EmbreeTriangles(triangles.corners[triangles.occluders])
+
+    def tracer(self, directions: Float64[ndarray, "n 3"]) -> ElementTracer:
+        return ElementTracer(self.points.starts, self.points.normals, directions.astype(np.float32), self.occluders)
+
+    def visibility(self) -> dict[str, ndarray]:
+        """Bits of all elements, and how many rays and seconds they took."""
+        path = self.capture.folder / VISIBILITY_FILE
+        if (stored := stored_arrays(path, self.key)) is not None:
+            return stored
+        began = time.process_time()
+        tracer = self.tracer(self.cubemap.directions)
+        elements = tracer.count * self.cubemap.count
+        sampling = self.sampling if self.sampling != "auto" else "neighbors" if elements >= WORTHWHILE else "full"
+        told = f"visibility, {elements / 1e6:.1f} million elements"
+
+        def report(done: int, total: int) -> None:
+            self.progress(done, total, told)
+
+        if sampling == "full":
+            found = SampledVisibility(tracer.all_seen(report), elements, 0.0)
+        elif sampling == "neighbors":
+            found = refined(tracer, self.cubemap, self.seed, report)
+        else:
+            found = sparsely_sampled(tracer, self.cubemap, self.seed, report, self.say)
+        arrays: dict[str, ndarray] = {
+            "bits": found.bits,
+            "receivers": self.points.texels.astype(np.int32),
+            "normals": self.points.normals,
+            "rays": np.array(tracer.rays),
+            "sampled": np.array(found.asked / elements),
+            "error": np.array(found.error),
+            "sampling": np.array(sampling),
+            "cpu_seconds": np.array(time.process_time() - began),
+        }
+        write_arrays(path, self.key, **arrays)
+        return arrays
+
+    def reflected(self, sampling: str) -> dict[str, ndarray]:
+        """Shapes and weights of the bounces, and how many rays and seconds they took."""
+        path = self.capture.folder / BOUNCES_FILE
+        if (stored := stored_arrays(path, self.key)) is not None:
+            return stored
+        began = time.process_time()
+        count = len(self.points.texels)
+        if self.bounces == 0 or not self.surfels.cells.albedo.any():
+            bounces, mixture = DistantBounces.none(count, self.cubemap.count), Mixture.none(self.surfels.count)
+        else:
+            origins = RayOrigins.even(self.points.starts[:, None], self.points.normals[:, None])
+            effort = Effort.full(count) if sampling == "full" else Effort.sparse()
+            bounces, mixture = traced(
+                self.surfels,
+                origins,
+                self.cubemap,
+                self.occluders,
+                self.bounces,
+                effort,
+                self.seed,
+                lambda done, total: self.progress(done, total, "bounces"),
+            )
+        arrays: dict[str, ndarray] = {
+            "shapes": bounces.shapes.astype(np.float16),
+            "weights": bounces.weights.astype(np.float16),
+            "transfer": mixture.transfer.astype(np.float16),
+            "rays": np.array(bounces.rays),
+            "cpu_seconds": np.array(time.process_time() - began),
+        }
+        write_arrays(path, self.key, **arrays)
+        return arrays
+
+    def tested(self, roles: tuple[int, int], bounces: dict[str, ndarray]) -> list[dict[str, Any]]:
+        """Images of random distant lights by a ray from every receiver; the entries of the manifest."""
+        directions = random_directions(sum(roles), "sphere", np.random.default_rng(self.seed))
+        entries = [
+            {
+                "kind": "directional",
+                "direction": direction,
+                "role": "validation" if i < roles[0] else "holdout",
+                "file": f"lights/{i:04d}.exr",
+                **({"direct": f"direct/{i:04d}.exr"} if self.capture.transport == "indirect" else {}),
+            }
+            for i, direction in enumerate(directions.tolist())
+        ]
+        missing = [
+            i
+            for i, entry in enumerate(entries)
+            if not all((self.capture.folder / entry[k]).is_file() for k in ("file", "direct") if k in entry)
+        ]
+        if missing:
+            tracer = self.tracer(directions[missing])
+            seen = np.unpackbits(tracer.all_seen(), axis=1, count=len(missing))
+            direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
+            lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
+            transfer = bounces["transfer"].astype(np.float32)
+            weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
+            shapes = bounces["shapes"].astype(np.float32)
+            for number, i in enumerate(missing):
+                self._write_tested(entries[i], direct[:, number], shapes @ weights[:, number])
+                self.progress(number + 1, len(missing), "lights that test")
+        return entries
+
+    def _write_tested(self, entry: dict[str, Any], direct: Float32[ndarray, " R"], reflected: Float32[ndarray, "R 3"]) -> None:
+        white = np.repeat(direct[:, None], 3, axis=1).astype(np.float32)
+        if "direct" in entry:
+            write_image(self.capture.folder / entry["direct"], self._image(white), "half")
+        else:
+            reflected = reflected + white
+        write_image(self.capture.folder / entry["file"], self._image(reflected), "half")
+
+    def _image(self, irradiance: Float32[ndarray, "R 3"]) -> Float32[ndarray, "H W 3"]:
+        """In the capture's quantity; 0 where there is no receiver."""
+        image = np.zeros((self.capture.height * self.capture.width, 3), np.float32)
+        image[self.points.texels] = irradiance
+        return image.reshape(self.capture.height, self.capture.width, 3) * self.receivers.reflectance()
+
+
+def trace_cubemap(
+    capture: Capture,
+    surfels: Surfels,
+    bounces: int | None,
+    checksum: str,
+    cubemap: Cubemap,
+    sampling: str,
+    roles: tuple[int, int],
+    seed: int,
+    progress: Progress,
+    say: Callable[[str], None],
+) -> dict[str, Any]:
+    """The files of a capture under `cubemap` into the folder of `capture`, which has no lights; the keys of its manifest.
+
+    `checksum`: of what is known of the scene. `roles`: how many lights validate and are held out.
+    """
+    key = f"{checksum} {capture.width}x{capture.height} {cubemap.side} {sampling} {seed}"
+    stages = _Stages(capture, surfels, bounces, cubemap, sampling, seed, key, progress, say)
+    visibility = stages.visibility()
+    chosen = str(visibility["sampling"])
+    reflected = stages.reflected(chosen)
+    entries = stages.tested(roles, reflected)
+    rays, sampled, error = int(visibility["rays"]) + int(reflected["rays"]), float(visibility["sampled"]), float(visibility["error"])
+    predicted = "" if chosen == "full" else f"; predicted error of direct light under suns {error:.2%}"
+    millions = len(stages.points.texels) * cubemap.count / 1e6
+    say(f"{chosen}: {sampled:.1%} of {millions:.1f} million elements, {rays / 1e6:.1f} million rays{predicted}")
+    told = {
+        "side": cubemap.side,
+        "visibility": VISIBILITY_FILE,
+        "bounces": BOUNCES_FILE,
+        "sampling": chosen,
+        "rays": rays,
+        "sampled": sampled,
+    }
+    return {"cubemap": told if chosen == "full" else {**told, "predicted_error": error}, "lights": entries}
+
+
+def totals(folder: Path) -> dict[str, Any] | None:
+    """{rays, cpu_seconds, sampled} of a capture under a cubemap, over all runs of its bake; None where it is another, or not done."""
+    if not (folder / MANIFEST).is_file():
+        return None
+    told = files.read_json(folder / MANIFEST).get("cubemap")
+    stages = [stored_arrays(folder / name) for name in (VISIBILITY_FILE, BOUNCES_FILE)]
+    if told is None or None in stages:
+        return None
+    seconds = sum(float(stage["cpu_seconds"]) for stage in stages if stage is not None)
+    return {"rays": told["rays"], "cpu_seconds": round(seconds, 2), "sampled": told["sampled"]}

@@ -1,0 +1,191 @@
+"""Captures under a cubemap: images on request are visibility times cosine plus bounces; roles, rows, indirect ones; fits; damage."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_forms import ball
+
+from srbf.capture import Capture
+from srbf.cubemap import Cubemap
+from srbf.cubemap_capture import CubemapCapture
+from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, write_arrays
+from srbf.errors import ImageError, ManifestError
+from srbf.evaluation.errors_by_role import evaluate
+from srbf.fitting.options import fit
+from srbf.info import describe
+from srbf.io import files
+from srbf.io.image import write_image
+from srbf.lights import DirectionalLight
+from srbf.methods import linear_response
+from srbf.visibility.element_tracer import ElementTracer
+from srbf.visibility.embree import EmbreeTriangles
+
+pytest.importorskip("embreex")
+
+WIDTH, HEIGHT, SIDE = 24, 20, 8
+RANK = 2
+
+
+def made(folder: Path, transport: str = "combined", quantity: str = "irradiance", uncovered: int = 7) -> Capture:
+    """A ground of WIDTH x HEIGHT places below a ball, the last few texels empty; bounces of two made-up shapes; two lights that test."""
+    rng = np.random.default_rng(4)
+    cubemap = Cubemap(SIDE)
+    x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(1, -1, HEIGHT))
+    position = np.stack([x, y, np.zeros_like(x)], axis=2).astype(np.float32)
+    coverage = np.ones(WIDTH * HEIGHT, np.float32)
+    coverage[len(coverage) - uncovered :] = 0
+    receivers = np.flatnonzero(coverage)
+    normals = np.tile(np.array([0, 0, 1], np.float32), (len(receivers), 1))
+    starts = position.reshape(-1, 3)[receivers] + np.array([0, 0, 1e-4], np.float32)
+    tracer = ElementTracer(
+        starts, normals, cubemap.directions.astype(np.float32), EmbreeTriangles(ball(0.4, [0, 0, 0.6]).astype(np.float32))
+    )
+    (folder / "lights").mkdir(parents=True)
+    write_arrays(folder / VISIBILITY_FILE, "made", bits=tracer.all_seen(), receivers=receivers.astype(np.int32), normals=normals)
+    shapes, weights = rng.random((len(receivers), RANK), np.float32), 0.1 * rng.random((RANK, cubemap.count, 3), np.float32)
+    write_arrays(folder / BOUNCES_FILE, "made", shapes=shapes, weights=weights)
+    for name, image in (
+        ("position", position),
+        ("coverage", coverage.reshape(HEIGHT, WIDTH, 1)),
+        ("albedo", rng.random((HEIGHT, WIDTH, 3), np.float32)),
+    ):
+        write_image(folder / f"{name}.exr", image, "float")
+    lights = []
+    for i in range(2):
+        image = rng.random((HEIGHT, WIDTH, 3), np.float32)
+        write_image(folder / f"lights/{i:04d}.exr", image, "float")
+        direct = {"direct": f"lights/{i:04d}.exr"} if transport == "indirect" else {}
+        lights.append({"kind": "directional", "direction": [0, 0, 1], "role": "holdout", "file": f"lights/{i:04d}.exr", **direct})
+    manifest = {
+        "format": "srbf-capture",
+        "version": 1,
+        "quantity": quantity,
+        "transport": transport,
+        "width": WIDTH,
+        "height": HEIGHT,
+        "lights": lights,
+        "cubemap": {"side": SIDE, "visibility": VISIBILITY_FILE, "bounces": BOUNCES_FILE},
+        **{name: f"{name}.exr" for name in ("position", "coverage", "albedo")},
+    }
+    files.write_json(folder / "capture.json", manifest)
+    return Capture.open(folder)
+
+
+@pytest.fixture
+def capture(tmp_path: Path) -> Capture:
+    return made(tmp_path / "capture")
+
+
+def test_every_texel_is_a_train_light(capture: Capture) -> None:
+    assert isinstance(capture, CubemapCapture) and capture.is_cubemap and capture.kind == "directional"
+    assert len(capture.indices("train")) == 6 * SIDE**2 and capture.indices("holdout") == [6 * SIDE**2, 6 * SIDE**2 + 1]
+    np.testing.assert_allclose(capture.directions(capture.indices("train")), Cubemap(SIDE).directions)
+    told = describe(capture.folder)
+    assert told["lights"] == {"train": 6 * SIDE**2, "validation": 0, "holdout": 2} and told["cubemap"]["side"] == SIDE
+    assert len({light.file for light in capture.lights}) == len(capture.lights)
+
+
+def test_images_are_visibility_times_cosine_and_bounces(capture: Capture) -> None:
+    """Away from the ball's shadow the direct light is the cosine; below the horizon there are bounces alone."""
+    stored = np.load(capture.folder / BOUNCES_FILE)
+    bounces = np.einsum("pr,rnc->pnc", stored["shapes"], stored["weights"])
+    up = int(Cubemap(SIDE).texel_of(np.array([[0.1, 0.1, 1.0]]))[0])
+    down = int(Cubemap(SIDE).texel_of(np.array([[0.1, 0.1, -1.0]]))[0])
+    covered = capture.coverage().ravel() > 0
+    for index in (up, down):
+        direct = capture.image(index).reshape(-1, 3)[covered] - bounces[:, index]
+        expected = max(0.0, float(Cubemap(SIDE).directions[index, 2]))
+        lit = np.isclose(direct[:, 0], expected, atol=1e-5)
+        np.testing.assert_allclose(direct[~lit], 0, atol=1e-5)
+        assert lit.mean() > 0.6 and (index == down or not lit.all())
+    assert not capture.image(up).reshape(-1, 3)[~covered].any()
+
+
+def test_blocks_rows_and_images_agree(capture: Capture) -> None:
+    indices = [0, 5, 6 * SIDE**2, 300, 6 * SIDE**2 + 1]
+    images = np.stack([capture.image(i).reshape(-1, 3) for i in indices])
+    for read in (capture.blocks(indices), capture.stream(indices)):
+        np.testing.assert_allclose(np.concatenate([block.copy() for _, block in read]), images, atol=1e-6)
+    texels = np.array([3, 100, WIDTH * HEIGHT - 1, 7])
+    np.testing.assert_allclose(capture.sample(indices, texels), images[:, texels].transpose(1, 0, 2), atol=1e-6)
+    rows = [(2, 5), (11, 12)]
+    chosen = np.concatenate([np.arange(a * WIDTH, b * WIDTH) for a, b in rows])
+    np.testing.assert_allclose(
+        np.concatenate([block.copy() for _, block in capture.stream(indices, rows=rows)]), images[:, chosen], atol=1e-6
+    )
+    seen: dict[int, np.ndarray] = {}
+    for _ in capture.stream(indices, lambda row, image: seen.update({row: image.copy()})):
+        pass
+    np.testing.assert_allclose(np.stack([seen[i] for i in range(len(indices))]), images, atol=1e-6)
+    loaded = capture.load(texels)
+    np.testing.assert_allclose(loaded.image(5), capture.image(5).reshape(-1, 3)[texels][None], atol=1e-6)
+    half = capture.with_roles([("train" if i % 2 else "holdout") if i < 10 else None for i in range(len(capture.lights))])
+    np.testing.assert_allclose(half.image(half.indices("train")[2]), capture.image(5), atol=1e-6)
+
+
+def test_indirect_captures_leave_the_direct_light_out_and_add_it_again(tmp_path: Path) -> None:
+    combined, indirect = made(tmp_path / "combined"), made(tmp_path / "indirect", "indirect")
+    stored = np.load(indirect.folder / BOUNCES_FILE)
+    covered = indirect.coverage().ravel() > 0
+    np.testing.assert_allclose(indirect.image(9).reshape(-1, 3)[covered], stored["shapes"] @ stored["weights"][:, 9], atol=1e-6)
+    assert indirect.has_direct
+    np.testing.assert_allclose(indirect.combined().image(9), combined.image(9), atol=1e-6)
+    np.testing.assert_allclose(indirect.combined().image(6 * SIDE**2), 2 * indirect.image(6 * SIDE**2), rtol=1e-5)
+
+
+def test_radiance_is_irradiance_times_albedo_over_pi(tmp_path: Path) -> None:
+    irradiance, radiance = made(tmp_path / "irradiance"), made(tmp_path / "radiance", quantity="radiance")
+    albedo = radiance.geometry("albedo")
+    assert albedo is not None
+    np.testing.assert_allclose(radiance.image(40), irradiance.image(40) * albedo / np.pi, rtol=1e-5, atol=1e-7)
+    np.testing.assert_allclose(radiance.sample([40], np.array([9]))[0, 0], radiance.image(40).reshape(-1, 3)[9], rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture) -> None:
+    said: list[str] = []
+    asset = fit(capture, budget=16, say=said.append)
+    assert asset.method == "clustered-eigen-map" and asset.bytes_per_texel()["directional"] <= 16 and "chose" in said[0]
+    errors = evaluate(asset, capture, roles=("train",))
+    assert errors["train"]["relative_rmse"] < 0.15
+    index = int(Cubemap(SIDE).texel_of(np.array([[0.5, 0.2, 0.8]]))[0])
+    x, y, z = Cubemap(SIDE).directions[index].tolist()
+    relit, true = linear_response(asset, [DirectionalLight((x, y, z))]), capture.image(index)
+    covered = capture.coverage() > 0
+    assert np.linalg.norm((relit - true)[covered]) < 0.2 * np.linalg.norm(true[covered])
+
+
+@pytest.mark.parametrize("name", [VISIBILITY_FILE, BOUNCES_FILE])
+@pytest.mark.parametrize("damage", ["missing", "truncated", "another"])
+def test_damaged_files_are_named_in_one_line(capture: Capture, name: str, damage: str) -> None:
+    path = capture.folder / name
+    if damage == "missing":
+        path.unlink()
+    elif damage == "truncated":
+        path.write_bytes(path.read_bytes()[:100])
+    else:
+        write_arrays(
+            path,
+            "made",
+            bits=np.zeros((3, 3), np.uint8),
+            receivers=np.arange(3),
+            normals=np.zeros((3, 3), np.float32),
+            shapes=np.zeros((3, 1)),
+            weights=np.zeros((1, 3, 3)),
+        )
+    with pytest.raises(ImageError, match="expected the cubemap's visibility and bounces"):
+        Capture.open(capture.folder).image(0)
+
+
+@pytest.mark.parametrize(("key", "value"), [("side", 1), ("side", "32"), ("visibility", "../out.npz"), ("bounces", None)])
+def test_a_broken_key_is_refused(capture: Capture, key: str, value: object) -> None:
+    path = capture.folder / "capture.json"
+    manifest = json.loads(path.read_text())
+    manifest["cubemap"][key] = value
+    path.write_text(json.dumps(manifest))
+    with pytest.raises(ManifestError):
+        Capture.open(capture.folder)
