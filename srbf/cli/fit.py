@@ -84,4 +84,5 @@ def _solve_rows(cluster: Cluster, capture: Capture, lights: list[int], matrix: A
 def _summary(asset: Asset) -> str:
     rule = asset.manifest["source"]["fit"].get("chosen_by")
     chosen = f"; spread and ridge chosen by {rule}" if rule else ""
-    return f"{method_of(asset).summary(asset)} ({asset.bytes_per_texel()['directional']} bytes per texel{chosen})"
+    size = f"{asset.bytes_per_texel()['directional']} bytes per texel, {asset.resident_bytes() / 1e6:.1f} MB with tables and geometry"
+    return f"{method_of(asset).summary(asset)} ({size}{chosen})"
