@@ -160,7 +160,7 @@ class _Stages:
         arrays: dict[str, ndarray] = {
             "shapes": bounces.shapes.astype(np.float16),
             "weights": bounces.weights.astype(np.float16),
-            "transfer": mixture.transfer.astype(np.float16),
+            "from_surfels": mixture.transfer.astype(np.float16),
             "rays": np.array(bounces.rays),
             "cpu_seconds": np.array(time.process_time() - began),
         }
@@ -190,7 +190,7 @@ class _Stages:
             seen = np.unpackbits(tracer.all_seen(), axis=1, count=len(missing))
             direct = seen * np.maximum(tracer.normals @ tracer.directions.T, 0)
             lit = light_on_surfels(self.surfels, directions[missing], self.occluders)[0]
-            transfer = bounces["transfer"].astype(np.float32)
+            transfer = bounces["from_surfels"].astype(np.float32)
             weights = np.stack([transfer[:, :, c] @ lit for c in range(3)], axis=2)
             shapes = bounces["shapes"].astype(np.float32)
             for number, i in enumerate(missing):

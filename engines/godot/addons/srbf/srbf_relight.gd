@@ -37,7 +37,7 @@ const SKY_WIDTH := 32
 @export var by_surfels := true
 ## Draw the surfels in every frame, since objects move; off: when a light or the asset has moved or changed.
 @export var surfels_every_frame := true
-## So many by so many pixels are drawn of each surfel.
+## So many by so many pixels are drawn of each surfel's cells; assets of transfer have four of these a surfel, so that 1 does.
 @export_enum("1:1", "2 x 2:2", "4 x 4:4") var surfel_parts := 2
 ## Of the surfels' own shadow maps of omni and spot lights, pixels.
 @export_range(256, 8192, 256) var surfel_shadow_size := 2048
