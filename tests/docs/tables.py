@@ -83,6 +83,8 @@ NOT_RUN = {
     "srbf bake SCENE -o C *": "stands for the scenes of a table; bakes of all light sets are run by tests/bake",
     "srbf fit C -o A *": "stands for the captures of a table; fits of them are run by tests/methods",
     "srbf bake shot.blend *": "a view's pool and links: tests/bake/test_gather_bakes.py runs smaller ones",
+    "python benchmarks/sparse.py *": "traces every element of a figure and its ground, three times over: minutes",
+    "srbf bake large.blend *": "60,000 vertices under 6144 directions: minutes; tests/bake/test_cubemap_bakes.py runs smaller ones",
     "srbf bake loft.blend *": "form factors of thousands of probes: a minute at its smallest",
     "python benchmarks/quality.py": "its own scene of 300 lights takes minutes",
     "python benchmarks/quality.py REALRTI": "fits again for each light left out: minutes for one small item",
