@@ -123,7 +123,7 @@ def compressed(capture: Capture, lights: np.ndarray, true: np.ndarray) -> None:
             f"{name} {_psnr(own[:, covered], true[:, covered])}"
             for name, own in (("13 bytes", found), ("SH 4", by_harmonics), ("wavelets", _wavelets(capture, lights, cubemap)))
         ),
-    )  # noqa: E501
+    )
 
 
 def _wavelets(capture: Capture, lights: np.ndarray, cubemap: Cubemap) -> np.ndarray:

@@ -9,13 +9,9 @@ from __future__ import annotations
 
 import math
 import sys
-from pathlib import Path
 
 import bpy
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from staging import add_camera, start_cycles  # noqa: E402
+from staging import add_camera, start_cycles
 
 SIDE = 170  # squares of the ground, of 4 m a side
 CUT = 0.06  # m, the longest side of a piece of the bench

@@ -209,9 +209,7 @@ class Transfer(LightsInsideMaps):
 
     def _parts(self, inside: CloudLights, operator: TransferOperator) -> Cells:
         """Where light is measured, the surfel of each as its patch: several points of a surfel, or one where compressed depths are kept."""
-        count = len(operator.objects)
-        several = self.visibility == kept_visibility.NONE and inside.cells.patch_count == count
-        return inside.cells if several else operator.cells.with_patches(np.arange(count))
+        return inside.cells if self.visibility == kept_visibility.NONE else operator.cells
 
     def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""

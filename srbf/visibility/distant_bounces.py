@@ -17,8 +17,8 @@ from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
 from srbf.visibility.received import starts_of
 from srbf.visibility.surfels import Surfels
+from srbf.visibility.transfer_operator import POINTS, SURFEL_RAYS, leave_gaps_out, rays_of_each
 
-POINTS = 16  # of a surfel
 LEFT_OUT = 0.01  # of the receivers' bounces under all directions, rms, that the shapes leave out
 MOST_RANK = 256
 JUDGES, JUDGING = 1024, 1024  # receivers that the shapes are made for, and rays from each
@@ -37,7 +37,7 @@ class Effort:
     @staticmethod
     def full(receivers: int) -> Effort:
         """As a bake of surfels has them."""
-        return Effort(int(np.clip(1.5e8 / max(1, receivers), 768, 3072)), 2048, True)
+        return Effort(rays_of_each(receivers), SURFEL_RAYS, True)
 
     @staticmethod
     def sparse() -> Effort:
@@ -104,7 +104,7 @@ def traced(
     count = len(origins.weights)
     spread = RayOrigins.even(*surfels.spread(POINTS, seed))
     exchange = form_factors(surfels, spread, effort.surfel_rays // POINTS, seed + 1)
-    exchange.data[surfels.hidden[np.repeat(np.arange(surfels.count), np.diff(exchange.indptr))] | surfels.hidden[exchange.indices]] = 0
+    leave_gaps_out(exchange, surfels)
     rays = surfels.count * POINTS * (effort.surfel_rays // POINTS)
     flux = reciprocal(exchange.toarray(), surfels.cells.areas)
     if most_bounces is not None and most_bounces < SERIES and np.count_nonzero(flux) < SPARSE * flux.size:

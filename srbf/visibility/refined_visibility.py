@@ -136,7 +136,7 @@ def coarse_rows(tracer: ElementTracer, cubemap: Cubemap, rows: Int[ndarray, " n"
     member = window[row, column]
     kept = coarse[member]
     sums = csr_array((np.ones(kept.sum(), np.float32), (member[kept], row[kept])), shape=(cubemap.count, cubemap.count))[grid]
-    sums.data[:] = 1  # a window that folds over an edge may have a texel twice
+    sums.data[:] = 1  # windows that fold over edges may have texels twice
     whole = np.asarray(sums.sum(axis=0)).ravel()
     asked = np.zeros(1, np.int64)
     for start in range(0, len(rows), ROWS):

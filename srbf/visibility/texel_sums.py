@@ -12,7 +12,7 @@ from srbf.arrays import Bool, Float, Float32, Float64, Int
 REFINE_STEP = 0.02  # irradiance between samples of a texel, or between neighbors, from which a texel is refined
 NEIGHBOR_STEP = 0.2  # between neighbors: a shadow edge may cross a corner without samples
 EDGE_STEP = 0.03  # between samples of a texel, from which it is refined once more
-CLOSE, VERY_CLOSE = 0.1, 0.6  # of the brightest unshadowed sample of a texel, the difference to the darkest: beside a light
+CLOSE, VERY_CLOSE = 0.1, 0.6  # of the brightest unshadowed sample per texel, the difference to the darkest: beside a light
 MIN_DIFFUSE = 1e-12  # share
 COUNTS = 1e-5  # least importance of a sample whose difference to others counts
 

@@ -62,7 +62,7 @@ class TransferOperator:
         coverage = receivers.images.get("coverage")
         texels = receivers.width * receivers.height
         chosen = np.arange(texels) if coverage is None else np.flatnonzero(coverage.ravel() > 0)
-        rays = int(np.clip(RAYS / max(1, len(chosen)), FEWEST_RAYS, MOST_RAYS))
+        rays = rays_of_each(len(chosen))
         points = _LightmapPoints(receivers, seed) if is_lightmap else _Centers(receivers)
         total = len(chosen) + surfels.count
         aimed = AimedFactors(surfels, seed)
@@ -76,8 +76,7 @@ class TransferOperator:
         spread = RayOrigins.even(*surfels.spread(POINTS, seed))
         own, environment = factors_and_environment(surfels, Openings(receivers.triangles), spread, SURFEL_RAYS // POINTS, _hash(seed, -1))
         own = aimed.put(own, spread, len(chosen), _hash(seed, -1))
-        own.data[surfels.hidden[np.repeat(np.arange(surfels.count), np.diff(own.indptr))] | surfels.hidden[own.indices]] = 0
-        own.eliminate_zeros()
+        leave_gaps_out(own, surfels)
         progress(total, total)
         traced = vstack(parts, format="csr")
         counts = np.zeros(texels + 1, np.int64)
@@ -147,6 +146,18 @@ def _read_environment(stored: Any, path: Path) -> EnvironmentRows | None:
     if cells.max(initial=0) >= side**2:
         raise ImageError(f"expected cells of the environment below {side**2} in {path}, found {cells.max()}; bake again with `force=True`")
     return EnvironmentRows(starts, cells.astype(np.int64), shares.astype(np.float32), int(side))
+
+
+def rays_of_each(receivers: int) -> int:
+    """How many rays start at each of so many receivers."""
+    return int(np.clip(RAYS / max(1, receivers), FEWEST_RAYS, MOST_RAYS))
+
+
+def leave_gaps_out(exchange: csr_array, surfels: Surfels) -> None:
+    """Take what surfels exchange in gaps, where bounces stay, out of form factors between them (S, S)."""
+    hidden = surfels.hidden[np.repeat(np.arange(surfels.count), np.diff(exchange.indptr))] | surfels.hidden[exchange.indices]
+    exchange.data[hidden] = 0
+    exchange.eliminate_zeros()
 
 
 def is_traced(folder: Path, key: str) -> bool:

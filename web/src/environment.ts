@@ -5,7 +5,7 @@ import { determinant, type Matrix4, type Triple, turned } from "./matrix";
 
 const UPRIGHT = 1e-8; // how far the rotated zenith may be from (0, 0, 1), as in numpy.allclose
 
-/** A texel of a map: its unit direction in the asset's frame, and its solid angle (sr). */
+/** One texel of an environment map: its unit direction in the asset's frame, and its solid angle (sr). */
 export interface EnvironmentTexel {
   readonly direction: Triple;
   readonly solidAngle: number;
