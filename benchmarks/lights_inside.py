@@ -16,6 +16,7 @@ import numpy as np
 from references import rendered, settings_of
 
 from srbf.asset import Asset
+from srbf.bake.scene_query import ask_scene
 from srbf.capture import COVERED, Capture
 from srbf.lights import AreaLight, Light, PointLight, SpotLight
 from srbf.methods import linear_response
@@ -25,15 +26,22 @@ CLEARANCE = 0.1  # m
 OFF_SURFACE = {"near": (0.05, 0.2), "wall": (0.05, 0.05)}  # m
 LIGHTS_AT_A_TIME = 4
 SIDES = (0.6, 0.3)
+PLACES, FRESH = 512, 0x5EED  # of which lights are drawn; the seed of these
 
 
-def placed(capture: Capture, kind: str, count: int, rng: np.random.Generator) -> list[Light]:
-    """`count` random lights of a kind, in the free space of a capture."""
+def fresh_places(scene: Path, count: int) -> np.ndarray:
+    """(n, 3) random free places that no capture of a usual seed has, m: at those of a capture are the lights that a fit is made for."""
+    where = {"box": None, "count": 0, "spacing": None, "random": 0, "places": count, "seed": FRESH}
+    return np.array(ask_scene(scene, {"places": where})["places"]["places"])
+
+
+def placed(capture: Capture, kind: str, count: int, rng: np.random.Generator, places: np.ndarray | None = None) -> list[Light]:
+    """`count` random lights of a kind, at some of the free `places` (n, 3), by default the capture's."""
     inside = CloudLights.of(capture)
-    cells = inside.cells
+    cells, free = inside.cells, inside.free if places is None else places
     lights: list[Light] = []
     while len(lights) < count:
-        place = inside.free[rng.integers(len(inside.free))] + rng.uniform(-0.02, 0.02, 3)
+        place = free[rng.integers(len(free))]
         off = np.linalg.norm(cells.places - place, axis=1).min()
         direction = rng.normal(size=3)
         direction /= np.linalg.norm(direction)
@@ -99,8 +107,9 @@ def main() -> None:
     print(
         f"{'asset':>24}{'light':>8}{'median':>8}{'90 %':>8}{'pooled':>8}{'mean':>8}{'worst':>8}{'without 1 %':>14}{'energy':>9}{'noise':>8}"
     )
+    fresh = fresh_places(asked.scene, PLACES)
     for kind in asked.kinds.split(","):
-        lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
+        lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]), fresh)
         first, second = rendered(asked.scene, settings_of(capture), lights, asked.samples)["indirect"][:, :, covered]
         for path in asked.assets:
             asset = Asset.open(path)

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from lights_inside import placed, row
+from lights_inside import PLACES, fresh_places, placed, row
 from references import rendered
 
 from srbf.asset import Asset
@@ -67,8 +67,9 @@ def main() -> None:
         found = ask_scene(scene, {"vertices": receiver.job()})
         settings = BakeSettings(receiver, found["width"], found["height"])
         points, normals = geometry(scene, settings)
+        fresh = fresh_places(asked.scene, PLACES)
         for kind in asked.kinds.split(","):
-            lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]))
+            lights = placed(capture, kind, asked.lights, np.random.default_rng([3, len(kind)]), fresh)
             references = rendered(scene, settings, lights, asked.samples)["indirect"]
             first, second = references.reshape(2, len(lights), -1, 3)[:, :, : len(points)]
             for path in asked.assets:

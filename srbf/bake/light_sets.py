@@ -28,6 +28,7 @@ from srbf.visibility.surfels import Surfels
 from srbf.visibility.transfer_operator import OPERATOR_FILE, SURFELS_FILE
 
 PLACES = 1024  # random free places: where the components of a fit are made for, and what sees which patch
+SURFEL_PLACES = 4096  # with surfels: shapes of light are made for most of them
 LIGHT_SET_FILE = "light_set.npz"  # in the capture's folder: what was found of the scene, so that a resumed bake has the same
 PATCHES_FILE = "patches.exr"
 MOST_NAMES = 4096
@@ -208,7 +209,7 @@ class CloudSet:
                 "count": self.count if self.kind == "cloud" and self.spacing is None else 0,
                 "spacing": self.spacing if self.kind == "cloud" else None,
                 "random": tested,
-                "places": PLACES,
+                "places": SURFEL_PLACES if self.kind == "surfels" else PLACES,
                 "seed": seed,
             },
             "surfaces": self._surfaces(),

@@ -18,7 +18,7 @@ from srbf.methods.component_maps import ComponentMaps
 from srbf.solve.radiosity import Bounces
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.surface_cells import Cells
-from srbf.visibility.transfer_basis import PLACED, TransferBasis, grouped
+from srbf.visibility.transfer_basis import TransferBasis, grouped, placed_of
 from srbf.visibility.transfer_operator import TransferOperator
 
 LIGHTS = 24  # random ones, where the capture has no validation lights
@@ -51,8 +51,8 @@ class Judges:
         `received`: on cells of which the patches are the surfels.
         """
         validation = capture.indices("validation")
-        order = np.random.default_rng(0).permutation(len(free))  # as `training_light` takes them, by default
-        places = capture.positions(validation) if validation else free[(order[PLACED:] if len(order) > PLACED else order)[:LIGHTS]]
+        unused = placed_of(len(operator.cells.places))  # by `training_light`, from here on
+        places = capture.positions(validation) if validation else free[unused if len(free) > unused else 0 :][:LIGHTS]
         lights = [PointLight((x, y, z), falloff="inverse-square") for x, y, z in places.tolist()]
         irradiance = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
         texels = sampled_texels(capture, TEXELS)

@@ -24,7 +24,9 @@ from srbf.visibility.transfer_operator import TransferOperator
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-PLACED, NEAR, SPOTS = 700, 250, 250  # lights that the shapes are made for
+PLACED, NEAR, SPOTS = 700, 250, 250  # lights that the shapes are made for, at least
+SURFELS_PER_PLACE, MOST_PLACED = 2, 4000  # many surfels need more: shapes of few lights hold none among furniture
+IN_EVERY_COLOR = 1800  # lights: of more, each is in red, green or blue, in turn
 NEAR_RANGE = (0.03, 0.12)  # m from a surface
 CONE = (0.25, 0.7)  # rad, half-angles
 OVERSAMPLED = 16
@@ -67,11 +69,11 @@ class Emitted:
 def training_light(operator: TransferOperator, received: ReceivedLight, free: Float64[ndarray, "F 3"], seed: int = 0) -> ndarray:
     """(S, V) float32: irradiance on the surfels of points and spots in free space, points close to surfaces, and parts of environments.
 
-    `received`: on cells of which the patches are the surfels.
+    `received`: on cells of which the patches are the surfels. `free`: places, of which the first `placed_of` are taken.
     """
     rng = np.random.default_rng(seed)
     cells = operator.cells
-    placed = free[rng.permutation(len(free))[:PLACED]]
+    placed = free[: placed_of(len(cells.places))]
     chosen = rng.choice(len(cells.places), NEAR, p=cells.areas / cells.areas.sum())
     near = cells.places[chosen] + rng.uniform(*NEAR_RANGE, size=(NEAR, 1)) * cells.normals[chosen]
     lights: list[PointLight] = []
@@ -84,6 +86,11 @@ def training_light(operator: TransferOperator, received: ReceivedLight, free: Fl
         lights.append(SpotLight((x, y, z), falloff="inverse-square", direction=(dx, dy, dz), inner=0.9 * outer, outer=outer))
     inside = np.stack([received.on_patches(light)[:, 0] for light in lights], axis=1).astype(np.float32)
     return inside if operator.environment is None else np.concatenate([inside, operator.environment.parts()], axis=1)
+
+
+def placed_of(surfels: int) -> int:
+    """At how many free places there are point lights that the shapes are made for."""
+    return min(MOST_PLACED, max(PLACED, surfels // SURFELS_PER_PLACE))
 
 
 Exchange = tuple[Float32[ndarray, "S S"], list[Bounces]]
@@ -117,9 +124,10 @@ def transfer_basis(
     some = operator.receivers[lit[:: max(1, len(lit) // NORM_TEXELS)]]
     sampled = len(lit) > SAMPLE_TEXELS
     form_factors = operator.receivers[np.sort(rng.choice(lit, SAMPLE_TEXELS, replace=False)) if sampled else lit]
+    in_turn = irradiance.shape[1] > IN_EVERY_COLOR
     radiosity = []
     for channel, one in enumerate(bounces):
-        own = _of_unit_norm(one.radiosity(irradiance), some)
+        own = _of_unit_norm(one.radiosity(irradiance[:, channel::3] if in_turn else irradiance), some)
         if emitted is not None:
             first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
             shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), some)
@@ -136,8 +144,9 @@ def transfer_basis(
     found = np.linalg.qr(product(form_factors, mixed))[0]
     for _ in range(POWER_STEPS):
         found = np.linalg.qr(product(form_factors, lights @ (lights.T @ transposed_product(form_factors, found))))[0]
-    left, values, _ = np.linalg.svd(transposed_product(form_factors, found).T @ lights, full_matrices=False)
-    axes = found @ left
+    projected = (transposed_product(form_factors, found).T @ lights).astype(np.float64)
+    squares, left = np.linalg.eigh(projected @ projected.T)  # in ascending order
+    values, axes = np.sqrt(np.maximum(squares[::-1], 0)).astype(np.float32), found @ left[:, ::-1].astype(np.float32)
     mixtures = form_factors @ (lights @ rng.normal(size=(lights.shape[1], JUDGES)))
     count = most if rank is not None else _enough(axes[:, :most], mixtures, left_out)
     values = np.maximum(values[:count], 1e-7 * max(float(values[0]), 1e-30))

@@ -36,7 +36,6 @@ def fewer_lights(monkeypatch: pytest.MonkeyPatch) -> None:
     """Shapes of a small room need few lights."""
     for name, count in (("PLACED", 120), ("NEAR", 40), ("SPOTS", 40)):
         monkeypatch.setattr(transfer_basis, name, count)
-    monkeypatch.setattr(transfer_choice, "PLACED", 120)
 
 
 def test_the_error_on_validation_lights_is_kept_to(capture: Capture) -> None:
