@@ -178,7 +178,7 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
 
 def select(objects: list[bpy.types.Object]) -> None:
     """Select these objects alone, for Blender's operators; the first is the active one."""
-    bpy.context.view_layer.update()  # selecting would make the layer anew while its objects are iterated, and leave None among them
+    bpy.context.view_layer.update()  # selecting would rebuild the layer while its objects are iterated, and leave None among them
     for other in tuple(bpy.context.view_layer.objects):
         other.select_set(False)
     for obj in objects:

@@ -50,7 +50,7 @@ def show_as_rendered(scene: bpy.types.Scene) -> None:
         layer = layers.pop()
         layer.hide_viewport = False
         layers += layer.children
-    for obj in tuple(bpy.context.view_layer.objects):  # showing one makes the layer anew
+    for obj in tuple(bpy.context.view_layer.objects):  # showing one rebuilds the layer
         obj.hide_set(False)
     for obj in scene.objects:
         obj.hide_viewport = obj.hide_render

@@ -1,4 +1,4 @@
-"""Selecting objects in Blender while its view layer is made anew."""
+"""Selecting objects in Blender while its view layer is rebuilt."""
 
 from __future__ import annotations
 
