@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import glb
-from made_surfels import DOOR, LIGHTS, WALL, irradiance_of, made_asset, weights_of
+from made_surfels import DOOR, LIGHTS, PANORAMA, RANK, WALL, irradiance_of, made_asset, weights_of
 from passes import Passes
 from test_unity import needs_mono, needs_spirv
 
@@ -21,7 +21,8 @@ from srbf.export.surfel_textures import PASSES, surfel_textures
 from srbf.gl.uniforms import NO_CONE, versine
 from srbf.io import files
 from srbf.io.image import read_image
-from srbf.lights import DirectionalLight, Light, NamedLight, PointLight, SpotLight
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SpotLight
+from srbf.methods.surface_changes import Surfaces, with_albedo
 from srbf.visibility.surface_cells import Cells, frames
 
 pytestmark = pytest.mark.engines
@@ -29,6 +30,9 @@ pytest.importorskip("embreex")
 
 SHADOWS = 256  # texels of a face
 CLOSE = 5e-6  # of the largest: sums of floats
+HALF = 1e-3  # of the largest: numpy rounds a repainted table to half floats
+MATRICES = [("gather", "columns"), ("gather", "scale"), ("sent", "scale"), ("feedback", "columns"), ("feedback", "scale")]
+CELLS = 0.005  # of all weights: texels that straddle cells count in parts here, wholly in numpy, which has them finer
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +68,8 @@ class Unity:
         text = shader_of(folder, "SrbfSurfels.hlsl")
         names: dict[str, tuple[str, ...]] = {"onCube": ("SrbfNearness", "SrbfOccluderOnCube"), "onMap": ("SrbfHeight", "SrbfOccluderOnMap")}
         names |= {"byCube": ("SrbfIrradianceByCube",), "byMap": ("SrbfIrradianceByMap",), "means": ("SrbfMeans",)}
-        names |= {"parts": ("SrbfTableParts",), "sums": ("SrbfTableSums",)}
+        names |= {"parts": ("SrbfTableParts",), "sums": ("SrbfTableSums",), "cells": ("SrbfCells",), "product": ("SrbfProduct",)}
+        names |= {"exchange": ("SrbfExchange",), "repainted": ("SrbfRepainted",)}
         self.programs = {name: passes.program(text, *entries) for name, entries in names.items()}
         self.passes, self.told, self.asset, self.folder = passes, told, asset, folder
         files_of = {name: read_image(folder / told[name]) for name in ("places", "normals", "ranges", "corners")}
@@ -108,7 +113,8 @@ class Unity:
             "_SrbfLightShape": (light.a0, light.radius, *cone),
         }
 
-    def weights(self, irradiance: Any, added: np.ndarray | None = None) -> np.ndarray:
+    def weights(self, irradiance: Any, added: Any = None, repainted: Any = None) -> np.ndarray:
+        """`added`: a texture of a row per row of the first table; `repainted`: that table with other albedo."""
         numbers = self.target(*read_image(self.folder / self.told["ranges"]).shape[:2])
         self.passes.draw(self.programs["means"], numbers, self.images | {"_SrbfIrradiance": irradiance}, {})
         for i, table in enumerate(self.told["tables"]):
@@ -121,16 +127,66 @@ class Unity:
             parts, target = self.target(-(-rows * blocks // width), width), self.target(*shape)
             values = {"_SrbfTable": (rows, columns, blocks, table["channels"] == 1), "_SrbfScale": [table["scale"]]}
             entries = self.passes.texture(read_image(self.folder / table["file"]))
+            if repainted is not None and i == 0:
+                entries, values["_SrbfScale"] = repainted, [1]
             self.passes.draw(
                 self.programs["parts"], parts, {"_SrbfEntries": entries, "_SrbfNumbers": numbers}, values | {"_SrbfTargetWidth": [width]}
             )
-            more = np.zeros((shape[0] * shape[1], 4))
-            if added is not None and i == 0:
-                more[:rows, :3] = added
-            images = {"_SrbfParts": parts, "_SrbfAdded": self.passes.texture(more.reshape(*shape, 4))}
+            more = added if added is not None and i == 0 else self.target(1, 1)
+            images = {"_SrbfParts": parts, "_SrbfAdded": more}
             self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[1]]})
             numbers = target
         return self.passes.read(numbers)[..., :3]
+
+    def column(self, weights: np.ndarray) -> Any:
+        """A texel per row."""
+        return self.passes.texture(np.pad(weights[:, None], ((0, 0), (0, 0), (0, 1))))
+
+    def multiplied(
+        self,
+        name: str,
+        shape: tuple[int, int],
+        left: Any,
+        right: Any,
+        count: int,
+        scale: float,
+        addend: Any,
+        images: dict[str, Any] | None = None,
+    ) -> Any:
+        """`addend`: a texture and its scale."""
+        made = self.target(*shape)
+        images = {"_SrbfLeft": left, "_SrbfRight": right, "_SrbfAddend": addend[0], **(images or {})}
+        self.passes.draw(self.programs[name], made, images, {"_SrbfMatrix": (count, scale, addend[1], 1)})
+        return made
+
+    def lit_by(self, panorama: np.ndarray, axes: np.ndarray, energy: float, added: Any) -> Any:
+        """What is added with an environment: rows from below, `axes` the directions of Unity's x, z and -y in the asset's frame."""
+        told = self.told["environment"]
+        images = {"_SrbfCells": read_image(self.folder / self.told["cells"]), "_SrbfEnvironment": panorama}
+        values = {"_SrbfAtMiddle": (*axes[0], told["side"]), "_SrbfAtLeft": (*axes[1], 0), "_SrbfAtRowZero": (*axes[2], energy)}
+        radiances = self.target(told["columns"], 1)
+        self.passes.draw(self.programs["cells"], radiances, {name: self.passes.texture(pixels) for name, pixels in images.items()}, values)
+        rows = self.told["tables"][0]["rows"]
+        table = self.passes.texture(read_image(self.folder / told["file"]))
+        return self.multiplied("product", (rows, 1), table, radiances, told["columns"], told["scale"], (added, 1))
+
+    def repainted(self, albedo: np.ndarray) -> tuple[Any, Any, Any]:
+        """(exchange, series, table) with the albedo of surfels (S, 2, 3) now, and of the bake."""
+        told, table = self.told["changes"], self.told["tables"][0]
+        rank, count = told["feedback"]["columns"], told["gather"]["columns"]
+        matrix = {name: self.passes.texture(read_image(self.folder / told[name]["file"])) for name in ("gather", "sent", "feedback")}
+        images = {"_SrbfAlbedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1)))), "_SrbfEntries": matrix["gather"]}
+        addend, scale = (matrix["feedback"], told["feedback"]["scale"]), told["gather"]["scale"] * told["sent"]["scale"]
+        exchange = self.multiplied("exchange", (rank, rank), matrix["gather"], matrix["sent"], count, scale, addend, images)
+        series = one = self.passes.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
+        for term in range(told.get("bounces", 64)):
+            series = self.multiplied("product", (rank, rank), exchange, series, rank if term else 0, 1, (one, 1))
+        before, own = (
+            self.passes.texture(read_image(self.folder / told["series"])),
+            self.passes.texture(read_image(self.folder / table["file"])),
+        )
+        changed = self.multiplied("repainted", (rank, count), before, series, rank, told["gather"]["scale"], (own, table["scale"]), images)
+        return exchange, series, changed
 
 
 def face_axes(face: int) -> list[np.ndarray]:
@@ -176,10 +232,33 @@ def test_tables_give_numpys_weights(drawn: Unity, asset: Asset, folder: Path, to
     rays = np.zeros((shape[0] * shape[1], 4))
     rays[: len(order), :3] = np.sum([irradiance_of(asset, light) for light in lights], axis=0)[order]
     name, radiance = told["objects"][1], np.array([0.5, 2.0, 1.0])
-    added = read_image(folder / told["emission"])[1] * radiance
+    added = drawn.column(read_image(folder / told["emission"])[1] * radiance)
     found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), added)
-    expected = weights_of(asset, [*lights, NamedLight(name, tuple(radiance))])
+    emitting = NamedLight(name, tuple(radiance))
+    expected = weights_of(asset, [*lights, emitting])
     np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
+    painted = {told["objects"][0]: (0.1, 0.6, 0.9)}
+    albedo = np.stack([Surfaces.of(asset).repainted(painted)[0].albedo, Surfaces.of(asset).albedo], axis=1)
+    exchange, series, table = drawn.repainted(albedo)
+    first = drawn.column(read_image(folder / told["changes"]["first"])[1] * radiance)
+    reflected = drawn.multiplied("product", (RANK, 1), series, first, RANK, 1, (drawn.target(1, 1), 0))
+    bounced = drawn.multiplied("product", (RANK, 1), exchange, reflected, RANK, 1, (first, 1))
+    found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), bounced, table)
+    after = weights_of(with_albedo(asset, painted), [*lights, emitting])
+    np.testing.assert_allclose(found, after, atol=HALF * np.abs(after).max())
+    assert np.abs(after - expected).max() > 0.05 * np.abs(expected).max()
+
+
+@needs_spirv
+def test_an_environment_adds_what_numpy_says(drawn: Unity, asset: Asset) -> None:
+    """Of a map in Unity's layout, u = 1/2 - atan2(z, x) / 2 pi, whose rows start below; Unity's (x, y, z) is the asset's (-x, -z, y)."""
+    axes = np.array([[-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)  # of Unity's x, z, -y
+    found = drawn.weights(drawn.irradiance([]), drawn.lit_by(PANORAMA[::-1], axes, 0.7, drawn.target(1, 1)))
+    turned = np.roll(PANORAMA, PANORAMA.shape[1] // 2, axis=1)  # whose middle is at -x
+    expected = weights_of(asset, [EnvironmentLight(turned.repeat(4, axis=0).repeat(4, axis=1), (0.7,) * 3)])
+    assert np.linalg.norm(found - expected) < CELLS * np.linalg.norm(expected)
+    other = weights_of(asset, [EnvironmentLight(PANORAMA, (0.7,) * 3)])
+    assert np.linalg.norm(other - expected) > 10 * CELLS * np.linalg.norm(expected)
 
 
 @needs_spirv
@@ -296,4 +375,13 @@ def test_c_sharp_reads_what_passes_need(folder: Path, told: dict[str, Any], ask:
     emission = read_image(folder / told["emission"])
     added = np.array(said["added"]).reshape(-1, 4)[:, :3]
     np.testing.assert_allclose(added, emission[1] * [0.5, 2.0, 1.0], rtol=1e-6, atol=1e-7)
-    assert said["told"][0][0] > 50
+    changes, surfaces = told["changes"], Surfaces.of(Asset.open(folder))
+    first = np.array(said["first"]).reshape(-1, 4)[:, :3]
+    np.testing.assert_allclose(first, surfaces.emission[:, 1] * [0.5, 2.0, 1.0], rtol=1e-6, atol=1e-7)
+    numbers = [64, *(changes[name][key] for name, key in MATRICES)]
+    assert said["changes"] == [numbers]
+    assert said["environment"] == [[told["environment"][key] for key in ("columns", "scale", "side")]]
+    painted = np.array(said["painted"]).reshape(-1, 2, 4)[..., :3]
+    now = surfaces.repainted({told["objects"][1]: (0.5, 2.0, 1.0)})[0].albedo
+    np.testing.assert_allclose(painted, np.stack([now, surfaces.albedo], axis=1), atol=1e-6)
+    assert [row[0] > 50 for row in said["told"]] == [True, True]
