@@ -186,7 +186,7 @@ def _(evaluate: Evaluate) -> None:
 
 @twin("surfels/environment_cell.glsl")
 def _(evaluate: Evaluate) -> None:
-    """Of a map that is another in every direction. Texels that straddle cells count in parts here; numpy has the map eight times as fine."""
+    """Of a map that is another in every direction. Texels across cells count in parts here: numpy has the map eight times as fine."""
     side = 6
     turned = np.linalg.qr(np.random.default_rng(76).normal(size=(3, 3)))[0]
     turned *= np.linalg.det(turned)
