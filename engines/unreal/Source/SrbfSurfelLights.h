@@ -57,13 +57,13 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
     TMap<FString, FLinearColor> Paint;
 
-    /** Energy times color is the radiance; energy 0 ends it. */
+    /** Energy times color is the radiance; energy 0 ends it. False, with a warning, where no object of that name changes. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
-    void SetEmission(const FString& Name, float Energy, FLinearColor Color);
+    bool SetEmission(const FString& Name, float Energy, FLinearColor Color);
 
     /** In the bounces alone: materials are yours. An object has its own albedo again when it is removed from Paint. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
-    void SetAlbedo(const FString& Name, FLinearColor Color);
+    bool SetAlbedo(const FString& Name, FLinearColor Color);
 
     virtual void BeginPlay() override;
     virtual void TickComponent(float DeltaTime, ELevelTick TickType, FActorComponentTickFunction* ThisTickFunction) override;
@@ -115,6 +115,7 @@ private:
     UTextureRenderTarget2D* MakeTarget(int Width, int Height, bool bDepth);
     bool MakeMaterial(const FString& Name, TArray<UMaterialInstanceDynamic*>& Made);
     bool MakeShapes();
+    bool Changes(const FString& Name) const;
     std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors) const;
     bool DrawShapes();
     void DrawPaint(const std::vector<float>& Painted);

@@ -17,14 +17,25 @@ FLinearColor Matrix(int Columns, double Scale, double Added) { return FLinearCol
 FLinearColor Axis(const SrbfSurfels::Triple& V, float W) { return FLinearColor(float(V[0]), float(V[1]), float(V[2]), W); }
 }
 
-void USrbfSurfelLights::SetEmission(const FString& Name, float Energy, FLinearColor Color)
+bool USrbfSurfelLights::SetEmission(const FString& Name, float Energy, FLinearColor Color)
 {
-    Emission.FindOrAdd(Name) = Color * Energy;
+    const bool bKnown = Changes(Name);
+    if (bKnown) Emission.FindOrAdd(Name) = Color * Energy;
+    return bKnown;
 }
 
-void USrbfSurfelLights::SetAlbedo(const FString& Name, FLinearColor Color)
+bool USrbfSurfelLights::SetAlbedo(const FString& Name, FLinearColor Color)
 {
-    Paint.FindOrAdd(Name) = Color;
+    const bool bKnown = Changes(Name);
+    if (bKnown) Paint.FindOrAdd(Name) = Color;
+    return bKnown;
+}
+
+bool USrbfSurfelLights::Changes(const FString& Name) const
+{
+    const bool bKnown = Known.Index(TCHAR_TO_UTF8(*Name)) >= 0;
+    if (!bKnown) UE_LOG(LogTemp, Warning, TEXT("expected an object of an asset fitted with --editable, found %s"), *Name);
+    return bKnown;
 }
 
 bool USrbfSurfelLights::MakeShapes()
@@ -53,11 +64,7 @@ std::vector<float> USrbfSurfelLights::Listed(const TMap<FString, FLinearColor>& 
     for (const TPair<FString, FLinearColor>& Entry : Colors)
     {
         const int Object = Known.Index(TCHAR_TO_UTF8(*Entry.Key));
-        if (Object < 0)
-        {
-            UE_LOG(LogTemp, Warning, TEXT("expected an object of an asset fitted with --editable, found %s"), *Entry.Key);
-            continue;
-        }
+        if (Object < 0) continue;
         const float Values[] = {Entry.Value.R, Entry.Value.G, Entry.Value.B, 1.0f};
         std::copy(Values, Values + 4, Found.begin() + 4 * Object);
     }
@@ -66,7 +73,13 @@ std::vector<float> USrbfSurfelLights::Listed(const TMap<FString, FLinearColor>& 
 
 bool USrbfSurfelLights::DrawShapes()
 {
-    if (ShapeMaterials.Num() == 0) return false;
+    if (Environment != LastEnvironment && Environment != nullptr && Known.Cells == 0)
+        UE_LOG(LogTemp, Warning, TEXT("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again"));
+    if (ShapeMaterials.Num() == 0)
+    {
+        LastEnvironment = Environment;
+        return false;
+    }
     const std::vector<float> Shining = Listed(Emission), Painted = Listed(Paint);
     const bool bNewPaint = Painted != LastPaint, bNewEnvironment = Environment != LastEnvironment || EnvironmentEnergy != LastEnergy;
     if (bShapesDrawn && Shining == LastEmission && !bNewPaint && !bNewEnvironment) return false;

@@ -64,6 +64,7 @@ namespace Srbf
         Vector4[] weights;
         Texture2D rows;
         SrbfAsset weighed;
+        string warned;
 
         /// <summary>Dim, recolor or switch one of the scene's own lights; ArgumentException where the asset has none of that name.</summary>
         public void SetLight(string lightName, float intensity, Color color)
@@ -204,7 +205,8 @@ namespace Srbf
         {
             Matrix4x4 assetFromUnity = AssetFromUnity();
             Vector3 x = assetFromUnity.MultiplyVector(Vector3.right).normalized, y = assetFromUnity.MultiplyVector(Vector3.up).normalized, z = assetFromUnity.MultiplyVector(Vector3.forward).normalized;
-            if (environment != null && paint.Count > 0) Debug.LogWarning("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo", this);
+            if (environment != null && !asset.surfels.environment.Exists) Warn("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again");
+            else if (environment != null && paint.Count > 0) Warn("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo");
             return new SrbfShining
             {
                 Radiances = emission.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, InBlendersUnits(entry.color.linear * entry.intensity))),
@@ -214,6 +216,13 @@ namespace Srbf
                 AtLeft = new Vector4(z.x, z.y, z.z, 0),
                 AtRowZero = new Vector4(-y.x, -y.y, -y.z, environmentIntensity / Mathf.PI),  // Unity's rows start below
             };
+        }
+
+        void Warn(string text)
+        {
+            if (warned == text) return;
+            warned = text;
+            Debug.LogWarning(text, this);
         }
 
         /// <summary>From the asset's frame to Unity's world.</summary>
