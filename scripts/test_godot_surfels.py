@@ -1,8 +1,8 @@
 """Compare bounces of Godot's own lights with numpy's, by the light that Godot lays on surfels with its shadow maps; exits 1 if they differ.
 
 As scripts/test_godot.py, in the same chroot: an omni light, a spot, two colored lights, and a sun through an open roof, on both
-renderers. Numbers are relative root mean squares: of the light on the surfels, and of the picture. numpy has the edge of Godot's spots
-here; by its own, spots differ by 0.06.
+renderers; an environment through a window, objects that emit, and objects that are repainted. Numbers are relative root mean squares: of
+the light on the surfels, and of the picture. numpy has the edge of Godot's spots here; by its own, spots differ by 0.06.
     python scripts/test_godot_surfels.py [--keep] [--parts 2] [--only WORD]
 """
 
@@ -29,7 +29,7 @@ from srbf.methods.kept_visibility import light_on_patches
 
 sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
 from godot_lights import Lit  # noqa: E402
-from godot_surfels import assets  # noqa: E402
+from godot_surfels import Shown, assets  # noqa: E402
 
 MOST = 0.05  # of the picture: numpy sees each cell's middle by a ray, Godot its squares by shadow maps
 
@@ -38,29 +38,31 @@ def relative(found: ndarray, wanted: ndarray) -> float:
     return float(np.sqrt(((found - wanted) ** 2).sum() / (wanted**2).sum()))
 
 
-def compare(title: str, asset: Asset, lights: dict[str, list[Lit]], parts: int, chroot: Path, keep: bool) -> int:
+def compare(title: str, asset: Asset, lights: dict[str, Shown], parts: int, chroot: Path, keep: bool) -> int:
     """Print a line per renderer and set of lights; returns the number of differences."""
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
     write(asset, folder)
     for script in ("godot_surfels.gd", "godot_scene.gd"):
         shutil.copy(ROOT / "tests" / "export" / script, folder)
-    jobs = [{"lights": [lit.node for lit in lights[name]], "parts": parts, "output": f"{name}.raw"} for name in lights]
+    jobs = [{**lights[name].job(), "parts": parts, "output": f"{name}.raw"} for name in lights]
     (folder / "jobs.json").write_text(json.dumps(jobs))
     run(folder, chroot, "--headless", "--import")
     on_patches = light_on_patches(asset)
     areas = np.bincount(asset.tables["cells"][1, :, 3].round().astype(int), asset.tables["cells"][0, :, 3])[:, None]
-    missed = 0
+    missed, none = 0, np.zeros((len(areas), 3))
     for renderer, arguments in RENDERERS.items():
         run(folder, chroot, *arguments, "--script", "res://godot_surfels.gd", display=True)
-        for name, own in lights.items():
-            with edge_of(own):
-                wanted = relight(asset, [lit.light() for lit in own]) / np.pi
-                lit = np.sum([on_patches(light) for light in in_asset_frame(asset, [lit.light() for lit in own])], axis=0)
+        for name, shown in lights.items():
+            with edge_of(shown.lights):
+                wanted = relight(*shown.meant(asset)) / np.pi
+                lit = np.sum(
+                    [on_patches(light) for light in in_asset_frame(asset, [lit.light() for lit in shown.lights])] or [none], axis=0
+                )
             found = read(folder / f"{name}.raw")[: wanted.size // 3].reshape(wanted.shape)
             received = read(folder / f"received_{name}.raw")[: len(lit)]
             error = relative(found[asset.covered], wanted[asset.covered])
             missed += error > MOST
-            spread = relative(received * np.sqrt(areas), lit * np.sqrt(areas))
+            spread = relative(received * np.sqrt(areas), lit * np.sqrt(areas)) if lit.any() else float(np.abs(received).max())
             verdict = "" if error <= MOST else "  MISSED"
             say(f"{title:22}{renderer:18}{name:12}{spread:9.4f}{error:9.4f}{verdict}")
     if keep:

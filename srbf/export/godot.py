@@ -6,6 +6,9 @@ import re
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import ShaderError
@@ -15,11 +18,14 @@ from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
 from srbf.gl.includes import resolve_text
 from srbf.io import files
+from srbf.io.image import write_image
 from srbf.methods import method_of
+from srbf.methods.surface_changes import KEY, Surfaces
 
 DATA = "asset"  # the folder of the asset's images, hidden from Godot's own importers
 IMPORTED = "asset.srbf"  # the file that Godot imports: it holds the path of asset.json
 MODEL = "model.glb"  # shown by the example instead of the asset's texels
+SERIES = "surface_series.exr"
 SHADERS = Path("addons/srbf/shaders")
 PROBES = "probes/probe_irradiance.glsl"
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
@@ -47,7 +53,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     encoding = settings.encoding or asset.held
     writer = WRITERS[encoding] if settings.levels in ("auto", 0, 1) else dds.write
     notes = writer(asset, folder / DATA, Settings(encoding, settings.levels)).notes
-    manifest = below(DATA, files.read_json(folder / DATA / MANIFEST))
+    manifest = below(DATA, files.read_json(folder / DATA / MANIFEST)) | _series(asset, folder)
     (folder / DATA / MANIFEST).unlink()
     files.write_json(folder / MANIFEST, manifest)
     files.write_text(folder / DATA / ".gdignore", "")
@@ -55,6 +61,16 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     if settings.mesh is not None:
         shutil.copy(settings.mesh, folder / MODEL)
     return Written((*notes, "docs/engines/godot.md: open the folder as a project, or copy addons/srbf, asset/ and asset.* into one"))
+
+
+def _series(asset: Asset, folder: Path) -> dict[str, Any]:
+    """Of an asset whose surfaces can change, what GDScript would take long to solve: all exchanges of light, half floats over `scale`."""
+    if KEY not in asset.manifest:
+        return {}
+    series = Surfaces.of(asset).series()
+    scale = float(2.0 ** np.ceil(np.log2(np.abs(series).max())))
+    write_image(folder / DATA / SERIES, series / np.float32(scale), "half")
+    return {"surface_series": {"file": f"{DATA}/{SERIES}", "scale": scale}}
 
 
 def method_include(name: str) -> str:

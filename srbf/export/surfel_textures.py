@@ -18,7 +18,9 @@ from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.io.image import write_image
 from srbf.io.scene_glb import read_triangles
+from srbf.methods.environment_table import KEY as ENVIRONMENT
 from srbf.methods.surface_changes import KEY, Surfaces
+from srbf.solve.radiosity import SERIES
 from srbf.visibility.surface_cells import OFFSET, Cells
 
 PASSES = "surfel_passes"
@@ -97,8 +99,8 @@ def write_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
     """Write the textures below `folder`/`data`; returns what `surfel_passes` of the manifest holds.
 
     `tables` take the mean irradiance of the patches, one after the other, to the asset's weights: `rows` of `columns` entries, times
-    `scale`. `emission`: a row of weights per object, for a radiance of 1, to be added after the first table. InputError where a table
-    is larger than textures can be.
+    `scale`. `emission`: a row of weights per object, for a radiance of 1, to be added after the first table. `environment`: a table from
+    radiance in `cells` to what is added there; `changes`: what other albedo needs. InputError where a table is larger than textures.
     """
     made = surfel_textures(asset)
     tables = [name for name in ("surfel_transfer", "light_values") if name in asset.tables]
@@ -110,9 +112,13 @@ def write_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
     if KEY in asset.manifest:
         surfaces = Surfaces.of(asset)
         images["emission"] = np.stack([surfaces.emitted(name, np.ones(3)) for name in surfaces.names]).astype(np.float32)
+    if ENVIRONMENT in asset.manifest:
+        images["cells"] = np.array(asset.manifest[ENVIRONMENT]["cells"], np.float32).reshape(-1, 1, 1)
     for name, pixels in images.items():
         write_image(folder / data / f"surfel_{name}.exr", pixels, "float")
     return {
+        **({"environment": _matrix(asset, ENVIRONMENT, data) | {"side": asset.manifest[ENVIRONMENT]["side"]}} if "cells" in images else {}),
+        **({"changes": _changes(asset, folder, data)} if "emission" in images else {}),
         **{name: f"{data}/surfel_{name}.exr" for name in images},
         **({"objects": list(Surfaces.of(asset).names)} if "emission" in images else {}),
         "middle": made.middle.tolist(),
@@ -122,6 +128,28 @@ def write_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
         "triangles": made.triangles,
         "tables": [_table(asset, name, data) for name in tables],
     }
+
+
+def _changes(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
+    """`gather`, `sent`, `feedback` and `series`, all exchanges of light, by `bounces` or without end; of surfels `shares`, a row per
+    object, and `albedo`; `first`: a row of weights per object that emits, without bounces.
+    """
+    surfaces = Surfaces.of(asset)
+    write_image(folder / data / "surfel_series.exr", surfaces.series(), "float")
+    write_image(folder / data / "surfel_first.exr", np.ascontiguousarray(surfaces.emission.transpose(1, 0, 2)), "float")
+    write_image(folder / data / "surfel_shares.exr", surfaces.shares[..., None], "float")
+    write_image(folder / data / "surfel_albedo.exr", surfaces.albedo[None], "float")
+    own = {name: _matrix(asset, f"surface_{name}", data) for name in ("gather", "sent", "feedback")}
+    files_ = {name: f"{data}/surfel_{name}.exr" for name in ("series", "first", "shares", "albedo")}
+    endless = surfaces.bounces is None or surfaces.bounces >= SERIES
+    return {**own, **files_, **({} if endless else {"bounces": surfaces.bounces})}
+
+
+def _matrix(asset: Asset, name: str, data: str) -> dict[str, Any]:
+    """A file of the asset as rows of texels, values over `scale`."""
+    told = asset.manifest[name]
+    scale = told["scale"] if "scale" in told else asset.manifest[KEY]["scales"][name]
+    return {"file": f"{data}/{told['file']}", "columns": asset.tables[name].shape[1], "scale": scale}
 
 
 def _table(asset: Asset, name: str, data: str) -> dict[str, Any]:

@@ -23,7 +23,11 @@ SHADER = "Relit.shader"
 IMPORTED = "relit.srbf"
 SURFEL_PACK = "SrbfSurfelPack.hlsl"  # what SrbfSurfels.hlsl includes: the same for all assets
 SURFEL_FILES = [
-    f"surfels/{name}.glsl" for name in ("cell_irradiance", "cell_on_cube", "cell_on_map", "patch_mean", "table_part", "block_sum")
+    f"surfels/{name}.glsl"
+    for name in (
+        *("cell_irradiance", "cell_on_cube", "cell_on_map", "patch_mean", "table_part", "block_sum"),
+        *("environment_cell", "matrix_product", "changed_exchange", "repainted_entry"),
+    )
 ]
 
 

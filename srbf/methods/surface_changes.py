@@ -156,6 +156,11 @@ class Surfaces:
             added[:, :, c] = after - _series(self.feedback[:, :, c], self.gather * self.albedo[:, c], self.bounces)
         return replace(self, albedo=painted, feedback=feedback), added
 
+    def series(self) -> Float32[ndarray, "r r 3"]:
+        """Sum over k of feedback^k, all exchanges of light: what a change of albedo replaces."""
+        one = np.eye(len(self.feedback), dtype=np.float32)
+        return np.stack([_series(self.feedback[:, :, c], one, self.bounces) for c in range(3)], axis=2)
+
     def _share_of(self, name: str) -> Float32[ndarray, " S"]:
         if name not in self.names:
             known = ", ".join(self.names[:8]) + (", …" if len(self.names) > 8 else "")

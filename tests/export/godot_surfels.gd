@@ -23,6 +23,13 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	relight.asset = asset
 	relight.surfel_parts = job.parts
 	relight.surfels_every_frame = false
+	if job.panorama:
+		relight.sky = ImageTexture.create_from_image(Image.create_from_data(16, 8, false, Image.FORMAT_RGBF, PackedFloat32Array(job.panorama).to_byte_array()))  # words: ok
+		relight.sky_energy = job.energy  # words: ok
+	for name in job.emission:
+		relight.set_emission(name, job.emission[name][0], _color(job.emission[name][1]))
+	for name in job.albedo:
+		relight.set_albedo(name, _color(job.albedo[name]))
 	var canvas := ColorRect.new()
 	canvas.size = viewport.size
 	relight.add_child(canvas)
@@ -44,3 +51,7 @@ func _write(viewport: SubViewport, output: String) -> void:
 	var image := viewport.get_texture().get_image()
 	image.convert(Image.FORMAT_RGBAF)
 	FileAccess.open("res://%s" % output, FileAccess.WRITE).store_buffer(image.get_data())
+
+
+static func _color(numbers: Array) -> Color:
+	return Color(numbers[0], numbers[1], numbers[2])

@@ -11,6 +11,7 @@ from made_rooms import Room
 from made_tables import in_a_room
 
 from srbf.asset import Asset
+from srbf.light_geometry import environment_samples
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
 from srbf.methods import method_of
 from srbf.methods.surface_changes import Surfaces
@@ -22,6 +23,9 @@ ROOMS = Room.box((4, 3, 2.5), 0.5, 0.6, (2.0, 1.0, 3.0))
 WALL, DOOR = 1.0, (0.2, 2.2)  # x of the wall; y where it ends, and of the room's, as shifted
 SHIFT = np.array([-1.0, -0.8, 0.0], np.float32)  # of `in_a_room`
 RANK, PATCHES = 17, 90
+SIDE = 6  # cells of an environment
+_TEXELS = environment_samples(np.zeros((96, 192, 3), np.float32), "sphere", np.eye(3))[0]
+PANORAMA = np.exp(_TEXELS @ np.random.default_rng(19).normal(size=(3, 3))).astype(np.float32)  # another in every direction
 LIGHTS: dict[str, Light] = {
     "point": PointLight((-0.29, -0.12, 1.33), (1.0, 0.5, 2.0), falloff="inverse-square"),
     "close": PointLight((-0.87, 1.25, 0.85), (0.5, 1.0, 0.7), a0=0.6),
@@ -47,11 +51,15 @@ def made_asset() -> Asset:
     asset.manifest["light_values"] = {"file": "light_values.exr", "lights": RANK, "scale": 0.5, "channels": 1}
     asset.tables["surfel_transfer"] = rng.normal(size=(RANK, count, 3)).astype(np.float16)
     asset.manifest["surfel_transfer"] = {"file": "transfer.exr", "rank": RANK, "surfels": count, "scale": 0.125}
-    gather, sent = rng.normal(size=(2, RANK, count)).astype(np.float32) / count
+    gather, sent = rng.normal(size=(2, RANK, count)).astype(np.float32) * np.array([[[0.1]], [[1 / count]]], np.float32)
     shares = np.stack([np.arange(count) % 2, 1 - np.arange(count) % 2]).astype(np.float32)
     feedback = rng.normal(size=(RANK, RANK, 3)).astype(np.float32) / (4 * RANK)
     albedo, emission = np.full((count, 3), 0.5, np.float32), np.repeat((np.float32(np.pi) * gather @ shares.T)[:, :, None], 3, axis=2)
     Surfaces(gather, sent, feedback, shares, albedo, ("Walls", "Screen"), None, emission).add_to(asset)
+    cells = np.flatnonzero(rng.random(SIDE**2) < 0.3)
+    asset.tables["environment_transfer"] = rng.normal(size=(RANK, len(cells), 3)).astype(np.float16)
+    entry = {"file": "environment_transfer.exr", "rank": RANK, "side": SIDE, "cells": cells.tolist(), "scale": 0.5}
+    asset.manifest["environment_transfer"] = entry
     low = (ROOMS.corners[:, :, 2] < 2.4).any(axis=1)
     assert (~low).sum() == 2
     return replace(asset, scene=glb(ROOMS.corners[low] + SHIFT))

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_surfels import RANK, made_asset
 from made_tables import INSIDE, made
 from test_godot import checked
 
@@ -20,11 +21,14 @@ from srbf.asset import Asset
 from srbf.export import export
 from srbf.export.engine_folder import engine_root
 from srbf.export.godot import write
+from srbf.io.image import read_image
 from srbf.methods import relight
+from srbf.methods.surface_changes import Surfaces
 from srbf.probe_grid import ProbeGrid
 
+HALF_STEP = 2.0**-11  # of a value: the series are half floats
 ADDON = engine_root("godot") / "addons" / "srbf"
-SHADERS = {"surfel_irradiance", "surfel_means", "table_sums", "block_sums", "probe_harmonics"}
+SHADERS = {"surfel_irradiance", "surfel_means", "table_sums", "block_sums", "matrix_product", "repainted_table", "probe_harmonics"}
 PROBES = "probe_harmonics"
 BUILT_IN = {
     "canvas_item": "in vec2 UV; out vec4 COLOR;\n",
@@ -56,13 +60,27 @@ def test_the_tables_go_along(tmp_path: Path) -> None:
 
 def test_passes_get_the_uniforms_that_they_have() -> None:
     declared = {name for shader in SHADERS - {PROBES} for name in uniforms_of(f"{shader}.gdshader")}
-    script = (ADDON / "srbf_surfel_weights.gd").read_text()
+    script = "".join((ADDON / f"srbf_{name}_weights.gd").read_text() for name in ("surfel", "shape"))
     assert set(re.findall(r'"(srbf_\w+)"', script)) == declared
     assert set(re.findall(r"shaders/(\w+)\.gdshader", script)) == SHADERS - {PROBES}
     assert {path.stem for path in (ADDON / "shaders").glob("*.gdshader")} == SHADERS
     declared = {*uniforms_of(f"{PROBES}.gdshader"), *uniforms_of("probe_lit.gdshaderinc")}
     given = set(re.findall(r'"(srbf_\w+)"', "".join((ADDON / f"srbf_{name}.gd").read_text() for name in ("probes", "probe_grid"))))
     assert given | {"srbf_asset_from_world"} == declared  # which SrbfRelight gives
+
+
+def test_all_exchanges_of_light_go_along(tmp_path: Path) -> None:
+    """The series times one exchange less than it: (1 + F + F² + …) (1 - F) = 1."""
+    asset = made_asset()
+    write(asset, tmp_path)
+    told = Asset.open(tmp_path).manifest["surface_series"]
+    series = read_image(tmp_path / told["file"]).astype(np.float64) * told["scale"]
+    feedback = Surfaces.of(asset).feedback
+    for c in range(3):
+        np.testing.assert_allclose(series[..., c] @ (np.eye(RANK) - feedback[..., c]), np.eye(RANK), atol=HALF_STEP * RANK * told["scale"])
+    few = replace(asset, manifest={**asset.manifest, "surfaces": {**asset.manifest["surfaces"], "bounces": 3}})
+    square = np.einsum("ijc,jkc->ikc", feedback, feedback)
+    np.testing.assert_allclose(Surfaces.of(few).series(), np.eye(RANK)[:, :, None] + feedback + square, atol=1e-6)
 
 
 def uniforms_of(shader: str) -> set[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,24 +10,27 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import glb
-from made_surfels import DOOR, LIGHTS, WALL, irradiance_of, made_asset, weights_of
+from made_surfels import DOOR, LIGHTS, PANORAMA, RANK, WALL, irradiance_of, made_asset, weights_of
 from passes import Passes
 from test_unity import needs_mono, needs_spirv
+from unity_passes import Unity, face_axes, frame_of, shader_of
 
 from srbf.asset import Asset
 from srbf.export import spirv, unity
 from srbf.export.surfel_textures import PASSES, surfel_textures
-from srbf.gl.uniforms import NO_CONE, versine
 from srbf.io import files
 from srbf.io.image import read_image
-from srbf.lights import DirectionalLight, Light, NamedLight, PointLight, SpotLight
+from srbf.lights import DirectionalLight, EnvironmentLight, NamedLight, PointLight
+from srbf.methods.surface_changes import Surfaces, with_albedo
 from srbf.visibility.surface_cells import Cells, frames
 
 pytestmark = pytest.mark.engines
 pytest.importorskip("embreex")
 
-SHADOWS = 256  # texels of a face
 CLOSE = 5e-6  # of the largest: sums of floats
+HALF = 1e-3  # of the largest: numpy rounds a repainted table to half floats
+MATRICES = [("gather", "columns"), ("gather", "scale"), ("sent", "scale"), ("feedback", "columns"), ("feedback", "scale")]
+CELLS = 0.005  # of all weights: texels that straddle cells count in parts here, wholly in numpy, which has them finer
 
 
 @pytest.fixture(scope="module")
@@ -47,102 +49,6 @@ def asset(folder: Path) -> Asset:
 @pytest.fixture(scope="module")
 def told(folder: Path) -> dict[str, Any]:
     return files.read_json(folder / "asset.json")[PASSES]
-
-
-def shader_of(folder: Path, name: str) -> str:
-    """An include of Shaders/ with the pack in place, for OpenGL, whose rows run upwards."""
-    line = '#include "SrbfSurfelPack.hlsl"\n'
-    text = (folder / "Srbf/Shaders" / name).read_text()
-    assert text.count(line) == 1
-    return "#define SHADER_API_GLCORE\n" + text.replace(line, (folder / "Srbf/Shaders/SrbfSurfelPack.hlsl").read_text())
-
-
-class Unity:
-    """The passes of SrbfSurfelPasses.cs, in its order and with its uniforms."""
-
-    def __init__(self, passes: Passes, folder: Path, told: dict[str, Any], asset: Asset) -> None:
-        text = shader_of(folder, "SrbfSurfels.hlsl")
-        names: dict[str, tuple[str, ...]] = {"onCube": ("SrbfNearness", "SrbfOccluderOnCube"), "onMap": ("SrbfHeight", "SrbfOccluderOnMap")}
-        names |= {"byCube": ("SrbfIrradianceByCube",), "byMap": ("SrbfIrradianceByMap",), "means": ("SrbfMeans",)}
-        names |= {"parts": ("SrbfTableParts",), "sums": ("SrbfTableSums",)}
-        self.programs = {name: passes.program(text, *entries) for name, entries in names.items()}
-        self.passes, self.told, self.asset, self.folder = passes, told, asset, folder
-        files_of = {name: read_image(folder / told[name]) for name in ("places", "normals", "ranges", "corners")}
-        self.images = {f"_Srbf{name.capitalize()}": passes.texture(pixels) for name, pixels in files_of.items()}
-
-    def target(self, height: int, width: int, channels: int = 4) -> Any:
-        return self.passes.texture(np.zeros((height, width, channels)))
-
-    def irradiance(self, lights: list[Light]) -> Any:
-        sum_ = self.target(*read_image(self.folder / self.told["places"]).shape[:2])
-        for light in lights:
-            distant = isinstance(light, DirectionalLight)
-            size = 4 * SHADOWS if distant else SHADOWS
-            values = self.values(light)
-            slices = []
-            for face in range(1 if distant else 6):
-                axes = frame_of(np.array(light.direction)) if isinstance(light, DirectionalLight) else face_axes(face)
-                values |= {f"_Srbf{name}": (*axis, 0) for name, axis in zip(("Across", "Up", "Ahead"), axes, strict=True)}
-                slices.append(self.target(size, size, 1))
-                program = self.programs["onMap" if distant else "onCube"]
-                self.passes.draw(program, slices[-1], self.images, values, 3 * self.told["triangles"], "max")
-            nearness = self.passes.texture(np.stack([self.passes.read(face) for face in slices]))
-            self.passes.draw(
-                self.programs["byMap" if distant else "byCube"], sum_, self.images | {"_SrbfNearness": nearness}, values, 3, "add"
-            )
-        return sum_
-
-    def values(self, light: Light) -> dict[str, Any]:
-        common = {"_SrbfReach": [self.told["reach"]], "_SrbfLift": [self.told["lift"]], "_SrbfLightColor": (*light.color, 0)}  # type: ignore[union-attr]
-        if isinstance(light, DirectionalLight):
-            return common | {"_SrbfLightPlace": (*light.direction, 0), "_SrbfLightAxis": (0, 0, 1, 1), "_SrbfLightShape": (1, 1, 3, 4)}
-        assert isinstance(light, PointLight)
-        spot = isinstance(light, SpotLight)
-        cone = (versine(light.inner), versine(light.outer)) if isinstance(light, SpotLight) else NO_CONE
-        place = np.array(light.position) - self.told["middle"]
-        axis = light.direction if isinstance(light, SpotLight) else (0, 0, 1)
-        assert spot or cone == NO_CONE
-        return common | {
-            "_SrbfLightPlace": (*place, 0),
-            "_SrbfLightAxis": (*axis, float(light.falloff == "inverse-square")),
-            "_SrbfLightShape": (light.a0, light.radius, *cone),
-        }
-
-    def weights(self, irradiance: Any, added: np.ndarray | None = None) -> np.ndarray:
-        numbers = self.target(*read_image(self.folder / self.told["ranges"]).shape[:2])
-        self.passes.draw(self.programs["means"], numbers, self.images | {"_SrbfIrradiance": irradiance}, {})
-        for i, table in enumerate(self.told["tables"]):
-            rows, columns = table["rows"], table["columns"]
-            blocks = -(-columns // 64)
-            last = i == len(self.told["tables"]) - 1
-            side = math.ceil(math.sqrt(rows))
-            shape = (self.asset.clusters, self.asset.components + 1) if last else (-(-rows // side), side)
-            width = math.ceil(math.sqrt(rows * blocks))
-            parts, target = self.target(-(-rows * blocks // width), width), self.target(*shape)
-            values = {"_SrbfTable": (rows, columns, blocks, table["channels"] == 1), "_SrbfScale": [table["scale"]]}
-            entries = self.passes.texture(read_image(self.folder / table["file"]))
-            self.passes.draw(
-                self.programs["parts"], parts, {"_SrbfEntries": entries, "_SrbfNumbers": numbers}, values | {"_SrbfTargetWidth": [width]}
-            )
-            more = np.zeros((shape[0] * shape[1], 4))
-            if added is not None and i == 0:
-                more[:rows, :3] = added
-            images = {"_SrbfParts": parts, "_SrbfAdded": self.passes.texture(more.reshape(*shape, 4))}
-            self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[1]]})
-            numbers = target
-        return self.passes.read(numbers)[..., :3]
-
-
-def face_axes(face: int) -> list[np.ndarray]:
-    """Columns, rows and the way that a face of a cube looks."""
-    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
-    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
-
-
-def frame_of(toward: np.ndarray) -> list[np.ndarray]:
-    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
-    across /= np.linalg.norm(across)
-    return [across, np.cross(toward, across), toward]
 
 
 @pytest.fixture(scope="module")
@@ -176,10 +82,33 @@ def test_tables_give_numpys_weights(drawn: Unity, asset: Asset, folder: Path, to
     rays = np.zeros((shape[0] * shape[1], 4))
     rays[: len(order), :3] = np.sum([irradiance_of(asset, light) for light in lights], axis=0)[order]
     name, radiance = told["objects"][1], np.array([0.5, 2.0, 1.0])
-    added = read_image(folder / told["emission"])[1] * radiance
+    added = drawn.column(read_image(folder / told["emission"])[1] * radiance)
     found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), added)
-    expected = weights_of(asset, [*lights, NamedLight(name, tuple(radiance))])
+    emitting = NamedLight(name, tuple(radiance))
+    expected = weights_of(asset, [*lights, emitting])
     np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
+    painted = {told["objects"][0]: (0.1, 0.6, 0.9)}
+    albedo = np.stack([Surfaces.of(asset).repainted(painted)[0].albedo, Surfaces.of(asset).albedo], axis=1)
+    exchange, series, table = drawn.repainted(albedo)
+    first = drawn.column(read_image(folder / told["changes"]["first"])[1] * radiance)
+    reflected = drawn.multiplied("product", (RANK, 1), series, first, RANK, 1, (drawn.target(1, 1), 0))
+    bounced = drawn.multiplied("product", (RANK, 1), exchange, reflected, RANK, 1, (first, 1))
+    found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), bounced, table)
+    after = weights_of(with_albedo(asset, painted), [*lights, emitting])
+    np.testing.assert_allclose(found, after, atol=HALF * np.abs(after).max())
+    assert np.abs(after - expected).max() > 0.05 * np.abs(expected).max()
+
+
+@needs_spirv
+def test_an_environment_adds_what_numpy_says(drawn: Unity, asset: Asset) -> None:
+    """Of a map in Unity's layout, u = 1/2 - atan2(z, x) / 2 pi, whose rows start below; Unity's (x, y, z) is the asset's (-x, -z, y)."""
+    axes = np.array([[-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)  # of Unity's x, z, -y
+    found = drawn.weights(drawn.irradiance([]), drawn.lit_by(PANORAMA[::-1], axes, 0.7, drawn.target(1, 1)))
+    turned = np.roll(PANORAMA, PANORAMA.shape[1] // 2, axis=1)  # whose middle is at -x
+    expected = weights_of(asset, [EnvironmentLight(turned.repeat(4, axis=0).repeat(4, axis=1), (0.7,) * 3)])
+    assert np.linalg.norm(found - expected) < CELLS * np.linalg.norm(expected)
+    other = weights_of(asset, [EnvironmentLight(PANORAMA, (0.7,) * 3)])
+    assert np.linalg.norm(other - expected) > 10 * CELLS * np.linalg.norm(expected)
 
 
 @needs_spirv
@@ -296,4 +225,13 @@ def test_c_sharp_reads_what_passes_need(folder: Path, told: dict[str, Any], ask:
     emission = read_image(folder / told["emission"])
     added = np.array(said["added"]).reshape(-1, 4)[:, :3]
     np.testing.assert_allclose(added, emission[1] * [0.5, 2.0, 1.0], rtol=1e-6, atol=1e-7)
-    assert said["told"][0][0] > 50
+    changes, surfaces = told["changes"], Surfaces.of(Asset.open(folder))
+    first = np.array(said["first"]).reshape(-1, 4)[:, :3]
+    np.testing.assert_allclose(first, surfaces.emission[:, 1] * [0.5, 2.0, 1.0], rtol=1e-6, atol=1e-7)
+    numbers = [64, *(changes[name][key] for name, key in MATRICES)]
+    assert said["changes"] == [numbers]
+    assert said["environment"] == [[told["environment"][key] for key in ("columns", "scale", "side")]]
+    painted = np.array(said["painted"]).reshape(-1, 2, 4)[..., :3]
+    now = surfaces.repainted({told["objects"][1]: (0.5, 2.0, 1.0)})[0].albedo
+    np.testing.assert_allclose(painted, np.stack([now, surfaces.albedo], axis=1), atol=1e-6)
+    assert [row[0] > 50 for row in said["told"]] == [True, True]

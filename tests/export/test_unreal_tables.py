@@ -102,15 +102,16 @@ def test_c_plus_plus_refuses_what_are_no_tables(ask: Any, tmp_path: Path) -> Non
     assert "another size" in ask(tmp_path / "tables", [])["refused"][0]
 
 
-def component_compiles(name: str, folder: Path) -> None:
-    """Against handwritten interfaces: each header that it includes and srbf does not have is all of them."""
+def component_compiles(name: str, folder: Path, declared: str | None = None) -> None:
+    """Against handwritten interfaces: each header that it includes and srbf does not have is all of them; `declared`: its own header."""
+    own = declared or name
     shutil.copy(SOURCE / f"{name}.cpp", folder)
-    header = (SOURCE / f"{name}.h").read_text()
+    header = (SOURCE / f"{own}.h").read_text()
     for file in re.findall(r'#include "(.+)"', header + (SOURCE / f"{name}.cpp").read_text()):
         if not (SOURCE / file).exists():
             (folder / file).parent.mkdir(parents=True, exist_ok=True)
             (folder / file).write_text('#include "Declarations.h"\n')
-    (folder / f"{name}.h").write_text(header.replace("public:\n", "public:\n    using Super = UActorComponent;\n", 1))
+    (folder / f"{own}.h").write_text(header.replace("public:\n", "public:\n    using Super = UActorComponent;\n", 1))
     command = ["g++", "-std=c++17", "-Wall", "-fsyntax-only", f"-I{folder}", f"-I{SOURCE}", f"-I{HERE}", str(folder / f"{name}.cpp")]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -8,7 +8,17 @@ from pathlib import Path
 
 from srbf.export.engine_folder import engine_root
 
-ENGINE_FREE = ("SrbfMath", "SrbfJson", "SrbfManifest", "SrbfImage", "SrbfDds", "SrbfLightTable", "SrbfPositionTable", "SrbfSurfels")
+ENGINE_FREE = (
+    "SrbfMath",
+    "SrbfJson",
+    "SrbfManifest",
+    "SrbfImage",
+    "SrbfDds",
+    "SrbfLightTable",
+    "SrbfPositionTable",
+    "SrbfSurfels",
+    "SrbfChanges",
+)
 Said = dict[str, list[list[float]]]
 
 

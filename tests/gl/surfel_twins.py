@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from twins import EPS, POINT, SPOT, SUM, UNIT, Evaluate, N, point_light_expression, twin, units, vec4
 
-from srbf.lights import PointLight
+from srbf.light_geometry import environment_samples
+from srbf.lights import EnvironmentLight, PointLight
+from srbf.methods.surface_changes import Surfaces
+from srbf.visibility.environment_cells import cell_radiance
 from srbf.visibility.received import ReceivedLight, patch_means
 from srbf.visibility.surface_cells import Cells, frames
 
 WIDTH = 16  # texels of a map
+CELLS = 0.01  # of a mean over 100 places in place of all of a cell
 
 
 class Unshadowed:
@@ -150,3 +154,68 @@ def _(evaluate: Evaluate) -> None:
     found = evaluate("surfels/block_sum.glsl", "vec4(srbfBlockSum(parts, 3, int(a.x)), 0.0)", vec4(np.arange(9.0)), images={"parts": parts})
     np.testing.assert_allclose(found[:8, :3], parts.reshape(8, 3, 3).sum(axis=1), atol=SUM)
     assert not found[8:, :3].any()
+
+
+@twin("surfels/matrix_product.glsl")
+def _(evaluate: Evaluate) -> None:
+    rng = np.random.default_rng(75)
+    left, right = rng.normal(size=(5, 7, 3)), rng.normal(size=(7, 4, 3))
+    expression = "vec4(srbfMatrixProduct(left, right, 7, ivec2(a.xy)), 0.0)"
+    found = evaluate("surfels/matrix_product.glsl", expression, entries(5, 4), images={"left": left, "right": right})
+    np.testing.assert_allclose(found[:, :3].reshape(5, 4, 3), np.einsum("ikc,kjc->ijc", left, right), atol=10 * SUM)
+
+
+@twin("surfels/changed_exchange.glsl")
+def _(evaluate: Evaluate) -> None:
+    own, painted, _ = repainted()
+    images = {"gather": own.gather[..., None], "sent": own.sent[..., None], "albedo": np.stack([painted.albedo, own.albedo], axis=1)}
+    expression = "vec4(srbfChangedExchange(gather, sent, albedo, 9, ivec2(a.xy)), 0.0)"
+    found = evaluate("surfels/changed_exchange.glsl", expression, entries(4, 4), images=images)
+    np.testing.assert_allclose(found[:, :3].reshape(4, 4, 3), painted.feedback - own.feedback, atol=SUM)
+
+
+@twin("surfels/repainted_entry.glsl")
+def _(evaluate: Evaluate) -> None:
+    own, painted, added = repainted()
+    images = {"before": own.series() / 2, "after": painted.series(), "gather": own.gather[..., None]}
+    images["albedo"] = np.stack([painted.albedo, own.albedo], axis=1)
+    expression = "vec4(srbfRepaintedEntry(before, after, gather, albedo, 4, 2.0, ivec2(a.xy)), 0.0)"
+    found = evaluate("surfels/repainted_entry.glsl", expression, entries(4, 9), images=images)
+    np.testing.assert_allclose(found[:, :3].reshape(4, 9, 3), added, atol=10 * SUM)
+
+
+@twin("surfels/environment_cell.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Of a map that is another in every direction. Texels across cells count in parts here: numpy has the map eight times as fine."""
+    side = 6
+    turned = np.linalg.qr(np.random.default_rng(76).normal(size=(3, 3)))[0]
+    turned *= np.linalg.det(turned)
+    directions, _ = environment_samples(np.zeros((64, 128, 3), np.float32), "sphere", np.eye(3))
+    image = np.exp(directions @ np.random.default_rng(77).normal(size=(3, 3))).astype(np.float32)
+    ahead, left, up = (f"vec3({', '.join(map(str, axis))})" for axis in turned.T)
+    call = f"srbfEnvironmentCell(panorama, {ahead}, {left}, {up}, int(a.x), {side})"
+    found = evaluate("surfels/environment_cell.glsl", f"vec4({call}, 0.0)", vec4(np.arange(36.0)), images={"panorama": image})[:, :3]
+    fine = EnvironmentLight(image.repeat(8, axis=0).repeat(8, axis=1), rotation=turned)
+    np.testing.assert_allclose(found, cell_radiance(fine, side), rtol=CELLS)
+    assert np.ptp(found, axis=0).min() > 0.5
+    even = evaluate(
+        "surfels/environment_cell.glsl", f"vec4({call}, 0.0)", vec4(np.arange(36.0)), images={"panorama": np.full_like(image, 0.5)}
+    )
+    np.testing.assert_allclose(even[:, :3], 0.5, rtol=SUM)
+
+
+def entries(rows: int, columns: int) -> np.ndarray:
+    """Column and row of every entry of a matrix, row by row."""
+    row, column = np.divmod(np.arange(rows * columns), columns)
+    return vec4(np.stack([column, row, row], axis=1).astype(float))
+
+
+def repainted() -> tuple[Surfaces, Surfaces, np.ndarray]:
+    """(surfaces of 4 shapes and 9 surfels, the same with one object repainted, what that adds to the table)."""
+    rng = np.random.default_rng(78)
+    gather, sent = rng.normal(size=(2, 4, 9)).astype(np.float32) / 3
+    albedo = rng.uniform(0.2, 0.6, (9, 3)).astype(np.float32)
+    feedback = (np.einsum("is,sc,js->ijc", gather, albedo, sent) / 4).astype(np.float32)
+    shares = np.stack([np.arange(9) % 2, 1 - np.arange(9) % 2]).astype(np.float32)
+    own = Surfaces(gather, sent / 4, feedback, shares, albedo, ("Wall", "Floor"), None, np.zeros((4, 2, 3), np.float32))
+    return own, *own.repainted({"Wall": (0.1, 0.7, 0.9)})

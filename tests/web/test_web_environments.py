@@ -50,6 +50,7 @@ SETS = [[ENVIRONMENT], [*LIGHTS["point"], ENVIRONMENT, {**ENVIRONMENT, "color": 
         ("three-lightmap", {"weights": "gpu"}),
         ("nodes-lightmap", {"weights": "gpu", "backend": "webgl"}),
         ("nodes-lightmap", {"weights": "gpu", "backend": "webgpu"}),
+        ("nodes-lightmap", {"weights": "compute", "backend": "webgpu"}),
     ],
 )
 def test_maps_shine_through_windows(browser: Any, page: str, job: dict[str, str]) -> None:

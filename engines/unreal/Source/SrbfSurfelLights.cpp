@@ -52,7 +52,7 @@ void USrbfSurfelLights::BeginPlay()
     }
     for (int Copy = 0; Copy < 2; ++Copy) Targets.Add(MakeTarget(Known.PlacesWidth, Known.PlacesHeight, false));
     Targets.Add(MakeTarget(Known.RangesWidth, Known.RangesHeight, false));
-    bool bWhole = MakeMaterial(TEXT("SurfelIrradiance")) && MakeMaterial(TEXT("SurfelMeans"));
+    bool bWhole = MakeMaterial(TEXT("SurfelIrradiance"), Materials) && MakeMaterial(TEXT("SurfelMeans"), Materials);
     for (size_t Table = 0; Table < Known.Tables.size(); ++Table)
     {
         const SrbfSurfelTable& Sizes = Known.Tables[Table];
@@ -61,9 +61,11 @@ void USrbfSurfelLights::BeginPlay()
         const auto Sums = bLast ? std::array<int, 2>{Known.WeightsWidth, Known.WeightsHeight} : SrbfSurfels::Square(Sizes.Rows);
         Targets.Add(MakeTarget(Parts[0], Parts[1], false));
         Targets.Add(MakeTarget(Sums[0], Sums[1], false));
-        bWhole = bWhole && MakeMaterial(FString::Printf(TEXT("SurfelParts%d"), int(Table))) && MakeMaterial(FString::Printf(TEXT("SurfelSums%d"), int(Table)));
+        bWhole = bWhole && MakeMaterial(FString::Printf(TEXT("SurfelParts%d"), int(Table)), Materials) && MakeMaterial(FString::Printf(TEXT("SurfelSums%d"), int(Table)), Materials);
     }
+    if (bWhole && (Known.Cells > 0 || !Known.Names.empty())) bWhole = MakeShapes();
     if (!bWhole) return;
+    OwnTable = Materials[FirstSum]->K2_GetTextureParameterValue(TEXT("Table"));
     if (Known.Groups == 0)
     {
         for (int Face = 0; Face < 7; ++Face) Targets.Add(MakeTarget((Face < 6 ? 1 : MapSides) * ShadowSize, (Face < 6 ? 1 : MapSides) * ShadowSize, true));
@@ -86,7 +88,8 @@ void USrbfSurfelLights::TickComponent(float DeltaTime, ELevelTick TickType, FAct
 {
     Super::TickComponent(DeltaTime, TickType, ThisTickFunction);
     const std::vector<FLook> Now = Looks();
-    if (bDrawn && !bEveryTick && Now == Last) return;
+    const bool bShapes = DrawShapes();
+    if (bDrawn && !bEveryTick && !bShapes && Now == Last) return;
     bDrawn = true;
     Last = Now;
     UKismetRenderingLibrary::ClearRenderTarget2D(this, Targets[Irradiance], FLinearColor(0.0f, 0.0f, 0.0f, 0.0f));
@@ -98,8 +101,11 @@ void USrbfSurfelLights::TickComponent(float DeltaTime, ELevelTick TickType, FAct
     {
         const SrbfSurfelTable& Sizes = Known.Tables[Table];
         const int Parts = FirstTable + 2 * int(Table), Sums = Parts + 1, Material = FirstSum + 2 * int(Table);
-        const FLinearColor Entries(float(Sizes.Rows), float(Sizes.Columns), float(Sizes.Blocks()), float(Sizes.Scale));
+        const bool bRepainted = bPainted && Table == 0;
+        const FLinearColor Entries(float(Sizes.Rows), float(Sizes.Columns), float(Sizes.Blocks()), bRepainted ? 1.0f : float(Sizes.Scale));
         for (int Pass = 0; Pass < 2; ++Pass) Materials[Material + Pass]->SetVectorParameterValue(TEXT("Entries"), Entries);
+        if (Table == 0) Materials[Material]->SetTextureParameterValue(TEXT("Table"), bRepainted ? RepaintedTable : OwnTable);
+        if (Table == 0 && ShapeMaterials.Num() > 0) Materials[Material + 1]->SetTextureParameterValue(TEXT("Added"), Added);
         Materials[Material]->SetTextureParameterValue(TEXT("Numbers"), Targets[Numbers]);
         Draw(Parts, Material);
         Materials[Material + 1]->SetTextureParameterValue(TEXT("Parts"), Targets[Parts]);
@@ -113,12 +119,12 @@ UTextureRenderTarget2D* USrbfSurfelLights::MakeTarget(int Width, int Height, boo
     return UKismetRenderingLibrary::CreateRenderTarget2D(this, Width, Height, bDepth ? RTF_R32f : RTF_RGBA32f);
 }
 
-bool USrbfSurfelLights::MakeMaterial(const FString& Name)
+bool USrbfSurfelLights::MakeMaterial(const FString& Name, TArray<UMaterialInstanceDynamic*>& Made)
 {
     const FString Path = FString::Printf(TEXT("%s/%s.%s"), *Folder, *Name, *Name);
     UMaterialInterface* Material = LoadObject<UMaterialInterface>(nullptr, *Path);
     if (Material == nullptr) UE_LOG(LogTemp, Error, TEXT("expected the material %s, found none; run import_srbf.py again"), *Path);
-    if (Material != nullptr) Materials.Add(UMaterialInstanceDynamic::Create(Material, this));
+    if (Material != nullptr) Made.Add(UMaterialInstanceDynamic::Create(Material, this));
     return Material != nullptr;
 }
 
@@ -195,6 +201,11 @@ void USrbfSurfelLights::CaptureFaces(const FLook& Look)
 
 void USrbfSurfelLights::Draw(int Target, int Material)
 {
-    Materials[Material]->SetVectorParameterValue(TEXT("Size"), Size(Targets[Target]->SizeX, Targets[Target]->SizeY));
-    UKismetRenderingLibrary::DrawMaterialToRenderTarget(this, Targets[Target], Materials[Material]);
+    DrawInto(Targets[Target], Materials[Material]);
+}
+
+void USrbfSurfelLights::DrawInto(UTextureRenderTarget2D* Target, UMaterialInstanceDynamic* Material)
+{
+    Material->SetVectorParameterValue(TEXT("Size"), Size(Target->SizeX, Target->SizeY));
+    UKismetRenderingLibrary::DrawMaterialToRenderTarget(this, Target, Material);
 }

@@ -11,6 +11,7 @@ class ULightComponent;
 class UMaterialInstanceDynamic;
 class USceneCaptureComponent2D;
 class UTexture;
+class UTexture2D;
 class UTextureRenderTarget2D;
 
 /**
@@ -42,6 +43,28 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
     bool bEveryTick = false;
 
+    /** An equirectangular map as Blender has it, its middle at Unreal's +X, that shines through windows; radiance times energy. It must be a Texture2D or a render target. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    UTexture* Environment = nullptr;
+
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    float EnvironmentEnergy = 1;
+
+    /** Of an editable asset: radiance of objects that emit, and albedo of objects with another one. */
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    TMap<FString, FLinearColor> Emission;
+
+    UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
+    TMap<FString, FLinearColor> Paint;
+
+    /** Energy times color is the radiance; energy 0 ends it. False, with a warning, where no object of that name changes. */
+    UFUNCTION(BlueprintCallable, Category = "Srbf")
+    bool SetEmission(const FString& Name, float Energy, FLinearColor Color);
+
+    /** In the bounces alone: materials are yours. An object has its own albedo again when it is removed from Paint. */
+    UFUNCTION(BlueprintCallable, Category = "Srbf")
+    bool SetAlbedo(const FString& Name, FLinearColor Color);
+
     virtual void BeginPlay() override;
     virtual void TickComponent(float DeltaTime, ELevelTick TickType, FActorComponentTickFunction* ThisTickFunction) override;
 
@@ -65,10 +88,41 @@ private:
     TArray<UMaterialInstanceDynamic*> Materials;  // irradiance, means, then parts and sums of each table
 
     UPROPERTY(Transient)
+    TArray<UTextureRenderTarget2D*> ShapeTargets;
+
+    UPROPERTY(Transient)
+    TArray<UMaterialInstanceDynamic*> ShapeMaterials;  // none where the asset knows of neither an environment nor objects that change
+
+    UPROPERTY(Transient)
+    UTexture2D* Emitted = nullptr;  // a row for every row of the first table
+
+    UPROPERTY(Transient)
+    UTexture2D* Albedo = nullptr;
+
+    UPROPERTY(Transient)
+    UTexture* OwnTable = nullptr;  // of the asset, from surfels to shapes
+
+    UTexture* Added = nullptr;  // one of those above, as is the next
+    UTexture* RepaintedTable = nullptr;
+    UTexture* LastEnvironment = nullptr;
+    float LastEnergy = 0;
+    std::vector<float> LastEmission, LastPaint;
+    bool bShapesDrawn = false, bPainted = false;
+
+    UPROPERTY(Transient)
     USceneCaptureComponent2D* Capture = nullptr;
 
     UTextureRenderTarget2D* MakeTarget(int Width, int Height, bool bDepth);
-    bool MakeMaterial(const FString& Name);
+    bool MakeMaterial(const FString& Name, TArray<UMaterialInstanceDynamic*>& Made);
+    bool MakeShapes();
+    bool Changes(const FString& Name) const;
+    std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors) const;
+    bool DrawShapes();
+    void DrawPaint(const std::vector<float>& Painted);
+    void DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, FLinearColor Numbers);
+    void DrawInto(UTextureRenderTarget2D* Target, UMaterialInstanceDynamic* Material);
+    static UTexture2D* MakeNumbers(int Width, int Height);
+    static void Upload(UTexture2D* Texture, const std::vector<float>& Texels);
     std::vector<FLook> Looks() const;
     void AddLook(const FLook& Look);
     void CaptureFaces(const FLook& Look);

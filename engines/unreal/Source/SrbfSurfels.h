@@ -31,27 +31,70 @@ public:
     int Groups = 0;                           // texels per cell of compressed depths; 0: shadows by captures of the scene
     double Far = 0, Reach = 0, Lift = 0;      // m
     std::vector<SrbfSurfelTable> Tables;
+    int Cells = 0, Side = 0;  // of the environment that surfels see; cells per side of the octahedral map of directions
+    double EnvironmentScale = 0;
+    std::vector<std::string> Names;  // of objects that change
+    int Count = 0, Terms = 0;        // surfels; how often light is exchanged
+    double ExchangeScale = 0, GatherScale = 0, FeedbackScale = 0;
 
     /// A file in memory; an empty text, or what was expected and found.
     std::string Read(const uint8_t* Data, size_t Size)
     {
         At = Data;
         End = Data + Size;
-        if (Size < 8 || std::memcmp(Data, "SRBFSRF1", 8) != 0) return "expected what srbf knows of surfels, found another file; export again";
+        if (Size < 8 || std::memcmp(Data, "SRBFSRF2", 8) != 0) return "expected what srbf knows of surfels, found another file; export again";
         At += 8;
         Fill(AssetFromWorld, 16);
         Fill(Middle, 3);
         for (double* Value : {&Reach, &Lift, &Far}) Fill(Value, 1);
         for (int* Value : {&PlacesWidth, &PlacesHeight, &RangesWidth, &RangesHeight, &WeightsWidth, &WeightsHeight, &Groups}) *Value = Int();
-        const int Count = Int();
-        for (int Table = 0; Table < Count && At != nullptr; ++Table)
+        const int TableCount = Int();
+        for (int Table = 0; Table < TableCount && At != nullptr; ++Table)
         {
             Tables.emplace_back();
             Tables.back().Rows = Int();
             Tables.back().Columns = Int();
             Fill(&Tables.back().Scale, 1);
         }
+        ReadShapes();
         return At == End ? "" : "expected what srbf knows of surfels, found a file of another size; export again";
+    }
+
+    /// -1 where no object of that name changes.
+    int Index(const std::string& Name) const
+    {
+        const auto Found = std::find(Names.begin(), Names.end(), Name);
+        return Found == Names.end() ? -1 : int(Found - Names.begin());
+    }
+
+    /// RGBA for every row of the first table: what objects of these radiances, RGB of each, add; with all bounces, or without.
+    std::vector<float> Emitted(const std::vector<float>& Radiances, bool bBounced) const
+    {
+        const int Rows = Tables.empty() ? 0 : Tables[0].Rows;
+        const std::vector<float>& Of = bBounced ? Emission : First;
+        std::vector<float> Added(size_t(4 * Rows), 0.0f);
+        for (size_t Object = 0; Object < Names.size(); ++Object)
+            for (int Row = 0; Row < Rows; ++Row)
+                for (size_t Channel = 0; Channel < 3; ++Channel)
+                    Added[4 * size_t(Row) + Channel] += Radiances[3 * Object + Channel] * Of[3 * (Object * size_t(Rows) + size_t(Row)) + Channel];
+        return Added;
+    }
+
+    /// RGBA of every surfel: its albedo where objects have others, RGB and 1 of each, and that of the bake.
+    std::vector<float> Repainted(const std::vector<float>& Painted) const
+    {
+        std::vector<float> Both(size_t(8 * Count), 0.0f);
+        for (size_t Surfel = 0; Surfel < size_t(Count); ++Surfel)
+            for (size_t Channel = 0; Channel < 3; ++Channel)
+            {
+                const float Own = Albedo[3 * Surfel + Channel];
+                float Now = Own;
+                for (size_t Object = 0; Object < Names.size(); ++Object)
+                    if (Painted[4 * Object + 3] > 0) Now += Shares[Object * size_t(Count) + Surfel] * (Limited(Painted[4 * Object + Channel]) - Own);
+                Both[8 * Surfel + Channel] = Limited(Now);
+                Both[8 * Surfel + 4 + Channel] = Own;
+            }
+        return Both;
     }
 
     /// A place of Unreal's world (cm, left-handed) in the asset's frame, less the middle of the cells (m).
@@ -114,6 +157,37 @@ public:
 private:
     double AssetFromWorld[16] = {}, Middle[3] = {};
     const uint8_t *At = nullptr, *End = nullptr;
+    std::vector<float> Emission, First, Shares, Albedo;
+
+    void ReadShapes()
+    {
+        Cells = Int();
+        Side = Int();
+        Fill(&EnvironmentScale, 1);
+        const int Objects = Int();
+        Count = Int();
+        Terms = Int();
+        for (double* Value : {&ExchangeScale, &GatherScale, &FeedbackScale}) Fill(Value, 1);
+        for (int Object = 0; Object < Objects && At != nullptr; ++Object)
+        {
+            const int Size = Int();
+            if (At == nullptr || Size < 0 || Size > End - At) { At = nullptr; return; }
+            Names.emplace_back(reinterpret_cast<const char*>(At), size_t(Size));
+            At += Size;
+        }
+        if (At == nullptr || Objects == 0 || Tables.empty()) return;
+        const size_t Weights = 3 * size_t(Objects) * size_t(Tables[0].Rows);
+        const size_t Sizes[] = {Weights, Weights, size_t(Objects) * size_t(Count), 3 * size_t(Count)};
+        std::vector<float>* const Lists[] = {&Emission, &First, &Shares, &Albedo};
+        for (int List = 0; List < 4 && At != nullptr; ++List)
+        {
+            if (Sizes[List] > size_t(End - At) / sizeof(float)) { At = nullptr; return; }
+            Lists[List]->resize(Sizes[List]);
+            Fill(Lists[List]->data(), Sizes[List]);
+        }
+    }
+
+    static float Limited(float Share) { return std::max(0.0f, std::min(0.99f, Share)); }  // what a bounce keeps at most
 
     int Int()
     {

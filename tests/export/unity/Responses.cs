@@ -89,8 +89,14 @@ static class Responses
         Axes("frame", SrbfSurfels.Frame(new Vector(0.48, -0.6, 0.64)));
         Axes("frame", SrbfSurfels.Frame(new Vector(0, 0, 1)));
         var radiance = new KeyValuePair<string, Vector>(surfels.objects[1], new Vector(n[1], n[2], n[3]));
-        Print("added", surfels.Emitted(new[] { radiance }));
-        try { surfels.Emitted(new[] { new KeyValuePair<string, Vector>("none", new Vector()) }); }
+        Print("added", surfels.Emitted(new[] { radiance }, surfels.emission));
+        Print("first", surfels.Emitted(new[] { radiance }, surfels.changes.first));
+        Print("changes", surfels.changes.terms, surfels.changes.gather.columns, surfels.changes.gather.scale, surfels.changes.sent.scale, surfels.changes.feedback.columns, surfels.changes.feedback.scale);
+        Print("environment", surfels.environment.columns, surfels.environment.scale, surfels.environmentSide);
+        Print("painted", surfels.changes.Repainted(new[] { radiance }, surfels.objects));
+        try { surfels.changes.Repainted(new[] { new KeyValuePair<string, Vector>("none", new Vector()) }, surfels.objects); }
+        catch (ArgumentException error) { Console.WriteLine("told " + error.Message.Length); }
+        try { surfels.Emitted(new[] { new KeyValuePair<string, Vector>("none", new Vector()) }, surfels.emission); }
         catch (ArgumentException error) { Console.WriteLine("told " + error.Message.Length); }
     }
 

@@ -70,7 +70,7 @@ namespace UnityEngine
         public void SetMatrix(string name, Matrix4x4 m) { }
         public void SetVectorArray(string name, Vector4[] v) { }
     }
-    public struct Vector3 { public float x, y, z; public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; } public static Vector3 zero, one, right; public float magnitude { get { return 0; } } public static Vector3 operator *(float f, Vector3 v) { return v; } public static Vector3 operator -(Vector3 a, Vector3 b) { return a; } public Vector3 normalized { get { return this; } } public static Vector3 operator -(Vector3 v) { return v; } }
+    public struct Vector3 { public float x, y, z; public Vector3(float x, float y, float z) { this.x = x; this.y = y; this.z = z; } public static Vector3 zero, one, right, up, forward; public float magnitude { get { return 0; } } public static Vector3 operator *(float f, Vector3 v) { return v; } public static Vector3 operator -(Vector3 a, Vector3 b) { return a; } public Vector3 normalized { get { return this; } } public static Vector3 operator -(Vector3 v) { return v; } }
     public struct Vector4 { public float x, y, z, w; public Vector4(float x, float y, float z, float w) { this.x = x; this.y = y; this.z = z; this.w = w; } }
     public struct Color { public float r, g, b, a; public static Color white { get { return new Color(); } } public static Color clear { get { return new Color(); } } public Color linear { get { return this; } } public static Color operator *(Color c, float f) { return c; } public static Color operator *(Color a, Color b) { return a; } }
     public struct Matrix4x4
@@ -83,7 +83,8 @@ namespace UnityEngine
         public Vector3 MultiplyVector(Vector3 v) { return v; }
         public Vector3 MultiplyPoint3x4(Vector3 v) { return v; }
     }
-    public static class Mathf { public static float Max(float a, float b) { return a; } public static Color CorrelatedColorTemperatureToRGB(float kelvin) { return new Color(); } }
+    public static class Debug { public static void LogWarning(object message, Object context) { } }
+    public static class Mathf { public const float PI = 3.14159265f; public static float Max(float a, float b) { return a; } public static Color CorrelatedColorTemperatureToRGB(float kelvin) { return new Color(); } }
     public class TooltipAttribute : Attribute { public TooltipAttribute(string text) { } }
     public class ExecuteAlwaysAttribute : Attribute { }
     public class RequireComponentAttribute : Attribute { public RequireComponentAttribute(Type type) { } }

@@ -16,6 +16,7 @@
 #define TCHAR_TO_UTF8(text) (text)
 #define UTF8_TO_TCHAR(text) (text)
 
+using TCHAR = char;
 using uint8 = uint8_t;
 using int32 = int32_t;
 struct FString { FString(const char* = "") {} const char* operator*() const { return ""; } template <typename... T> static FString Printf(const char*, T...) { return {}; } };
@@ -37,7 +38,7 @@ enum ELevelTick { LEVELTICK_All };
 struct FActorComponentTickFunction { bool bCanEverTick = false; };
 struct UTexture : UObject {};
 struct UMaterialInterface : UObject {};
-struct UMaterialInstanceDynamic : UMaterialInterface { void SetTextureParameterValue(const char*, UTexture*) {} void SetVectorParameterValue(const char*, const FLinearColor&) {} static UMaterialInstanceDynamic* Create(UMaterialInterface*, UObject*) { return nullptr; } };
+struct UMaterialInstanceDynamic : UMaterialInterface { void SetTextureParameterValue(const char*, UTexture*) {} void SetVectorParameterValue(const char*, const FLinearColor&) {} UTexture* K2_GetTextureParameterValue(const char*) { return nullptr; } static UMaterialInstanceDynamic* Create(UMaterialInterface*, UObject*) { return nullptr; } };
 struct AActor : UObject { template <typename T> void GetComponents(TArray<T*>&) const {} };
 struct UActorComponent : UObject
 {

@@ -25,6 +25,13 @@ int main(int, char** arguments)
     std::printf("sizes %d %d %d %d %d %d %d\n", surfels.PlacesWidth, surfels.PlacesHeight, surfels.RangesWidth, surfels.RangesHeight, surfels.WeightsWidth, surfels.WeightsHeight, surfels.Groups);
     std::printf("meters %.17g %.17g %.17g %.17g\n", surfels.Reach, surfels.Lift, surfels.Far, surfels.MetersPerUnit());
     for (const SrbfSurfelTable& table : surfels.Tables) std::printf("table %d %d %.17g %d\n", table.Rows, table.Columns, table.Scale, table.Blocks());
+    std::printf("environment %d %d %.17g\n", surfels.Cells, surfels.Side, surfels.EnvironmentScale);
+    std::printf("changes %d %d %.17g %.17g %.17g\n", surfels.Count, surfels.Terms, surfels.ExchangeScale, surfels.GatherScale, surfels.FeedbackScale);
+    for (const std::string& name : surfels.Names) std::printf("object %d\n", surfels.Index(name));
+    const std::vector<float> radiances{0.0f, 0.0f, 0.0f, 0.5f, 2.0f, 1.0f}, painted{0.0f, 0.0f, 0.0f, 0.0f, 0.5f, 2.0f, 1.0f, 1.0f};  // of the second of two objects
+    for (const float value : surfels.Emitted(radiances, true)) std::printf("emitted %.9g\n", value);
+    for (const float value : surfels.Emitted(radiances, false)) std::printf("first %.9g\n", value);
+    for (const float value : surfels.Repainted(painted)) std::printf("painted %.9g\n", value);
     print("place", surfels.Place(x, y, z));
     print("direction", surfels.Direction(x, y, z));
     print("back", surfels.UnrealDirection(surfels.Direction(x, y, z)));

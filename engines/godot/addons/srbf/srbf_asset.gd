@@ -204,7 +204,7 @@ func _table_weights(directions: PackedVector3Array, colors: PackedVector3Array) 
 	var sums := PackedVector3Array()
 	sums.resize(spreads.size())
 	for n in directions.size():
-		var place := (_octahedral(directions[n]) + Vector2.ONE) * (0.5 * (w_table_size - 1))
+		var place := (octahedral(directions[n]) + Vector2.ONE) * (0.5 * (w_table_size - 1))
 		var node := Vector2i(place).clampi(0, w_table_size - 2)
 		var part := place - Vector2(node)
 		for f in sums.size():
@@ -228,7 +228,7 @@ func _entry(texel: int) -> Vector3:
 
 
 ## A direction's place on the octahedral square, -1 to 1 [Cigolle2014].
-static func _octahedral(direction: Vector3) -> Vector2:
+static func octahedral(direction: Vector3) -> Vector2:
 	var d := direction / (absf(direction.x) + absf(direction.y) + absf(direction.z))
 	if d.z >= 0.0:
 		return Vector2(d.x, d.y)

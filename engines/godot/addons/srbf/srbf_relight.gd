@@ -13,13 +13,14 @@ extends Node3D
 const Z_UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, 1), Vector3(0, -1, 0)), Vector3.ZERO)  # (x, y, z) to (x, -z, y)
 const RADIUS := 1e-4  # meters: least distance of a receiver from a light, as in Godot
 const SKY_WIDTH := 32
+const WINDOW_SKY_WIDTH := 512
 
 @export var asset: SrbfAsset
 ## Meshes with the asset's texture coordinates as second UV layer, and canvas items; the node's children by default.
 @export var surfaces: Array[Node]
 ## Lights to follow; all of the scene by default.
 @export var lights: Array[Light3D]
-## An environment map, as in Godot's PanoramaSkyMaterial; it is averaged down to 32 texels of width. Bytes are sRGB.
+## An environment map, as in Godot's PanoramaSkyMaterial; it is averaged down to 32 texels of width, 512 where it shines through windows. Bytes are sRGB.
 @export var sky: Texture2D
 @export var sky_energy := 1.0
 ## Most omni and spot lights of a shader.
@@ -30,6 +31,10 @@ const SKY_WIDTH := 32
 @export var intensities := {}
 ## Named lights: colors by name, as of Godot's lights, on top of the scene's own; white where a name is missing.
 @export var colors := {}
+## Lights inside a scene, of assets fitted with --editable: linear radiance of objects that emit, by name. See `set_emission`.
+@export var emission := {}
+## The same: colors of objects with other albedo, by name, as of Godot's materials. See `set_albedo`.
+@export var albedo := {}
 ## Lights inside a scene: draw the direct light of all of Godot's lights, with their shadows, on surfels of the scene. Off: omni and spot lights by a table
 ## of places, on the CPU, with the bounces of inverse-square light, omni_attenuation 2, over any range. A spot's bounces are then a rough
 ## approximation: those of a point light at its place with the share of the flux that is inside the cone. In a small room they
@@ -51,6 +56,8 @@ var _materials: Array[ShaderMaterial] = []
 var _weights: ImageTexture
 var _environment_weights: PackedVector4Array
 var _environment_of := []
+var _cells: PackedVector3Array  # radiance of the environment through windows
+var _painted := {}
 var _last := []
 var _warned := {}
 
@@ -64,6 +71,7 @@ func _ready() -> void:
 func apply() -> void:
 	_materials.clear()
 	_last = []
+	_painted = {}
 	_weights = null
 	if surfel_weights:
 		surfel_weights.queue_free()
@@ -92,6 +100,22 @@ func _make_materials() -> void:
 func set_light(light_name: String, intensity := 1.0, color := Color.WHITE) -> void:
 	intensities[light_name] = intensity
 	colors[light_name] = color
+
+
+## Let an object emit, with all bounces: `color` times `energy` is its mean radiance, as of Godot's materials; energy 0 ends it.
+func set_emission(object_name: String, energy := 1.0, color := Color.WHITE) -> void:
+	var linear := color.srgb_to_linear()
+	emission[object_name] = Vector3(linear.r, linear.g, linear.b) * energy
+
+
+## Repaint an object: bounces off it change everywhere. Its own albedo again: `albedo.erase(NAME)`.
+func set_albedo(object_name: String, color: Color) -> void:
+	albedo[object_name] = color
+
+
+## The names that `set_emission` and `set_albedo` take; none where the asset was not fitted with --editable.
+func object_names() -> PackedStringArray:
+	return asset.surfels.surfaces.names if asset and asset.surfels and asset.surfels.surfaces else PackedStringArray()
 
 
 ## The names that `set_light` takes; none where the asset follows Godot's lights.
@@ -123,15 +147,23 @@ func _process(_delta: float) -> void:
 			now.append_array([] if light is DirectionalLight3D else [light.get_param(Light3D.PARAM_RANGE)])
 	if asset.light_table:
 		now.append_array([intensities.duplicate(), colors.duplicate()])
-	if surfel_weights and (surfels_every_frame or now != _last):
-		surfel_weights.draw(asset_from_godot)
-	if now == _last:
-		return
+	if asset.surfels:
+		now.append_array([emission.duplicate(), albedo.duplicate()])
+	var is_changed := now != _last
 	_last = now
+	if is_changed:
+		_follow(found, asset_from_godot)
+	if surfel_weights and (surfels_every_frame or is_changed):
+		surfel_weights.draw(asset_from_godot)
+
+
+## What depends on the lights, the node's place, or the exposure.
+func _follow(found: Array[Light3D], asset_from_godot: Transform3D) -> void:
 	if asset.light_table:
 		_give_weights(asset.light_table.weights(_mix()))
 	elif surfel_weights:
 		_check_lights(found)
+		_set_shapes(asset_from_godot)
 	elif asset.position_table:
 		_give_weights(_cloud_weights(found, asset_from_godot))
 	else:
@@ -152,7 +184,8 @@ func _set_distant_lights(found: Array[Light3D], asset_from_godot: Transform3D) -
 			colors.append(SrbfGodotLight.irradiance(light))
 	var sums := asset.weights(directions, colors, suns_by_table)
 	if sky:
-		_update_environment(asset_from_godot)
+		if _is_new_sky(asset_from_godot):
+			_environment_weights = SrbfSky.weights(asset, SrbfSky.panorama(sky, SKY_WIDTH), asset_from_godot.basis.orthonormalized())
 		for i in sums.size():
 			sums[i] += _environment_weights[i] * sky_energy
 	if asset.method == "relighting-map":
@@ -199,6 +232,8 @@ func _cloud_weights(found: Array[Light3D], asset_from_godot: Transform3D) -> Pac
 	var places := PackedVector3Array()
 	var strengths := PackedVector3Array()
 	var unit := pow(absf(asset_from_godot.basis.determinant()), 1.0 / 3.0)  # the asset's meters per meter of Godot's
+	if sky or emission or albedo:
+		_warn("expected by_surfels for an environment and for objects that change, found it off; they do nothing")
 	for light in found:
 		if light is DirectionalLight3D:
 			_warn("expected omni and spot lights for a light cloud, found %s; it adds no indirect light" % light.name)
@@ -220,24 +255,34 @@ func _warn(text: String) -> void:
 		push_warning(text)
 
 
-## An environment map's weights are the slowest, and change only with it.
-func _update_environment(asset_from_godot: Transform3D) -> void:
-	var now := [asset, sky, asset_from_godot.basis]
-	if now == _environment_of:
+## Objects that emit or are repainted, and an environment through windows.
+func _set_shapes(asset_from_godot: Transform3D) -> void:
+	var known := object_names()
+	for object_name: String in emission.keys() + albedo.keys():
+		if not object_name in known:
+			_warn("expected an object of %s, found %s" % [", ".join(known) if known else "an asset fitted with --editable", object_name])
+	if known:
+		surfel_weights.shapes.set_emission(emission)
+		if albedo != _painted:
+			_painted = albedo.duplicate()
+			surfel_weights.shapes.set_albedo(albedo)
+	if not asset.surfels.environment:
+		if sky:
+			_warn("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again")
 		return
+	if sky and albedo:
+		_warn("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo")
+	if sky and _is_new_sky(asset_from_godot):
+		_cells = SrbfSky.cell_radiance(SrbfSky.panorama(sky, WINDOW_SKY_WIDTH), asset_from_godot.basis.orthonormalized(), asset.surfels.environment_side)
+	surfel_weights.shapes.set_environment(_cells, sky_energy if sky else 0.0)
+
+
+## An environment map's weights are the slowest, and change only with it.
+func _is_new_sky(asset_from_godot: Transform3D) -> bool:
+	var now := [asset, sky, asset_from_godot.basis]
+	var is_new := now != _environment_of
 	_environment_of = now
-	var image := sky.get_image().duplicate() as Image
-	if image.is_compressed():
-		image.decompress()
-	var encoded := image.get_format() <= Image.FORMAT_RGBA8
-	image.convert(Image.FORMAT_RGBF)
-	if encoded:
-		for row in image.get_height():
-			for column in image.get_width():
-				image.set_pixel(column, row, image.get_pixel(column, row).srgb_to_linear())
-	while image.get_width() > SKY_WIDTH and image.get_height() > 1:
-		image.shrink_x2()
-	_environment_weights = SrbfSky.weights(asset, image, asset_from_godot.basis.orthonormalized())
+	return is_new
 
 
 func _set_point_lights(found: Array[Light3D], asset_from_godot: Transform3D) -> void:

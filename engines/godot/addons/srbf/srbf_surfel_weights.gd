@@ -12,16 +12,23 @@ const UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, -1), Vector3(0, 1,
 ## The weights, as the shaders of the asset take them.
 var weights: Texture2D
 var viewports: Array[SubViewport] = []
+## What else enters, where the asset takes environments or its surfaces change.
+var shapes: SrbfShapeWeights
 
 var _layout: SrbfSurfelLayout
 var _camera: Camera3D
 var _squares: Array[MeshInstance3D] = []
 var _material: ShaderMaterial
+var _first: ShaderMaterial  # of the asset's first table
+var _own_table: Texture2D
 
 
 ## `parts` x `parts` pixels a cell; `shadow_size`: of the atlas of the viewport's own shadow maps, pixels.
 static func of(asset: SrbfAsset, parts: int, shadow_size: int) -> SrbfSurfelWeights:
 	var made := SrbfSurfelWeights.new()
+	if asset.surfels.surfaces or asset.surfels.environment:
+		made.shapes = SrbfShapeWeights.of(asset.surfels)
+		made.add_child(made.shapes)  # drawn first
 	made._layout = SrbfSurfelLayout.of(asset.surfels, parts)
 	made._add_squares(parts, shadow_size)
 	made._add_passes(asset, parts)
@@ -41,6 +48,9 @@ func draw(asset_from_godot: Transform3D) -> void:
 	_camera.size = _layout.height * unit
 	_camera.near = 0.4 * depth
 	_camera.far = 4.0 * depth  # directional shadows fade out before
+	if shapes:
+		_first.set_shader_parameter("srbf_table", shapes.table if shapes.table else _own_table)
+		shapes.draw()
 	for viewport in viewports:
 		viewport.render_target_update_mode = SubViewport.UPDATE_ONCE
 
@@ -85,8 +95,9 @@ func _add_passes(asset: SrbfAsset, parts: int) -> void:
 	for i in surfels.tables.size():
 		var rows := surfels.rows[i]
 		var blocks := ceili(float(surfels.columns[i]) / PART)
+		var table := ImageTexture.create_from_image(surfels.tables[i])
 		numbers = _pass(preload("shaders/table_sums.gdshader"), _square(rows * blocks), {
-			"srbf_table": ImageTexture.create_from_image(surfels.tables[i]),
+			"srbf_table": table,
 			"srbf_numbers": numbers,
 			"srbf_scale": surfels.scales[i],
 			"srbf_gray": surfels.tables[i].get_format() == Image.FORMAT_RH,
@@ -94,19 +105,20 @@ func _add_passes(asset: SrbfAsset, parts: int) -> void:
 			"srbf_rows": rows,
 			"srbf_blocks": blocks,
 		})
+		if i == 0:
+			_own_table = table
+			_first = viewports[-1].get_child(0).material
 		var is_last := i == surfels.tables.size() - 1
 		var size := Vector2i(rows / asset.clusters, asset.clusters) if is_last else _square(rows)
-		numbers = _pass(preload("shaders/block_sums.gdshader"), size, {"srbf_numbers": numbers, "srbf_rows": rows, "srbf_blocks": blocks})
+		var values := {"srbf_numbers": numbers, "srbf_rows": rows, "srbf_blocks": blocks}
+		if i == 0 and shapes:
+			values["srbf_added"] = shapes.added
+		numbers = _pass(preload("shaders/block_sums.gdshader"), size, values)
 	weights = numbers
 
 
 func _pass(shader: Shader, size: Vector2i, values: Dictionary) -> Texture2D:
-	var material := ShaderMaterial.new()
-	material.shader = shader
-	material.set_shader_parameter("srbf_size", size)
-	for name in values:
-		material.set_shader_parameter(name, values[name])
-	return _add(pass_of(size, material)).get_texture()
+	return _add(pass_by(shader, size, values)).get_texture()
 
 
 ## Godot draws viewports in the order of the tree.
@@ -114,6 +126,16 @@ func _add(viewport: SubViewport) -> SubViewport:
 	add_child(viewport)
 	viewports.append(viewport)
 	return viewport
+
+
+## A viewport of half floats that a shader fills, with the uniforms of `values`.
+static func pass_by(shader: Shader, size: Vector2i, values: Dictionary) -> SubViewport:
+	var material := ShaderMaterial.new()
+	material.shader = shader
+	material.set_shader_parameter("srbf_size", size)
+	for name in values:
+		material.set_shader_parameter(name, values[name])
+	return pass_of(size, material)
 
 
 ## A viewport of half floats that draws one canvas item.

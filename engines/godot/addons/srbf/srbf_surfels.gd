@@ -17,6 +17,14 @@ const TABLE_WIDTH := 4096  # texels
 @export var rows: PackedInt32Array
 @export var columns: PackedInt32Array
 @export var scales: PackedFloat32Array
+## From the radiance in cells of the octahedral map of directions, `environment_side` squared, to what is added to the first table's rows: a column for each of
+## `environment_cells`. Null where no surfel sees the environment.
+@export var environment: Image
+@export var environment_cells: PackedInt32Array
+@export var environment_side: int
+@export var environment_scale: float
+## Of an asset whose surfaces can change.
+@export var surfaces: SrbfSurfaces
 
 
 ## Null where the lights of the asset are not measured by irradiance on patches.
@@ -33,6 +41,8 @@ static func read(folder: String, manifest: Dictionary) -> SrbfSurfels:
 	surfels._sort(cells.get_data().to_float32_array(), cells.get_width(), patches)
 	if told:
 		surfels._add(folder, told, int(told.rank), patches)
+		surfels.surfaces = SrbfSurfaces.read(folder, manifest)
+		surfels._read_environment(folder, manifest.get("environment_transfer", {}))
 	var functions: int = int(manifest.get("clusters", 1)) * (int(manifest.scalars) + 1)
 	surfels._add(folder, manifest.light_values, functions, int(manifest.light_values.lights))
 	return null if surfels.tables.has(null) else surfels
@@ -44,6 +54,16 @@ func count() -> int:
 
 func patch_count() -> int:
 	return starts.size() - 1
+
+
+func _read_environment(folder: String, told: Dictionary) -> void:
+	if told.get("cells", []).is_empty():
+		return
+	environment = SrbfAsset.image(folder, told.file)
+	environment.convert(Image.FORMAT_RGBAH)
+	environment_cells = PackedInt32Array(told.cells)
+	environment_side = int(told.side)
+	environment_scale = told.scale
 
 
 func _sort(cells: PackedFloat32Array, number: int, patches: int) -> void:

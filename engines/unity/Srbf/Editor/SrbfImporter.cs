@@ -65,6 +65,18 @@ namespace Srbf
             asset.normals = read("normals", surfels.normalsFile, TextureFormat.RGBAFloat);
             asset.ranges = read("ranges", surfels.rangesFile, TextureFormat.RGBAFloat);
             asset.corners = read("corners", surfels.cornersFile, TextureFormat.RGBAFloat);
+            if (surfels.environment.Exists)
+            {
+                asset.cells = read("cells", surfels.cellsFile, TextureFormat.RGBAFloat);
+                asset.environmentTable = read("environment", surfels.environment.file, TextureFormat.RGBAHalf);
+            }
+            if (surfels.changes.Exists)
+            {
+                asset.gather = read("gather", surfels.changes.gather.file, TextureFormat.RHalf);
+                asset.sent = read("sent", surfels.changes.sent.file, TextureFormat.RHalf);
+                asset.feedback = read("feedback", surfels.changes.feedback.file, TextureFormat.RGBAHalf);
+                asset.series = read("series", surfels.changes.seriesFile, TextureFormat.RGBAFloat);
+            }
             asset.surfelTables = System.Array.ConvertAll(surfels.tables, table =>
                 read(Path.GetFileNameWithoutExtension(table.file), table.file, table.channels == 1 ? TextureFormat.RHalf : TextureFormat.RGBAHalf));
         }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Passes of SrbfSurfelPasses, by number. In a folder Resources, so that builds have it.
+// Passes of SrbfSurfelPasses and SrbfShapePasses, by number. In a folder Resources, so that builds have it.
 Shader "Hidden/Srbf/Surfels"
 {
     SubShader
@@ -73,6 +73,38 @@ Shader "Hidden/Srbf/Surfels"
             HLSLPROGRAM
             #pragma vertex SrbfFullscreen
             #pragma fragment SrbfTableSums
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Cells of directions"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfCells
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Product"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfProduct
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Exchange"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfExchange
+            ENDHLSL
+        }
+        Pass
+        {
+            Name "Repainted table"
+            HLSLPROGRAM
+            #pragma vertex SrbfFullscreen
+            #pragma fragment SrbfRepainted
             ENDHLSL
         }
     }

@@ -19,6 +19,8 @@ namespace Srbf
         public SrbfSurfels surfels;              // of lights that passes measure: its textures are
         public Texture2D places, normals, ranges, corners;
         public Texture2D[] surfelTables;
+        public Texture2D cells, environmentTable;         // of a scene that is open
+        public Texture2D gather, sent, feedback, series;  // of surfaces that change
 
         public bool IsMaps { get { return method == "relighting-map"; } }
 

@@ -101,6 +101,7 @@ namespace Srbf
                 normalsFile = Text(told, "normals"),
                 rangesFile = Text(told, "ranges"),
                 cornersFile = Text(told, "corners"),
+                cellsFile = told.ContainsKey("cells") ? Text(told, "cells") : null,
                 emissionFile = told.ContainsKey("emission") ? Text(told, "emission") : null,
                 middle = Numbers(told["middle"]),
                 reach = Number(told, "reach"),
@@ -110,6 +111,31 @@ namespace Srbf
                 objects = told.ContainsKey("objects") ? ((List<object>)told["objects"]).ConvertAll(name => (string)name).ToArray() : new string[0],
                 tables = ((List<object>)told["tables"]).ConvertAll(table => SurfelTable(Member(table))).ToArray(),
             };
+            if (told.ContainsKey("environment"))
+            {
+                Surfels.environment = Matrix(told["environment"]);
+                Surfels.environmentSide = (int)Number(Member(told["environment"]), "side");
+            }
+            if (told.ContainsKey("changes")) ReadChanges(Member(told["changes"]));
+        }
+
+        void ReadChanges(Dictionary<string, object> told)
+        {
+            SrbfChanges changes = Surfels.changes;
+            changes.gather = Matrix(told["gather"]);
+            changes.sent = Matrix(told["sent"]);
+            changes.feedback = Matrix(told["feedback"]);
+            changes.seriesFile = Text(told, "series");
+            changes.firstFile = Text(told, "first");
+            changes.sharesFile = Text(told, "shares");
+            changes.albedoFile = Text(told, "albedo");
+            if (told.ContainsKey("bounces")) changes.terms = (int)Number(told, "bounces");
+        }
+
+        static SrbfMatrix Matrix(object told)
+        {
+            Dictionary<string, object> entry = Member(told);
+            return new SrbfMatrix { file = Text(entry, "file"), columns = (int)Number(entry, "columns"), scale = Number(entry, "scale") };
         }
 
         static SrbfSurfelTable SurfelTable(Dictionary<string, object> told)
@@ -127,7 +153,13 @@ namespace Srbf
         /// <summary>What passes need, from `folder`; null of another asset.</summary>
         public SrbfSurfels SurfelPasses(string folder)
         {
-            if (Surfels != null) Surfels.emission = Surfels.emissionFile == null ? new float[0] : SrbfImage.Read(System.IO.Path.Combine(folder, Surfels.emissionFile)).Values;
+            if (Surfels == null) return null;
+            Func<string, float[]> read = file => SrbfImage.Read(System.IO.Path.Combine(folder, file)).Values;
+            Surfels.emission = Surfels.emissionFile == null ? new float[0] : read(Surfels.emissionFile);
+            if (!Surfels.changes.Exists) return Surfels;
+            Surfels.changes.first = read(Surfels.changes.firstFile);
+            Surfels.changes.shares = read(Surfels.changes.sharesFile);
+            Surfels.changes.albedo = read(Surfels.changes.albedoFile);
             return Surfels;
         }
 

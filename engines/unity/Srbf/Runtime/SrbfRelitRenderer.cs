@@ -49,6 +49,12 @@ namespace Srbf
         [Tooltip("Objects of an editable asset that emit: intensity times color is their radiance.")]
         public List<SrbfNamedLight> emission = new List<SrbfNamedLight>();
 
+        [Tooltip("Objects of an editable asset with another color, in the bounces alone; intensities do nothing.")]
+        public List<SrbfNamedLight> paint = new List<SrbfNamedLight>();
+        [Tooltip("An equirectangular map, as Unity's panoramic skyboxes have it, that shines through the windows of a scene.")]
+        public Texture environment;
+        public float environmentIntensity = 1;
+
         readonly List<SrbfLook> looks = new List<SrbfLook>();
         SrbfSurfelPasses passes;
         readonly List<DistantLight> far = new List<DistantLight>();
@@ -58,6 +64,7 @@ namespace Srbf
         Vector4[] weights;
         Texture2D rows;
         SrbfAsset weighed;
+        string warned;
 
         /// <summary>Dim, recolor or switch one of the scene's own lights; ArgumentException where the asset has none of that name.</summary>
         public void SetLight(string lightName, float intensity, Color color)
@@ -75,6 +82,14 @@ namespace Srbf
             SrbfNamedLight found = emission.Find(entry => entry.name == objectName);
             if (found == null) emission.Add(found = new SrbfNamedLight { name = objectName });
             found.intensity = intensity;
+            found.color = color;
+        }
+
+        /// <summary>Give an object of an editable asset another color, in the bounces alone; to end it, take the entry from `paint`.</summary>
+        public void SetAlbedo(string objectName, Color color)
+        {
+            SrbfNamedLight found = paint.Find(entry => entry.name == objectName);
+            if (found == null) paint.Add(found = new SrbfNamedLight { name = objectName });
             found.color = color;
         }
 
@@ -182,13 +197,32 @@ namespace Srbf
             if (passes != null && (weighed != asset || passes.ShadowSize != shadowSize)) passes.Dispose();
             if (passes == null || passes.IsDisposed) passes = new SrbfSurfelPasses(asset, shadowSize);
             weighed = asset;
-            passes.Draw(looks, Radiances());
+            passes.Draw(looks, Shining());
         }
 
-        /// <summary>Of objects that emit; in Blender's units, as ambient light is.</summary>
-        public List<KeyValuePair<string, Vector>> Radiances()
+        /// <summary>Objects that emit, those with other colors, and the environment; radiances in Blender's units, as ambient light is.</summary>
+        public SrbfShining Shining()
         {
-            return emission.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, InBlendersUnits(entry.color.linear * entry.intensity)));
+            Matrix4x4 assetFromUnity = AssetFromUnity();
+            Vector3 x = assetFromUnity.MultiplyVector(Vector3.right).normalized, y = assetFromUnity.MultiplyVector(Vector3.up).normalized, z = assetFromUnity.MultiplyVector(Vector3.forward).normalized;
+            if (environment != null && !asset.surfels.environment.Exists) Warn("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again");
+            else if (environment != null && paint.Count > 0) Warn("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo");
+            return new SrbfShining
+            {
+                Radiances = emission.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, InBlendersUnits(entry.color.linear * entry.intensity))),
+                Painted = paint.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, new Vector(entry.color.linear.r, entry.color.linear.g, entry.color.linear.b))),
+                Environment = environment,
+                AtMiddle = new Vector4(x.x, x.y, x.z, 0),
+                AtLeft = new Vector4(z.x, z.y, z.z, 0),
+                AtRowZero = new Vector4(-y.x, -y.y, -y.z, environmentIntensity / Mathf.PI),  // Unity's rows start below
+            };
+        }
+
+        void Warn(string text)
+        {
+            if (warned == text) return;
+            warned = text;
+            Debug.LogWarning(text, this);
         }
 
         /// <summary>From the asset's frame to Unity's world.</summary>

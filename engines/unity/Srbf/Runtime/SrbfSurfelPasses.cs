@@ -20,9 +20,10 @@ namespace Srbf
         readonly CommandBuffer buffer = new CommandBuffer { name = "Srbf surfels" };
         readonly RenderTexture irradiance, received, cube, map;
         readonly RenderTexture[] parts, sums;
-        readonly Texture2D added, nothing;
+        readonly Texture2D nothing;
+        readonly SrbfShapePasses shapes;
         readonly List<SrbfLook> known = new List<SrbfLook>();
-        readonly List<KeyValuePair<string, Vector>> emitting = new List<KeyValuePair<string, Vector>>();
+        SrbfShining shining;
         bool drawn;
 
         public int ShadowSize { get; private set; }
@@ -55,8 +56,8 @@ namespace Srbf
                     ? Target(asset.WeightColumns, asset.clusterCount, RenderTextureFormat.ARGBFloat, 0)
                     : Target(Side(tables[i].rows), Rest(tables[i].rows), RenderTextureFormat.ARGBFloat, 0);
             }
-            added = Numbers(sums[0].width, sums[0].height);
-            nothing = Numbers(sums[tables.Length - 1].width, sums[tables.Length - 1].height);
+            nothing = Numbers(1, 1);
+            shapes = new SrbfShapePasses(asset, material);
         }
 
         /// <summary>As the asset's shaders take them.</summary>
@@ -65,24 +66,25 @@ namespace Srbf
         /// <summary>Irradiance of cells, to be drawn by another, such as a render pipeline's own lights, before Finish.</summary>
         public RenderTexture Irradiance { get { return irradiance; } }
 
-        /// <summary>Draw the weights, where a light or an emission is not as before; radiances by object.</summary>
-        public void Draw(List<SrbfLook> looks, List<KeyValuePair<string, Vector>> radiances)
+        /// <summary>Draw the weights, where a light or what shines besides is not as before.</summary>
+        public void Draw(List<SrbfLook> looks, SrbfShining now)
         {
-            if (drawn && Same(looks, known) && Same(radiances, emitting)) return;
+            if (drawn && Same(looks, known) && shining.Equals(now)) return;
             Keep(looks, known);
             buffer.Clear();
             buffer.SetRenderTarget(irradiance);
             buffer.ClearRenderTarget(false, true, Color.clear);
             foreach (SrbfLook look in looks) Add(look);
-            Finish(buffer, radiances);
+            Finish(buffer, now);
             Graphics.ExecuteCommandBuffer(buffer);
-            drawn = true;
         }
 
         /// <summary>Add the passes from Irradiance to Weights to a buffer.</summary>
-        public void Finish(CommandBuffer commands, List<KeyValuePair<string, Vector>> radiances)
+        public void Finish(CommandBuffer commands, SrbfShining now)
         {
-            if (!Same(radiances, emitting) || !drawn) Emit(radiances);
+            if (!drawn || !shining.Equals(now)) shapes.Draw(commands, now);
+            shining = now;
+            drawn = true;
             commands.SetGlobalTexture("_SrbfNormals", asset.normals);
             commands.SetGlobalTexture("_SrbfRanges", asset.ranges);
             commands.SetGlobalTexture("_SrbfIrradiance", irradiance);
@@ -92,12 +94,13 @@ namespace Srbf
             {
                 SrbfSurfelTable table = asset.surfels.tables[i];
                 commands.SetGlobalVector("_SrbfTable", new Vector4(table.rows, table.columns, table.Blocks, table.channels == 1 ? 1 : 0));
-                commands.SetGlobalFloat("_SrbfScale", (float)table.scale);
-                commands.SetGlobalTexture("_SrbfEntries", asset.surfelTables[i]);
+                Texture repainted = i == 0 ? shapes.Table : null;
+                commands.SetGlobalFloat("_SrbfScale", repainted != null ? 1 : (float)table.scale);
+                commands.SetGlobalTexture("_SrbfEntries", repainted != null ? repainted : asset.surfelTables[i]);
                 commands.SetGlobalTexture("_SrbfNumbers", numbers);
                 Fill(commands, parts[i], Parts);
                 commands.SetGlobalTexture("_SrbfParts", parts[i]);
-                commands.SetGlobalTexture("_SrbfAdded", i == 0 ? added : nothing);
+                commands.SetGlobalTexture("_SrbfAdded", i == 0 ? shapes.Added : nothing);
                 Fill(commands, sums[i], Sums);
                 numbers = sums[i];
             }
@@ -108,7 +111,8 @@ namespace Srbf
             foreach (RenderTexture target in new[] { irradiance, received, cube, map }) UnityEngine.Object.DestroyImmediate(target);
             foreach (RenderTexture target in parts) UnityEngine.Object.DestroyImmediate(target);
             foreach (RenderTexture target in sums) UnityEngine.Object.DestroyImmediate(target);
-            foreach (UnityEngine.Object one in new UnityEngine.Object[] { added, nothing, material }) UnityEngine.Object.DestroyImmediate(one);
+            foreach (UnityEngine.Object one in new UnityEngine.Object[] { nothing, material }) UnityEngine.Object.DestroyImmediate(one);
+            shapes.Dispose();
             buffer.Release();
             IsDisposed = true;
         }
@@ -146,16 +150,7 @@ namespace Srbf
             commands.DrawProcedural(Matrix4x4.identity, material, pass, MeshTopology.Triangles, 3, 1);
         }
 
-        void Emit(List<KeyValuePair<string, Vector>> radiances)
-        {
-            Keep(radiances, emitting);
-            float[] values = asset.surfels.Emitted(radiances);
-            Array.Resize(ref values, 4 * added.width * added.height);
-            added.SetPixelData(values, 0);
-            added.Apply(false);
-        }
-
-        static bool Same<T>(List<T> now, List<T> before)
+        internal static bool Same<T>(List<T> now, List<T> before)
         {
             if (now.Count != before.Count) return false;
             for (int i = 0; i < now.Count; i++)
@@ -176,7 +171,7 @@ namespace Srbf
         static Vector4 Four(Vector v, float w) { return new Vector4((float)v.X, (float)v.Y, (float)v.Z, w); }
 
         /// <summary>`slices`: of a texture array; 0 for a plain texture.</summary>
-        static RenderTexture Target(int width, int height, RenderTextureFormat format, int slices)
+        internal static RenderTexture Target(int width, int height, RenderTextureFormat format, int slices)
         {
             var target = new RenderTexture(width, height, 0, format, RenderTextureReadWrite.Linear) { filterMode = FilterMode.Point, hideFlags = HideFlags.HideAndDontSave };
             if (slices > 0)
@@ -188,7 +183,7 @@ namespace Srbf
             return target;
         }
 
-        static Texture2D Numbers(int width, int height)
+        internal static Texture2D Numbers(int width, int height)
         {
             var numbers = new Texture2D(width, height, TextureFormat.RGBAFloat, false, true) { filterMode = FilterMode.Point, hideFlags = HideFlags.HideAndDontSave };
             numbers.SetPixelData(new float[4 * width * height], 0);

@@ -32,13 +32,16 @@ namespace Srbf
     [Serializable]
     public sealed class SrbfSurfels
     {
-        public string placesFile, normalsFile, rangesFile, cornersFile, emissionFile;
+        public string placesFile, normalsFile, rangesFile, cornersFile, emissionFile, cellsFile;
         public double[] middle;     // m, the asset's frame
         public double reach, lift;  // m: of all cells and triangles about the middle; of a cell above its surface
         public int patches, triangles;
         public SrbfSurfelTable[] tables;
         public string[] objects;    // that can emit
         public float[] emission;    // RGB of every object and row of the first table, for a radiance of 1
+        public SrbfMatrix environment = new SrbfMatrix();  // from the radiance of cells of directions to what is added to the first table's rows
+        public int environmentSide;                        // cells per side of the octahedral map
+        public SrbfChanges changes = new SrbfChanges();
 
         /// <summary>A point light's cone: 1 everywhere.</summary>
         public static readonly double[] NoCone = { 3, 4 };
@@ -60,8 +63,8 @@ namespace Srbf
 
         public Vector LessMiddle(Vector place) { return new Vector(place.X - middle[0], place.Y - middle[1], place.Z - middle[2]); }
 
-        /// <summary>RGBA for every row of the first table: what objects of these radiances, one for each name or fewer, add.</summary>
-        public float[] Emitted(IList<KeyValuePair<string, Vector>> radiances)
+        /// <summary>RGBA for every row of the first table: what objects of these radiances, one for each name or fewer, add; `known`: for a radiance of 1.</summary>
+        public float[] Emitted(IList<KeyValuePair<string, Vector>> radiances, float[] known)
         {
             int rows = tables[0].rows;
             var added = new float[4 * rows];
@@ -72,9 +75,9 @@ namespace Srbf
                 for (int row = 0; row < rows; row++)
                 {
                     int at = 3 * (found * rows + row);
-                    added[4 * row] += (float)(entry.Value.X * emission[at]);
-                    added[4 * row + 1] += (float)(entry.Value.Y * emission[at + 1]);
-                    added[4 * row + 2] += (float)(entry.Value.Z * emission[at + 2]);
+                    added[4 * row] += (float)(entry.Value.X * known[at]);
+                    added[4 * row + 1] += (float)(entry.Value.Y * known[at + 1]);
+                    added[4 * row + 2] += (float)(entry.Value.Z * known[at + 2]);
                 }
             }
             return added;

@@ -80,7 +80,7 @@ namespace Srbf
         {
             if (rendered != view || passes == null) return;
             buffer.Clear();
-            passes.Finish(buffer, GetComponent<SrbfRelitRenderer>().Radiances());
+            passes.Finish(buffer, GetComponent<SrbfRelitRenderer>().Shining());
             context.ExecuteCommandBuffer(buffer);
             context.Submit();
         }

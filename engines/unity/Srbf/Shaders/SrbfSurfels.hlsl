@@ -14,7 +14,17 @@ Texture2D _SrbfIrradiance;  // of cells
 Texture2D _SrbfEntries;     // of a table
 Texture2D _SrbfNumbers;     // that it is multiplied by
 Texture2D _SrbfParts;       // of its sums
-Texture2D _SrbfAdded;
+Texture2D _SrbfAdded;       // a row for every row of the table
+Texture2D _SrbfLeft;        // of a product of matrices
+Texture2D _SrbfRight;
+Texture2D _SrbfAddend;
+Texture2D _SrbfAlbedo;      // of every surfel now, and of the bake
+Texture2D _SrbfCells;       // numbers of cells of directions
+Texture2D _SrbfEnvironment; // an equirectangular map
+float4 _SrbfMatrix;         // columns of the left one; scales of the product, of the addend, of the former series
+float4 _SrbfAtMiddle;       // of the environment: the direction at its middle; w: cells per side
+float4 _SrbfAtLeft;
+float4 _SrbfAtRowZero;      // w: its energy
 float4 _SrbfLightPlace;     // or the direction to a directional light
 float4 _SrbfLightColor;
 float4 _SrbfLightAxis;      // w: falloff, 0 linear, 1 inverse-square
@@ -146,7 +156,39 @@ float4 SrbfTableParts(float4 at : SV_Position) : SV_Target
 
 float4 SrbfTableSums(float4 at : SV_Position) : SV_Target
 {
-    return float4(srbfBlockSum(_SrbfParts, int(_SrbfTable.z), SrbfIndex(at)) + _SrbfAdded.Load(int3(int2(at.xy), 0)).rgb, 1.0);
+    int row = SrbfIndex(at);
+    return float4(srbfBlockSum(_SrbfParts, int(_SrbfTable.z), row) + _SrbfAdded.Load(int3(0, row % srbfTextureSize(_SrbfAdded).y, 0)).rgb, 1.0);
+}
+
+// The passes of SrbfShapePasses.
+float3 SrbfWithAddend(float3 product, float4 at)
+{
+    return product * _SrbfMatrix.y + _SrbfAddend.Load(int3(int2(at.xy) % srbfTextureSize(_SrbfAddend), 0)).rgb * _SrbfMatrix.z;
+}
+
+float4 SrbfCells(float4 at : SV_Position) : SV_Target
+{
+    int cell = int(_SrbfCells.Load(int3(int2(at.xy), 0)).r + 0.5);
+    float3 radiance = srbfEnvironmentCell(_SrbfEnvironment, _SrbfAtMiddle.xyz, _SrbfAtLeft.xyz, _SrbfAtRowZero.xyz, cell, int(_SrbfAtMiddle.w));
+    return float4(radiance * _SrbfAtRowZero.w, 1.0);
+}
+
+float4 SrbfProduct(float4 at : SV_Position) : SV_Target
+{
+    return float4(SrbfWithAddend(srbfMatrixProduct(_SrbfLeft, _SrbfRight, int(_SrbfMatrix.x), int2(at.xy)), at), 1.0);
+}
+
+// Left: gather; right: sent.
+float4 SrbfExchange(float4 at : SV_Position) : SV_Target
+{
+    return float4(SrbfWithAddend(srbfChangedExchange(_SrbfLeft, _SrbfRight, _SrbfAlbedo, int(_SrbfMatrix.x), int2(at.xy)), at), 1.0);
+}
+
+// Left and right: the series before and after; the addend is the table.
+float4 SrbfRepainted(float4 at : SV_Position) : SV_Target
+{
+    float3 added = srbfRepaintedEntry(_SrbfLeft, _SrbfRight, _SrbfEntries, _SrbfAlbedo, int(_SrbfMatrix.x), _SrbfMatrix.w, int2(at.xy));
+    return float4(SrbfWithAddend(added, at), 1.0);
 }
 
 #endif

@@ -23,8 +23,8 @@ export interface RelightingNodesOptions extends TargetOptions {
   source?: "maps" | "lightmap";
   /** Room for point and spot lights; their number may change without recompiling. */
   maxPointLights?: number;
-  /** As in `SrbfRelightingMap`. */
-  weights?: "cpu" | "gpu";
+  /** As in `SrbfRelightingMap`; "compute": the tables by compute shaders, on WebGPU alone. */
+  weights?: "cpu" | "gpu" | "compute";
   shadowSize?: number;
   lightsOf?: SceneAsset;
 }
@@ -49,7 +49,8 @@ export class SrbfRelightingNodes extends SceneAsset {
     this.source = sourceOf(asset, options.source);
     const filter = this.source === "maps" ? (options.filter ?? "linear") : "nearest";
     this.textures = new SrbfTextures(asset, filter);
-    if (options.weights === "gpu") this.gpu = new SurfelNodes(asset, options.shadowSize);
+    const { weights = "cpu" } = options;
+    if (weights !== "cpu") this.gpu = new SurfelNodes(asset, options.shadowSize, weights === "compute");
     this.inputs = new NodeInputs(asset, this.textures, filter, options.maxPointLights ?? 16, this.gpu?.weights);
     if (this.source === "lightmap") {
       this.target = lightmapTarget(asset, options);

@@ -17,6 +17,7 @@ import { each } from "./inputs";
 import type { N } from "./nodes";
 import { OccluderNodes } from "./occluder_nodes";
 import { disposeOf, type Pass, pass, render } from "./passes";
+import { type Stage, TableCompute } from "./table_compute";
 import { type CellTextures, irradianceNode, lookUniforms, seenFromFar, seenFromPlace, type Visibility } from "./surfel_irradiance";
 
 const { float, Fn, int, ivec2, min, screenCoordinate, textureLoad, vec3, vec4 } = tsl as Record<string, N>;
@@ -38,15 +39,17 @@ export class SurfelNodes {
   private readonly cells: CellTextures;
   private readonly means: [Pass, Pass];
   private readonly tables: Pass[];
+  private readonly compute?: TableCompute;
   private readonly textures: DataTexture[];
   private readonly added: DataTexture[] = [];
   private readonly ranks: number;
   private shapes = "";
 
-  /** @throws SrbfError on an asset without cells. */
+  /** `computed`: the tables by compute shaders, on WebGPU alone. @throws SrbfError on an asset without cells. */
   constructor(
     private readonly asset: Asset,
     shadowSize = 512,
+    computed = false,
   ) {
     const surfels = surfelsOf(asset);
     const cells = packedCells(surfels);
@@ -65,12 +68,14 @@ export class SurfelNodes {
     const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, normals, ranges, cells.width), received);
     this.means = [mean(0), mean(1)];
     this.ranks = surfels.tables[0].functions;
-    this.tables = this.tablePasses(surfels.tables, received);
+    const stages = this.stagesOf(surfels.tables);
+    this.tables = computed ? [] : tablePasses(stages, received);
+    if (computed) this.compute = new TableCompute(stages, received);
   }
 
   /** The weights, as the nodes of the asset take them. */
   get weights(): Texture {
-    return this.tables[this.tables.length - 1].target.texture;
+    return this.compute?.weights ?? this.tables[this.tables.length - 1].target.texture;
   }
 
   /** Take the objects that emit, and environments. @throws SrbfError where there are some that the asset does not know. */
@@ -98,6 +103,7 @@ export class SurfelNodes {
     this.engine = used;
     render(renderer, this.means[from]);
     for (const one of this.tables) render(renderer, one);
+    this.compute?.run(renderer);
     renderer.setRenderTarget(kept.target);
     renderer.setClearColor(kept.color, kept.alpha);
   }
@@ -107,6 +113,7 @@ export class SurfelNodes {
     disposeOf([...passes, ...[...this.engine.values()].flatMap((one) => one.passes)]);
     for (const { target: drawn } of passes) drawn.dispose();
     for (const one of [...this.textures, ...this.added, this.maps]) one.dispose();
+    this.compute?.dispose();
   }
 
   private passesOf(distant: boolean, visibility: Visibility): [Pass, Pass] {
@@ -144,23 +151,30 @@ export class SurfelNodes {
     for (const [name, value] of Object.entries(numbers)) this.uniforms[name].value = value;
   }
 
-  private tablePasses(tables: readonly LightValues[], received: RenderTarget): Pass[] {
+  private stagesOf(tables: readonly LightValues[]): Stage[] {
     const { weights } = this.asset.tables;
-    let numbers = received;
-    return tables.flatMap((values, i) => {
+    return tables.map((values, i) => {
       const [width, height] = i === tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
       const { texture, scale } = tableTexture(values);
       const added = floatTexture(new Float32Array(4 * width * height), width, height);
       this.textures.push(texture);
       this.added.push(added);
-      const blocks = Math.ceil(values.count / PART);
-      const parts = target(...square(values.functions * blocks));
-      const whole = target(width, height);
-      const passes = [pass(partNode(values, texture, scale, numbers, blocks, parts.width), parts), pass(wholeNode(parts, added, blocks, width), whole)];
-      numbers = whole;
-      return passes;
+      return { values, texture, scale, added, width, height };
     });
   }
+}
+
+/** Two passes for each table: parts of its rows' sums, and these added up. */
+function tablePasses(stages: readonly Stage[], received: RenderTarget): Pass[] {
+  let numbers = received;
+  return stages.flatMap(({ values, texture, scale, added, width, height }) => {
+    const blocks = Math.ceil(values.count / PART);
+    const parts = target(...square(values.functions * blocks));
+    const whole = target(width, height);
+    const passes = [pass(partNode(values, texture, scale, numbers, blocks, parts.width), parts), pass(wholeNode(parts, added, blocks, width), whole)];
+    numbers = whole;
+    return passes;
+  });
 }
 
 const here = (): N => ivec2(screenCoordinate);

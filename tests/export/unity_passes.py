@@ -1,0 +1,165 @@
+"""Unity's passes that light surfels, drawn one after the other as its component draws them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from passes import Passes
+
+from srbf.asset import Asset
+from srbf.gl.uniforms import NO_CONE, versine
+from srbf.io.image import read_image
+from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
+
+SHADOWS = 256  # texels of a face
+
+
+def shader_of(folder: Path, name: str) -> str:
+    """An include of Shaders/ with the pack in place, for OpenGL, whose rows run upwards."""
+    line = '#include "SrbfSurfelPack.hlsl"\n'
+    text = (folder / "Srbf/Shaders" / name).read_text()
+    assert text.count(line) == 1
+    return "#define SHADER_API_GLCORE\n" + text.replace(line, (folder / "Srbf/Shaders/SrbfSurfelPack.hlsl").read_text())
+
+
+class Unity:
+    """The passes of SrbfSurfelPasses.cs, in its order and with its uniforms."""
+
+    def __init__(self, passes: Passes, folder: Path, told: dict[str, Any], asset: Asset) -> None:
+        text = shader_of(folder, "SrbfSurfels.hlsl")
+        names: dict[str, tuple[str, ...]] = {"onCube": ("SrbfNearness", "SrbfOccluderOnCube"), "onMap": ("SrbfHeight", "SrbfOccluderOnMap")}
+        names |= {"byCube": ("SrbfIrradianceByCube",), "byMap": ("SrbfIrradianceByMap",), "means": ("SrbfMeans",)}
+        names |= {"parts": ("SrbfTableParts",), "sums": ("SrbfTableSums",), "cells": ("SrbfCells",), "product": ("SrbfProduct",)}
+        names |= {"exchange": ("SrbfExchange",), "repainted": ("SrbfRepainted",)}
+        self.programs = {name: passes.program(text, *entries) for name, entries in names.items()}
+        self.passes, self.told, self.asset, self.folder = passes, told, asset, folder
+        files_of = {name: read_image(folder / told[name]) for name in ("places", "normals", "ranges", "corners")}
+        self.images = {f"_Srbf{name.capitalize()}": passes.texture(pixels) for name, pixels in files_of.items()}
+
+    def target(self, height: int, width: int, channels: int = 4) -> Any:
+        return self.passes.texture(np.zeros((height, width, channels)))
+
+    def irradiance(self, lights: list[Light]) -> Any:
+        sum_ = self.target(*read_image(self.folder / self.told["places"]).shape[:2])
+        for light in lights:
+            distant = isinstance(light, DirectionalLight)
+            size = 4 * SHADOWS if distant else SHADOWS
+            values = self.values(light)
+            slices = []
+            for face in range(1 if distant else 6):
+                axes = frame_of(np.array(light.direction)) if isinstance(light, DirectionalLight) else face_axes(face)
+                values |= {f"_Srbf{name}": (*axis, 0) for name, axis in zip(("Across", "Up", "Ahead"), axes, strict=True)}
+                slices.append(self.target(size, size, 1))
+                program = self.programs["onMap" if distant else "onCube"]
+                self.passes.draw(program, slices[-1], self.images, values, 3 * self.told["triangles"], "max")
+            nearness = self.passes.texture(np.stack([self.passes.read(face) for face in slices]))
+            self.passes.draw(
+                self.programs["byMap" if distant else "byCube"], sum_, self.images | {"_SrbfNearness": nearness}, values, 3, "add"
+            )
+        return sum_
+
+    def values(self, light: Light) -> dict[str, Any]:
+        common = {"_SrbfReach": [self.told["reach"]], "_SrbfLift": [self.told["lift"]], "_SrbfLightColor": (*light.color, 0)}  # type: ignore[union-attr]
+        if isinstance(light, DirectionalLight):
+            return common | {"_SrbfLightPlace": (*light.direction, 0), "_SrbfLightAxis": (0, 0, 1, 1), "_SrbfLightShape": (1, 1, 3, 4)}
+        assert isinstance(light, PointLight)
+        spot = isinstance(light, SpotLight)
+        cone = (versine(light.inner), versine(light.outer)) if isinstance(light, SpotLight) else NO_CONE
+        place = np.array(light.position) - self.told["middle"]
+        axis = light.direction if isinstance(light, SpotLight) else (0, 0, 1)
+        assert spot or cone == NO_CONE
+        return common | {
+            "_SrbfLightPlace": (*place, 0),
+            "_SrbfLightAxis": (*axis, float(light.falloff == "inverse-square")),
+            "_SrbfLightShape": (light.a0, light.radius, *cone),
+        }
+
+    def weights(self, irradiance: Any, added: Any = None, repainted: Any = None) -> np.ndarray:
+        """`added`: a texture of a row per row of the first table; `repainted`: that table with other albedo."""
+        numbers = self.target(*read_image(self.folder / self.told["ranges"]).shape[:2])
+        self.passes.draw(self.programs["means"], numbers, self.images | {"_SrbfIrradiance": irradiance}, {})
+        for i, table in enumerate(self.told["tables"]):
+            rows, columns = table["rows"], table["columns"]
+            blocks = -(-columns // 64)
+            last = i == len(self.told["tables"]) - 1
+            side = math.ceil(math.sqrt(rows))
+            shape = (self.asset.clusters, self.asset.components + 1) if last else (-(-rows // side), side)
+            width = math.ceil(math.sqrt(rows * blocks))
+            parts, target = self.target(-(-rows * blocks // width), width), self.target(*shape)
+            values = {"_SrbfTable": (rows, columns, blocks, table["channels"] == 1), "_SrbfScale": [table["scale"]]}
+            entries = self.passes.texture(read_image(self.folder / table["file"]))
+            if repainted is not None and i == 0:
+                entries, values["_SrbfScale"] = repainted, [1]
+            self.passes.draw(
+                self.programs["parts"], parts, {"_SrbfEntries": entries, "_SrbfNumbers": numbers}, values | {"_SrbfTargetWidth": [width]}
+            )
+            more = added if added is not None and i == 0 else self.target(1, 1)
+            images = {"_SrbfParts": parts, "_SrbfAdded": more}
+            self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[1]]})
+            numbers = target
+        return self.passes.read(numbers)[..., :3]
+
+    def column(self, weights: np.ndarray) -> Any:
+        """A texel per row."""
+        return self.passes.texture(np.pad(weights[:, None], ((0, 0), (0, 0), (0, 1))))
+
+    def multiplied(
+        self,
+        name: str,
+        shape: tuple[int, int],
+        left: Any,
+        right: Any,
+        count: int,
+        scale: float,
+        addend: Any,
+        images: dict[str, Any] | None = None,
+    ) -> Any:
+        """`addend`: a texture and its scale."""
+        made = self.target(*shape)
+        images = {"_SrbfLeft": left, "_SrbfRight": right, "_SrbfAddend": addend[0], **(images or {})}
+        self.passes.draw(self.programs[name], made, images, {"_SrbfMatrix": (count, scale, addend[1], 1)})
+        return made
+
+    def lit_by(self, panorama: np.ndarray, axes: np.ndarray, energy: float, added: Any) -> Any:
+        """What is added with an environment: rows from below, `axes` the directions of Unity's x, z and -y in the asset's frame."""
+        told = self.told["environment"]
+        images = {"_SrbfCells": read_image(self.folder / self.told["cells"]), "_SrbfEnvironment": panorama}
+        values = {"_SrbfAtMiddle": (*axes[0], told["side"]), "_SrbfAtLeft": (*axes[1], 0), "_SrbfAtRowZero": (*axes[2], energy)}
+        radiances = self.target(told["columns"], 1)
+        self.passes.draw(self.programs["cells"], radiances, {name: self.passes.texture(pixels) for name, pixels in images.items()}, values)
+        rows = self.told["tables"][0]["rows"]
+        table = self.passes.texture(read_image(self.folder / told["file"]))
+        return self.multiplied("product", (rows, 1), table, radiances, told["columns"], told["scale"], (added, 1))
+
+    def repainted(self, albedo: np.ndarray) -> tuple[Any, Any, Any]:
+        """(exchange, series, table) with the albedo of surfels (S, 2, 3) now, and of the bake."""
+        told, table = self.told["changes"], self.told["tables"][0]
+        rank, count = told["feedback"]["columns"], told["gather"]["columns"]
+        matrix = {name: self.passes.texture(read_image(self.folder / told[name]["file"])) for name in ("gather", "sent", "feedback")}
+        images = {"_SrbfAlbedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1)))), "_SrbfEntries": matrix["gather"]}
+        addend, scale = (matrix["feedback"], told["feedback"]["scale"]), told["gather"]["scale"] * told["sent"]["scale"]
+        exchange = self.multiplied("exchange", (rank, rank), matrix["gather"], matrix["sent"], count, scale, addend, images)
+        series = one = self.passes.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
+        for term in range(told.get("bounces", 64)):
+            series = self.multiplied("product", (rank, rank), exchange, series, rank if term else 0, 1, (one, 1))
+        before, own = (
+            self.passes.texture(read_image(self.folder / told["series"])),
+            self.passes.texture(read_image(self.folder / table["file"])),
+        )
+        changed = self.multiplied("repainted", (rank, count), before, series, rank, told["gather"]["scale"], (own, table["scale"]), images)
+        return exchange, series, changed
+
+
+def face_axes(face: int) -> list[np.ndarray]:
+    """Columns, rows and the way that a face of a cube looks."""
+    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
+    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
+
+
+def frame_of(toward: np.ndarray) -> list[np.ndarray]:
+    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
+    across /= np.linalg.norm(across)
+    return [across, np.cross(toward, across), toward]
