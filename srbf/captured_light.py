@@ -29,7 +29,8 @@ class CapturedLight:
     `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
     `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
     as the file of a mask or as flat indices (row by row from the top); None: all of them. `column`: the texel of a cubemap that it is,
-    whose image is made on request, and `file` its name alone.
+    whose image is made on request, and `file` its name alone. `noise`: relative RMSE that the image has by its few samples, about, where that
+    was measured.
     """
 
     place: tuple[float, float, float]
@@ -43,6 +44,7 @@ class CapturedLight:
     patch: int | None = None
     harmonics: tuple[str, ...] = ()
     column: int | None = None
+    noise: float | None = None
 
     @staticmethod
     def of_manifest(entry: Mapping[str, Any], where: str) -> CapturedLight:
@@ -67,6 +69,7 @@ class CapturedLight:
             tuple(entry.get("objects", ())),
             entry.get("patch"),
             tuple(entry.get("harmonics", ())),
+            noise=entry.get("noise"),
         )
 
     @property

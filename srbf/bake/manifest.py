@@ -15,13 +15,13 @@ def capture_manifest(
     settings: BakeSettings,
     identity: dict[str, Any],
     prepared: dict[str, Any],
-    lights: Sequence[tuple[PlannedLight, int]],
+    lights: Sequence[tuple[PlannedLight, int, float | None]],
     reached: int,
     curve: list[dict[str, Any]],
 ) -> dict[str, Any]:
     """The manifest (the keys of capture.schema.json) of the lights rendered so far.
 
-    identity: scene, scene_sha256 and settings of the bake. prepared: see `CaptureImages`. lights: (light, its samples so far).
+    identity: scene, scene_sha256 and settings of the bake. prepared: see `CaptureImages`. lights: (light, its samples so far, its noise).
     reached: samples per texel of every train light, at least. curve: what `samples=auto` measured, see `stopping.record`.
     """
     facts = prepared["facts"]
@@ -51,8 +51,9 @@ def capture_manifest(
                 **({"direct": light.direct_file} if light.has_direct else {}),
                 **({} if light.gloss is None else {"harmonics": list(light.harmonics_files)}),
                 "samples": samples,
+                **({} if noise is None else {"noise": round(noise, 6)}),
             }
-            for light, samples in lights
+            for light, samples, noise in lights
         ],
         **({"scene": SCENE_FILE, "direct": {"sun_angle": settings.sun_angle, **prepared["sampling"]}} if apart else {}),
         **({} if settings.gloss is None else {"harmonics": {"order": settings.gloss}}),

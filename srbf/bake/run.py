@@ -416,9 +416,12 @@ class _Passes:
         """Make the folder a valid capture, once a train light is there. Shards do not: each knows only its own lights."""
         if self._shard is not None:
             return
-        lights = [(light, self._accumulation.samples(light)) for light in self._lights if self._accumulation.passes(light)]
+        done = [light for light in self._lights if self._accumulation.passes(light)]
+        is_indirect = self._settings.transport == "indirect"  # passes of direct light are spread over a texel, and differ by more than noise
+        noise = [self._accumulation.noise(light) if is_indirect else None for light in done]
+        lights = [(light, self._accumulation.samples(light), own) for light, own in zip(done, noise, strict=True)]
         traced = self._settings.light_set is not None and self._settings.light_set.kind in ("surfels", "gather", "cubemap")
-        reached = [self._goal] if traced else [samples for light, samples in lights if light.role == "train"]
+        reached = [self._goal] if traced else [samples for light, samples, _ in lights if light.role == "train"]
         if reached and self._images.prepared is not None:
             curve = stopping.record(self._curve)
             manifest = capture_manifest(self._settings, self._identity, self._images.prepared, lights, min(reached), curve)

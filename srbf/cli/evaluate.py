@@ -123,6 +123,9 @@ def _print_errors(result: dict[str, Any], json: bool) -> None:
                 f"{role:<14}{count:>7}{error['rmse']:>12.5g}{error['relative_rmse']:>10.4f}{mean}{error['psnr']:>10.2f}"
                 f"{error['psnr_pooled']:>8.2f}{error['peak']:>8.3g}"
             )
+    for role, error in result.items():
+        if role in ("validation", "holdout") and "noise" in error:
+            typer.echo(f"{role}: the references have noise of about {error['noise']:.4f}, relative, which the error includes")
     for role, error in result.get("viewers", {}).items():
         typer.echo(f"{role} lights toward random viewers: {viewer_line(error)}")
     if "environments" in result:

@@ -176,7 +176,8 @@ def evaluate(
     Returns
     -------
     dict
-        By role a `RoleError` as a dict: `rmse` and `peak` in the capture's unit, `psnr` and `psnr_pooled` in dB. `lights` lists a
+        By role a `RoleError` as a dict: `rmse` and `peak` in the capture's unit, `psnr` and `psnr_pooled` in dB; with `noise`, the
+        relative RMSE that the references have by their few samples, about, where the bake measured it of all of them. `lights` lists a
         {file, role, rmse, relative_rmse} per light. A role without lights is left out, and so are roles not in `roles`. The peak is the
         99.9 % quantile of the combined train references (of patches, of the point lights that test them), 1 for 8-bit sources.
 
@@ -234,7 +235,7 @@ def evaluate(
         indices = capture.indices(role)
         if indices:
             error = role_error(np.array([squares[i] for i in indices]), np.array([powers[i] for i in indices]), samples[role], peak)
-            result[role] = asdict(error)
+            result[role] = asdict(error) | noise_of([(capture.lights[i].noise, powers[i]) for i in indices])
     if watch is not None and not watch.exact:
         result["train"]["texels"] = len(watch.texels)
     result["lights"] = [
@@ -321,6 +322,15 @@ def role_error(squares: Float64[ndarray, " L"], powers: Float64[ndarray, " L"], 
         psnr_pooled=psnr(peak, rmse),
         peak=peak,
     )
+
+
+def noise_of(lights: Sequence[tuple[float | None, float]]) -> dict[str, float]:
+    """{noise}, relative and pooled, of lights whose (relative noise, sum of squares) are known; {} where the noise of one is not."""
+    known = [(noise, power) for noise, power in lights if noise is not None]
+    total = sum(power for _, power in known)
+    if len(known) < len(lights) or not total > 0:
+        return {}
+    return {"noise": float(np.sqrt(sum(noise**2 * power for noise, power in known) / total))}
 
 
 MAX_PSNR = 200.0  # dB, of equal images: the formula has infinity, which JSON lacks

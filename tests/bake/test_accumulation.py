@@ -41,6 +41,17 @@ def test_noise_is_told_without_bias() -> None:
         total = total.with_pass(samples, 5 + rng.normal(0, samples**-0.5, (200, 200, 3)).astype(np.float32), None, squares=True)
     assert float(total.noise_variance().mean()) == pytest.approx(1 / 8, rel=0.02)  # 120,000 texels of 3 degrees of freedom
     assert float(total.mean.var()) == pytest.approx(1 / 8, rel=0.02)
+    assert total.noise == pytest.approx(8**-0.5 / 5, rel=0.02)
+
+
+def test_the_noise_of_a_light_outlives_its_sum(tmp_path: Path) -> None:
+    """One pass tells none, nor does a black image."""
+    image = np.ones((3, 4, 3), np.float32)
+    one = NOTHING.with_pass(2, image, None, squares=False)
+    two = one.with_pass(2, 2 * image, None, squares=False)
+    assert one.noise is None and one.with_pass(2, image, None, squares=False).noise is None
+    Accumulation(tmp_path, [LIGHT]).write(LIGHT, two, keep=False)
+    assert Accumulation(tmp_path, [LIGHT]).noise(LIGHT) == two.noise == pytest.approx((0.25 / 2) ** 0.5)  # of a mean of 1.5: 2.25 is power and a variance of 0.25
 
 
 def test_the_noise_of_an_indirect_image_is_its_own() -> None:

@@ -106,3 +106,17 @@ def test_passes_of_a_camera_add_up(bake, tmp_path: Path) -> None:
     assert seen.var(axis=0, ddof=1).mean() / coin.mean() == pytest.approx(1, abs=0.1)
     noise = seen - seen.mean(axis=0)
     assert abs((noise[1:] * noise[:-1]).mean() / (noise**2).mean()) < 0.05
+
+
+def test_indirect_images_tell_their_noise(bake) -> None:
+    """About as they differ from the same of many samples. Combined captures tell none: passes of direct light differ by twice their noise."""
+    settings = {"validation": 1, "holdout": 2, "transport": "indirect"}
+    few, many = (bake("torus", "lightmap:Torus", name=str(n), holdout_samples=n, **settings).capture for n in (16, 1024))
+    told = [i for i, light in enumerate(few.lights) if light.noise is not None]
+    assert told == [i for i, light in enumerate(few.lights) if light.role != "train" and few.image(i).any()]
+    for i in told:
+        true = many.image(i).astype(np.float64)
+        noise = np.sqrt(((few.image(i) - true) ** 2).mean() / (true**2).mean())
+        assert 1e-3 < 0.7 * noise <= few.lights[i].noise <= 1.5 * noise
+    combined = bake("torus", "lightmap:Torus", holdout_samples=16).capture
+    assert all(light.noise is None for light in combined.lights)
