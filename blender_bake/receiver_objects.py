@@ -179,7 +179,8 @@ def apply_modifiers(obj: bpy.types.Object) -> bpy.types.Object:
 def select(objects: list[bpy.types.Object]) -> None:
     """Select these objects alone, for Blender's operators; the first is the active one."""
     for other in bpy.context.view_layer.objects:
-        other.select_set(False)
+        if other is not None:  # an object that has just been removed
+            other.select_set(False)
     for obj in objects:
         obj.select_set(True)
     bpy.context.view_layer.objects.active = objects[0]

@@ -247,6 +247,8 @@ class RayTracer:
         point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
         normal, face, lift = surface_at(self._receivers.triangles, triangle, bary)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
+        if self._receivers.sampling.get("behind"):
+            away = -away
         normal = normal * away
         if self._bumps is not None:
             smooth, bump = self._bumps
