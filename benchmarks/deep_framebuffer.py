@@ -2,9 +2,9 @@
 
 Lights at random free places that no bake saw, each so that the view gets light of it: points, wide spots of 35 to 50 degrees, narrow ones
 of 10 to 15, and points 5 cm off a surface in view (wall). References are rendered twice, so that their noise drops out: relative RMSE =
-sqrt(sum (a - r1)(a - r2) / sum r1 r2), of the indirect light, of the direct light by rays and of the full picture, median over lights; the
-ratio of energies of the indirect light, pooled and the one farthest from 1; megabytes of the asset's links, pool and pixels or maps; CPU
-seconds for one light; the noise of one reference. `--references FILE.npz` keeps what Cycles rendered.
+sqrt(sum (a - r1)(a - r2) / sum r1 r2), of the indirect light, of the direct light (`--direct ray` or `shadow-map`) and of the full picture,
+median over lights; the ratio of energies of the indirect light, pooled and the one farthest from 1; megabytes of the asset's links, pool
+and pixels or maps; CPU seconds for one light; the noise of one reference. `--references FILE.npz` keeps what Cycles rendered.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--references", type=Path)
+    parser.add_argument("--direct", choices=("ray", "shadow-map"), default="ray")
     asked = parser.parse_args()
     capture = Capture.open(asked.capture)
     covered = capture.coverage() >= COVERED
@@ -102,7 +103,7 @@ def main() -> None:
             started = time.process_time()
             indirect = np.stack([linear_response(asset, [light])[covered] for light in lights])
             seconds = (time.process_time() - started) / len(lights)
-            with Added(asset, "ray") as added:
+            with Added(asset, asked.direct) as added:
                 direct = np.stack([np.asarray(added.response([light]))[covered] for light in lights])
             bounced, near_errors, full, energies, noise = [], [], [], [], []
             for own, near, first, second in zip(indirect, direct, *references, strict=True):

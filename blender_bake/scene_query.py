@@ -33,10 +33,10 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
         `probe_places` (N, 3), `probe_valid` (N,), and `occluders`
     places                        -> `places`: see `free_places.places`
     surfaces: {cells, spacing, gloss} -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), with gloss as if it were diffuse where
-        `gloss` is true, or `caustics` and the scene has reflective ones, `object` (T,), `transparent` (T,), `emission` (T, 3) and
-        `one_sided` (T,) of all surfaces in fragments no longer than a cell, if they were `cells`, or than `spacing` m if that
-        is more; `occluders` (U, 3, 3), the triangles that block light; `surface_objects`: their names by number; `bounces`:
-        diffuse ones that the scene's settings allow
+        `gloss` is true, or `caustics` and the scene has reflective ones, `transmission` (T, 3), what is let through diffusely,
+        `object` (T,), `transparent` (T,), `emission` (T, 3) and `one_sided` (T,) of all surfaces in fragments no longer than a cell, if
+        they were `cells`, or than `spacing` m if that is more; `occluders` (U, 3, 3), the triangles that block light;
+        `surface_objects`: their names by number; `bounces`: diffuse ones that the scene's settings allow
     """
     found: dict[str, Any] = {}
     if question.get("collections"):
@@ -77,7 +77,7 @@ def _surfaces(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path, e
     longest = max(math.sqrt(surfaces.area(scene) / question["cells"]), question.get("spacing") or 0.0)
     gloss = scene.cycles.caustics_reflective if question.get("gloss") == "caustics" else bool(question.get("gloss"))
     found = surfaces.fragments(scene, longest, events, gloss)
-    names = ("corners", "albedo", "object", "transparent", "emission", "one_sided", "occluders")
+    names = ("corners", "albedo", "transmission", "object", "transparent", "emission", "one_sided", "occluders")
     return {
         "files": {name: hand_over(scratch, name, found[name]) for name in names},
         "surface_objects": found["names"],

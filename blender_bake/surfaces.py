@@ -13,7 +13,7 @@ import numpy as np
 from blender_bake.emission_switch import emits
 from blender_bake.fragment_albedo import EMISSION, GRAY, Attributes, Kinds, even_albedo, faces_front, varies, varying_albedo
 from blender_bake.ipc import Events, WorkerError
-from blender_bake.reflected import reflection_alone
+from blender_bake.reflected import lets_light_through, reflection_alone
 from blender_bake.scene_file import Shown, corners_of, rendered, show_as_rendered
 from blender_bake.translucency import _passes
 from blender_bake.without_triangles import is_only_volume
@@ -38,6 +38,7 @@ class _Shape:
     albedo: np.ndarray
     emission: np.ndarray
     one_sided: np.ndarray
+    transmission: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     """All surfaces that render and that diffuse rays see, as T fragments: triangles with no edge longer than `longest` meters.
 
     corners (T, 3, 3) float32 in the world, wound so that normals point as they render; albedo (T, 3) float32, diffuse color by Cycles: 0 of
-    metal, glass and black, without translucency, with `gloss` also what gloss reflects, as if it were diffuse; object (T,) int32 of
-    `names`, a list; transparent
+    metal, glass and black, without translucency, with `gloss` also what gloss reflects, as if it were diffuse; transmission (T, 3) float32,
+    what translucent materials let through diffusely; object (T,) int32 of `names`, a list; transparent
     (T,) bool: of a material that light passes; occluders (O, 3, 3) float32: the undivided triangles that cast shadows and are not
     transparent; emission (T, 3) float32, radiance of the front, and one_sided (T,) bool: of a material whose back may emit less, see
     `faces_front`; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
@@ -82,6 +83,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
     with reflection_alone():
         transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
+    _let_through(scene, shapes)
     _shine(scene, shapes)
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}
@@ -94,6 +96,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     return {
         "corners": np.concatenate(corners),
         "albedo": np.concatenate([shapes[one.key].albedo for one in placed]).astype(np.float32),
+        "transmission": np.concatenate([shapes[one.key].transmission for one in placed]).astype(np.float32),
         "object": np.concatenate([np.full(len(part), numbers[one.name], np.int32) for part, one in zip(corners, placed, strict=True)]),
         "names": names,
         "transparent": np.concatenate([transparent[one.key] for one in placed]),
@@ -147,30 +150,53 @@ def _divide(shapes: dict[tuple[Any, ...], _Shape], placed: list[_Placed], longes
 
 def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds: Kinds) -> dict[tuple[Any, ...], np.ndarray]:
     """Set every shape's albedo; which fragments are transparent, by shape."""
-    used = dict.fromkeys(shape.materials[slot] for shape in shapes.values() for slot in np.unique(shape.slots))
-    even = even_albedo(scene, [material for material in used if material is not None and not varies(material)], kinds)
-    passing = {
-        material: material is not None and bool(material.use_nodes and material.node_tree and _passes(material)) for material in used
-    }
+    passing = {m: m is not None and bool(m.use_nodes and m.node_tree and _passes(m)) for m in _used(shapes)}
     transparent = {}
+    for key, albedo in _colors(scene, shapes, kinds).items():
+        shape = shapes[key]
+        shape.albedo = albedo
+        transparent[key] = np.array([passing.get(material, False) for material in shape.materials])[shape.slots[shape.parents]]
+    return transparent
+
+
+def _let_through(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> None:
+    """Set what every shape lets through diffusely."""
+    some = {}
+    for key, shape in shapes.items():
+        shape.transmission = np.zeros((len(shape.parents), 3))
+        if any(lets_light_through(shape.materials[slot]) for slot in np.unique(shape.slots)):
+            some[key] = shape
+    if not some:
+        return
+    with reflection_alone():
+        reflected = _colors(scene, some, ("DIFFUSE",))
+    for key, color in _colors(scene, some, ("DIFFUSE",)).items():
+        some[key].transmission = np.maximum(color - reflected[key], 0)
+
+
+def _colors(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds: Kinds) -> dict[tuple[Any, ...], np.ndarray]:
+    """The color (F, 3) of every shape's fragments."""
+    even = even_albedo(scene, [material for material in _used(shapes) if material is not None and not varies(material)], kinds)
+    found = {}
     for key, shape in shapes.items():
         slots = shape.slots[shape.parents]
-        transparent[key] = np.array([passing.get(material, False) for material in shape.materials])[slots]
-        flat = np.array([even.get(material, np.full(3, GRAY)) for material in shape.materials])
-        shape.albedo = flat[slots]
+        found[key] = np.array([even.get(material, np.full(3, GRAY)) for material in shape.materials])[slots]
         if shape.attributes is not None:
             varying = np.array([varies(material) for material in shape.materials])[slots]
             parents, weights = shape.parents[varying], shape.weights[varying]
             corners = np.einsum("fij,fjk->fik", weights, shape.corners[parents])
             attributes = _interpolated(shape.attributes, parents, weights)
-            shape.albedo[varying] = varying_albedo(scene, corners, slots[varying], shape.materials, attributes, shape.matrix, kinds)
-    return transparent
+            found[key][varying] = varying_albedo(scene, corners, slots[varying], shape.materials, attributes, shape.matrix, kinds)
+    return found
+
+
+def _used(shapes: dict[tuple[Any, ...], _Shape]) -> list[bpy.types.Material | None]:
+    return list(dict.fromkeys(shape.materials[slot] for shape in shapes.values() for slot in np.unique(shape.slots)))
 
 
 def _shine(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> None:
     """Set what every shape emits."""
-    used = dict.fromkeys(shape.materials[slot] for shape in shapes.values() for slot in np.unique(shape.slots))
-    emitting = [material for material in used if material is not None and emits(material)]
+    emitting = [material for material in _used(shapes) if material is not None and emits(material)]
     fronts = {material: faces_front(material) for material in emitting}
     even = even_albedo(scene, [material for material in emitting if not varies(material)], EMISSION)
     cuts = _subdivision(PARTS)
@@ -254,7 +280,7 @@ def _of_mesh(shown: Shown, mesh: bpy.types.Mesh, shapes: dict[tuple[Any, ...], _
         mesh.loop_triangles.foreach_get("polygon_index", faces)
         attributes = Attributes.of(mesh, found.loops.reshape(-1, 3)[kept].ravel(), faces[kept])
     nothing = np.zeros(0)
-    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, *(nothing,) * 5), key
+    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, *(nothing,) * 6), key
 
 
 def _materials(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:

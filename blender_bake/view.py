@@ -16,12 +16,13 @@ from blender_bake.channels import chosen
 from blender_bake.denoise import Denoiser
 from blender_bake.exr import read_passes
 from blender_bake.ipc import Events, WorkerError
-from blender_bake.reflected import reflection_alone
+from blender_bake.reflected import lets_light_through, reflection_alone
 from blender_bake.request import RenderRequest
 from blender_bake.translucency import Switch, switched
 
 GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the center that its position reprojects onto it
 NOT_DIFFUSE = 1e-3
+LEAST_TRANSMISSION = 1e-3  # of a pixel: less is rounding of two renders
 LIGHT_PASSES = ("Combined", "Diffuse Direct", "Diffuse Indirect", "Diffuse Color")
 DIRECT_PASSES = ("Diffuse Direct", "Diffuse Color")
 GLOSS_PASSES = ("Glossy Direct", "Glossy Color")
@@ -89,7 +90,8 @@ class ViewReceiver:
     def channels(self, names: list[str]) -> dict[str, np.ndarray]:
         """Those named of `position` and `normal` (at pixel centers, with the mask `hit`), `albedo`, `coverage` and the mask `valid`.
 
-        Where gloss is kept: `glossy`, what the specular lobe reflects toward the camera, and its shape, `lobe`.
+        Where gloss is kept: `glossy`, what the specular lobe reflects toward the camera, and its shape, `lobe`; `transmission`, what
+        surfaces in view let through diffusely, of scenes with such materials.
         """
         makers = {
             "position": self._position,
@@ -101,6 +103,7 @@ class ViewReceiver:
             "seams": lambda: None,
             "glossy": lambda: self._measured("Glossy Color"),
             "lobe": self._lobe,
+            "transmission": self._transmission,
         }
         return chosen(names, makers, self.kind)
 
@@ -122,6 +125,16 @@ class ViewReceiver:
         sums = self._materials()[lobes.AOV][:, :, :3]
         weight = sums[:, :, 2:]
         return np.where(weight > 0, sums / np.where(weight > 0, weight, 1), 0).astype(np.float32)
+
+    def _transmission(self) -> np.ndarray | None:
+        """The diffuse color of whole materials less that of their reflection; None where no material lets light through."""
+        if not any(lets_light_through(material) for material in bpy.data.materials):
+            return None
+        coverage = self._measured_coverage()
+        whole = self._render(self._coverage_samples, 0, ("Diffuse Color",))["Diffuse Color"][:, :, :3]
+        reflected = self._materials()["Diffuse Color"][:, :, :3]
+        found = np.maximum(whole - reflected, 0) / np.where(coverage > 0, coverage, 1)
+        return np.where(found.max(axis=2, keepdims=True) > LEAST_TRANSMISSION, found, 0) if found.max() > LEAST_TRANSMISSION else None
 
     def _at_centers(self) -> dict[str, np.ndarray]:
         """`position` (m), unit `normal` and `hit` (1 or 0) at pixel centers, all 0 where there is no hit; rendered once."""

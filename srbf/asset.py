@@ -16,7 +16,7 @@ from srbf.basis.gaussian import GaussianBasis
 from srbf.basis.harmonics import HARMONICS, PolynomialTextureMap, SphericalHarmonics
 from srbf.basis.light_functions import LightFunctions
 from srbf.capture import COVERED
-from srbf.channels import GLOSS
+from srbf.channels import GLOSS, THROUGH
 from srbf.errors import InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers.texture_array import level_bytes, level_size
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 LayerEncoding = Literal["half", "float", "uint8", "bc7", "bc1"]  # the last two: blocks of a texture array, bytes once decoded
 
 MANIFEST = ASSET_MANIFEST
-GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo", *GLOSS)
+GEOMETRY = ("position", "normal", "coverage", "ambient", "albedo", *GLOSS, THROUGH)
+AT_TEXELS = ("normal", "albedo", "glossy", THROUGH)  # what relighting of some texels needs
 SCENE_FILE = "scene.glb"
 
 
@@ -58,7 +59,8 @@ class Asset:
         columns, 3) float16 and, where there are clusters, `cluster_index` (H, W) uint8.
     images
         position (m), normal, albedo (H, W, 3) float32, coverage (H, W) and ambient (H, W, 3), each optional; of views with gloss `glossy`
-        (H, W, 3), what lobes reflect toward the camera, and `lobe` (H, W, 3), see `srbf.channels`.
+        (H, W, 3), what lobes reflect toward the camera, and `lobe` (H, W, 3), of translucent views `transmission` (H, W, 3), see
+        `srbf.channels`.
     scene
         scene.glb of an indirect asset: what casts the shadows of the light to be added.
     probes
@@ -301,10 +303,11 @@ class Asset:
         """
         stored = self.stored.reshape(len(self.stored), -1, self.stored.shape[3])[:, texels]
         tables = {name: table.reshape(-1)[texels][None] if name == "cluster_index" else table for name, table in self.tables.items()}
-        if "gloss_neighbors" in tables:
-            tables["gloss_neighbors"] = tables["gloss_neighbors"].reshape(-1, self.height * self.width, 3)[:, texels]
+        for name in ("gloss_neighbors", "behind_neighbors"):
+            if name in tables:
+                tables[name] = tables[name].reshape(-1, self.height * self.width, 3)[:, texels]
         manifest = {**self.manifest, "height": 1, "width": len(texels)}
-        images = {name: image.reshape(-1, 3)[texels][None] for name, image in self.images.items() if name in ("normal", "albedo", "glossy")}
+        images = {name: image.reshape(-1, 3)[texels][None] for name, image in self.images.items() if name in AT_TEXELS}
         return replace(self, manifest=manifest, stored=stored[:, None], tables=tables, images=images)
 
     def bytes_per_texel(self) -> dict[str, int | float]:

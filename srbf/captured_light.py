@@ -29,8 +29,8 @@ class CapturedLight:
     `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
     `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
     as the file of a mask or as flat indices (row by row from the top); None: all of them. `column`: the texel of a cubemap that it is,
-    whose image is made on request, and `file` its name alone. `noise`: relative RMSE that the image has by its few samples, about, where that
-    was measured.
+    whose image is made on request, and `file` its name alone. `noise`: about the relative RMSE that few samples leave in the
+    image, where that was measured.
     """
 
     place: tuple[float, float, float]

@@ -43,6 +43,7 @@ CHANNELS: dict[str, Channel] = {
             real_where="valid",
         ),
         Channel("glossy", 3, "specular reflectance toward the camera, linear Rec.709, 0 to 1"),
+        Channel("transmission", 3, "diffuse transmittance of translucent surfaces, linear Rec.709, 0 to 1"),
         Channel("lobe", 3, "roughness, share with a Fresnel term, and 1 where there is a specular lobe"),
     )
 }
@@ -54,7 +55,8 @@ TOP_LEVEL = (
     "ambient",
 )  # capture.json names their files by keys of its own; every other channel is in its `channels`
 GEOMETRY = ("position", "normal", "albedo", "coverage")  # what every bake asks a receiver for
-GLOSS = ("glossy", "lobe")  # and that of a deep framebuffer its view
+GLOSS = ("glossy", "lobe")  # and that of a deep framebuffer its view,
+THROUGH = "transmission"  # and this, where surfaces in it are translucent
 
 
 def file_name(name: str) -> str:

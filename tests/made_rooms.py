@@ -91,8 +91,8 @@ class Room:
         tracer = EmbreeTriangles(self.corners)
         return ~tracer.occluded(from_.astype(np.float32), vector / np.maximum(distance, 1e-12)[:, None], distance - 1e-4)
 
-    def transport(self) -> np.ndarray:
-        """(N, N, 3): indirect irradiance at each cell per unit of irradiance on another, all bounces."""
+    def factors(self) -> np.ndarray:
+        """(N, N): what share of each cell's hemisphere another one fills, weighted by the cosine."""
         count = len(self.places)
         lifted = self.places + 1e-4 * self.normals
         i, j = np.divmod(np.arange(count * count), count)
@@ -106,6 +106,11 @@ class Room:
         factor = factor.reshape(count, count)
         if self.closed:  # all that leaves arrives
             factor /= np.maximum(factor.sum(axis=1, keepdims=True), 1e-12)
+        return factor
+
+    def transport(self) -> np.ndarray:
+        """(N, N, 3): indirect irradiance at each cell per unit of irradiance on another, all bounces."""
+        count, factor = len(self.places), self.factors()
         result = np.empty((count, count, 3), np.float32)
         for c in range(3):
             rho = self.albedo[:, c]

@@ -11,9 +11,10 @@ from made_rooms import Room, divided, write_room
 from srbf.asset import Asset
 from srbf.bake.gather_set import FoundSurfaces, GatherSet
 from srbf.capture import Capture
+from srbf.channels import THROUGH
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods.deep_framebuffer import GLOSSY_FILES
+from srbf.methods.deep_framebuffer import BEHIND, GLOSSY_FILES
 
 
 def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
@@ -71,3 +72,14 @@ def with_lobes(asset: Asset) -> Asset:
     images = {**asset.images, "glossy": glossy, "lobe": np.full_like(glossy, 0.5)}
     manifest = {**asset.manifest, **named, "glossy": "glossy.exr", "lobe": "lobe.exr", "gather": gather}
     return replace(asset, manifest=manifest, tables=tables, images=images)
+
+
+def with_backs(asset: Asset) -> Asset:
+    """An asset of a view some of whose pixels let light through, whose backs are lit as clusters of its own are."""
+    rng = np.random.default_rng(7)
+    neighbors = np.array(asset.stored[::-1][:4])
+    neighbors[..., 2] = rng.integers(0, 2, neighbors.shape[:3]) * rng.integers(1, 256, neighbors.shape[:3])
+    transmission = rng.uniform(0, 1, (asset.height, asset.width, 3)).astype(np.float32)
+    manifest = {**asset.manifest, BEHIND: {"file": f"{BEHIND}.png"}, THROUGH: f"{THROUGH}.exr"}
+    tables = {**asset.tables, BEHIND: neighbors.reshape(-1, asset.width, 3)}
+    return replace(asset, manifest=manifest, tables=tables, images={**asset.images, THROUGH: transmission})

@@ -41,14 +41,14 @@ def picture():
     return material
 
 
-def translucent():
-    """Cloth that lets half of the light through."""
-    material = surface("Cloth", (0.4, 0.4, 0.35), 1.0)
+def translucent(name="Cloth", reflected=(0.4, 0.4, 0.35), passed=(0.4, 0.4, 0.35)):
+    """Cloth that lets light through; half of it, unless told otherwise."""
+    material = surface(name, reflected, 1.0)
     tree = material.node_tree
     diffuse = next(one for one in tree.nodes if one.bl_idname == "ShaderNodeBsdfDiffuse")
     both = tree.nodes.new("ShaderNodeAddShader")
     tree.links.new(diffuse.outputs[0], both.inputs[0])
-    tree.links.new(node(tree, "BsdfTranslucent", Color=(0.4, 0.4, 0.35, 1)).outputs[0], both.inputs[1])
+    tree.links.new(node(tree, "BsdfTranslucent", Color=(*passed, 1)).outputs[0], both.inputs[1])
     tree.links.new(both.outputs[0], next(one for one in tree.nodes if "Output" in one.bl_idname).inputs["Surface"])
     return material
 

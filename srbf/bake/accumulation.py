@@ -129,7 +129,7 @@ class Accumulation:
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
             passes, samples = (int(n) for n in stored["counts"])
             arrays = [stored.get(name) for name in PARTS]
-            return Sum(passes, samples, *arrays, noise=_noise_in(stored))
+            return Sum(passes, samples, *arrays, _noise_in(stored))
         return NOTHING
 
     def write(self, light: PlannedLight, total: Sum, keep: bool, checksum: str = "") -> None:

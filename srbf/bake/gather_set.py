@@ -21,12 +21,13 @@ from srbf.bake.point_lights import Box, parse_box
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.visibility.behind import Behind, points_behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
 from srbf.visibility.gather_pool import MOST_POOL, pool_of
 from srbf.visibility.glossy_gather import Lobes
 from srbf.visibility.pixel_points import PixelPoints
-from srbf.visibility.receivers import Receivers
+from srbf.visibility.receivers import LEAST_THROUGH, Receivers
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.view_clusters import MOST_CLUSTERS
 
@@ -40,7 +41,8 @@ Progress = Callable[[int, int, str], None]
 class FoundSurfaces:
     """What a scene has for a view's gather: opaque triangles (T, 3, 3) with albedo and object, what casts shadows, free places, m.
 
-    `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow.
+    `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow. `transmission`: what the triangles
+    let through diffusely, where any does.
     """
 
     corners: Float32[ndarray, "T 3 3"]
@@ -51,6 +53,7 @@ class FoundSurfaces:
     free: Float64[ndarray, "F 3"]
     box: Float64[ndarray, " 6"]
     bounces: Int[ndarray, ""]
+    transmission: Float32[ndarray, "T 3"] | None = None
 
     @functools.cached_property
     def checksum(self) -> str:
@@ -62,19 +65,22 @@ class FoundSurfaces:
 
     def arrays(self) -> dict[str, ndarray]:
         """As a file holds them."""
-        return {entry.name: np.asarray(getattr(self, entry.name)) for entry in fields(self)}
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return {name: np.asarray(value) for name, value in values.items() if value is not None}
 
     @staticmethod
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
-        return FoundSurfaces(*(stored[entry.name] for entry in fields(FoundSurfaces)))
+        return FoundSurfaces(**{entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored})
 
     @staticmethod
     def of_facts(facts: dict[str, Any]) -> FoundSurfaces:
         """From the facts of a scene; InputError where no surface of it reflects light."""
         arrays, places = facts["arrays"], facts["places"]
         opaque = arrays["transparent"] < 0.5
-        if not (arrays["albedo"][opaque] > 0).any():
+        transmission = arrays["transmission"][opaque]
+        passed = transmission if (transmission > LEAST_THROUGH).any() else None
+        if passed is None and not (arrays["albedo"][opaque] > 0).any():
             raise InputError("expected opaque surfaces that reflect light, found none; make some diffuse")
         random, free = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("random", "places"))
         return FoundSurfaces(
@@ -86,6 +92,7 @@ class FoundSurfaces:
             free,
             np.array(places["box"], np.float64),
             np.array(facts["bounces"]),
+            passed,
         )
 
 
@@ -191,9 +198,17 @@ class GatherSet:
         if not len(pixels.points):
             raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
         surfaces = Fragments(found.corners, found.albedo)
-        pool = pool_of(surfaces, found.objects, occluders, found.free, pixels.points, pixels.normals, self.count, seed, lobes)
+        backs = None if found.transmission is None else points_behind(view)
+        looks = [pixels] if backs is None else [pixels, backs]
+        points, normals = np.concatenate([own.points for own in looks]), np.concatenate([own.normals for own in looks])
+        pool, asked = None, self.count
+        while pool is None or pool.count + (doubled := len(Behind.of(pool).surfels)) > MOST_POOL:
+            asked = asked if pool is None else MOST_POOL - int(1.1 * doubled)
+            pool = pool_of(surfaces, found.objects, occluders, found.free, points, normals, asked, seed, lobes, found.transmission)
         if not pool.count:
             raise InputError("expected surfaces that light in free space can reach, found none; choose another `light_bounds`")
         clusters = cluster_count(self.clusters, len(np.unique(pixels.pixels)))
-        operator = GatherOperator.traced(pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes)
+        operator = GatherOperator.traced(
+            pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes, backs
+        )
         operator.write(receivers.folder, key)

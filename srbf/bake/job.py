@@ -12,7 +12,7 @@ from srbf.bake.probes import PROBES_FILE, write_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.settings import BakeSettings, noise_seed, plan_lights
 from srbf.bake.viewers import viewer_directions
-from srbf.channels import GLOSS
+from srbf.channels import GLOSS, THROUGH
 from srbf.sphere import point_set
 
 AMBIENT_SEED = -1  # the light index of the image without a light
@@ -32,7 +32,7 @@ def serving_job(scene: Path, settings: BakeSettings, prepared: dict[str, Any] | 
     return {
         **base_job(scene, settings, scratch),
         "serve": True,
-        "channels": [*ASKED_FOR, *(GLOSS if _keeps_gloss(settings) else ())] if first else [],
+        "channels": [*ASKED_FOR, *((*GLOSS, THROUGH) if _keeps_gloss(settings) else ())] if first else [],
         "ambient": RenderRequest(None, settings.holdout_samples, noise_seed(settings.seed, AMBIENT_SEED)).message() if shines else None,
         "probes": [light.json() for light in probes],
         "transmittances": None if prepared is None else prepared["transmittances"],

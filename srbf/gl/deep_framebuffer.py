@@ -10,6 +10,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Int
 from srbf.asset import Asset
+from srbf.channels import THROUGH
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 
@@ -64,16 +65,25 @@ class LinkPasses:
         self._radiosity = [programs.target(size), programs.target(size)]
         own = -(-told["clusters"] // WIDTH)
         self._spans = [(self._view, 0, own)]  # links, and the rows of the target that they fill
-        self._lobes: tuple[moderngl.TextureArray, int, moderngl.Texture] | None = None
+        self._further: list[tuple[moderngl.TextureArray, int, moderngl.Texture]] = []  # neighbors of pixels, how many, and reflectance
         if "gloss_links" in tables:
             below = rows_image(tables["gloss_rows"], told["lobes"])
             rows = np.pad(below, ((own, 0), (0, 0), (0, 0)))
             links = LinkTextures(textures.kept(tables["gloss_links"]), textures.kept(rows), told["gloss_rays"])
             self._spans.append((links, own, len(below)))
-            layers = _behind(tables["gloss_neighbors"].reshape(-1, asset.height, asset.width, 3), own * WIDTH)
-            glossy = (asset.images["glossy"] / np.float32(np.pi)).astype(np.float32)
-            self._lobes = textures.kept_layers(layers), len(layers), textures.kept(glossy)
+            self._add(_after(self._image_of(tables, "gloss_neighbors", asset), own * WIDTH), asset.images["glossy"])
+        if "behind_neighbors" in tables:
+            self._add(self._image_of(tables, "behind_neighbors", asset), asset.images[THROUGH])
         self.cluster_size = (WIDTH, sum(count for _, _, count in self._spans))
+
+    @staticmethod
+    def _image_of(tables: dict[str, ndarray], name: str, asset: Asset) -> ndarray:
+        return tables[name].reshape(-1, asset.height, asset.width, 3)
+
+    def _add(self, layers: ndarray, reflectance: ndarray) -> None:
+        """What pixels show beside diffuse reflection, of an irradiance that they mix in other ways."""
+        over_pi = (reflectance / np.float32(np.pi)).astype(np.float32)
+        self._further.append((self._textures.kept_layers(layers), len(layers), self._textures.kept(over_pi)))
 
     def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer) -> None:
         """Draw the irradiance of all view clusters, and behind it what lobes gather, into `target`, of `cluster_size`.
@@ -107,13 +117,13 @@ class LinkPasses:
         """Draw the pixels into the target in use, from the irradiance of the clusters."""
         own = (self._textures.layers(), self._layers, self._reflectance)
         light.use(1)
-        for neighbors, layers, reflectance in (own, self._lobes) if self._lobes else (own,):
+        for neighbors, layers, reflectance in (own, *self._further):
             neighbors.use(0)
             reflectance.use(2)
             self._programs.run("deep_framebuffer_pixels.frag", {}, {"neighbors": 0, "layers": layers, "light": 1, "reflectance": 2})
 
 
-def _behind(neighbors: ndarray, first: int) -> ndarray:
+def _after(neighbors: ndarray, first: int) -> ndarray:
     """Layers of neighbors whose clusters are counted from `first` on."""
     number = neighbors[..., 0] + 256 * neighbors[..., 1].astype(np.int64) + first
     return np.stack([number & 255, number >> 8, neighbors[..., 2]], axis=-1).astype(np.uint8)

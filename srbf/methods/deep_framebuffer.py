@@ -14,7 +14,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset, layer_entries
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
-from srbf.channels import GLOSS
+from srbf.channels import GLOSS, THROUGH
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
@@ -44,6 +44,7 @@ FILES = {
     "exchange_links": "exchange_links.png",
     "exchange_rows": "exchange_rows.png",
 }
+BEHIND = "behind_neighbors"
 GLOSSY_FILES = {"gloss_links": "gloss_links.png", "gloss_rows": "gloss_rows.png", "gloss_neighbors": "gloss_neighbors.png"}
 KEPT = 2  # assets whose links are ready
 
@@ -55,7 +56,7 @@ class DeepFramebuffer(Method):
     e is the direct irradiance that the lights lay on a pool of surfels; F are links of these to each other, W those of view clusters to
     them, by rays; a pixel mixes the clusters nearest to it in place and normal. Glossy pixels add their specular reflectance times what
     their lobes gather, G B / pi, of links G by rays of the lobes' density. The paper's gather samples belong to one cluster each and
-    have one bounce.
+    have one bounce. Translucent surfaces send on what falls on their backs: B = rho E + tau E', by surfels and clusters behind theirs.
 
     Parameters
     ----------
@@ -145,8 +146,8 @@ class DeepFramebuffer(Method):
         )
         scale, bias = np.ones((most, 3), np.float32), np.zeros((most, 3), np.float32)
         images = carried_images(capture, nearest)
-        if operator.gloss is None:
-            images = {name: image for name, image in images.items() if name not in GLOSS}
+        unused = (*(GLOSS if operator.gloss is None else ()), *((THROUGH,) if operator.behind is None else ()))
+        images = {name: image for name, image in images.items() if name not in unused}
         manifest = common_manifest(capture, self.name, domain_of_capture(capture), images, asdict(self), {})
         manifest |= {name: {"file": file} for name, file in FILES.items()}
         manifest[self.layers] = layer_entries("neighbor", "uint8", scale, bias)
@@ -168,6 +169,9 @@ class DeepFramebuffer(Method):
             tables["gloss_neighbors"] = layers.reshape(-1, capture.width, 3)
             manifest |= {name: {"file": file} for name, file in GLOSSY_FILES.items()}
             manifest["gather"] |= {"lobes": gloss.links.rows, "gloss_rays": gloss.links.rays}
+        if operator.behind is not None:
+            tables[BEHIND] = _neighbors(*operator.behind).reshape(-1, capture.width, 3)
+            manifest |= {BEHIND: {"file": f"{BEHIND}.png"}}
         return Asset(manifest, stored, scale, bias, tables, images, scene)
 
     def _within(self, operator: GatherOperator, nearest: int, pixels: int) -> SparseLinks:
@@ -196,11 +200,13 @@ class DeepFramebuffer(Method):
                 if pixels.shape[1] != COLUMNS:
                     raise ImageError(f"expected {COLUMNS} columns of {name}_{part} in {reader.folder}, found {pixels.shape[1]}; fit again")
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
-        if "lobes" in told:
-            pixels = reader.pixels(reader.manifest["gloss_neighbors"]["file"], 3)
+        for name, what in (("gloss_neighbors", "lobes"), (BEHIND, "clusters behind")):
+            if name not in reader.manifest:
+                continue
+            pixels = reader.pixels(reader.manifest[name]["file"], 3)
             if pixels.shape[1] != reader.manifest["width"] or len(pixels) % reader.manifest["height"]:
-                raise ImageError(f"expected lobes of every pixel in {reader.folder}, found {pixels.shape[1]}x{len(pixels)}; fit again")
-            tables["gloss_neighbors"] = np.round(pixels * 255).astype(np.uint8)
+                raise ImageError(f"expected {what} of every pixel in {reader.folder}, found {pixels.shape[1]}x{len(pixels)}; fit again")
+            tables[name] = np.round(pixels * 255).astype(np.uint8)
         return tables
 
     @classmethod
@@ -233,9 +239,10 @@ class DeepFramebuffer(Method):
         pictures = _mixed(asset.stored, light[:clusters])
         if asset.quantity == "radiance":
             pictures = pictures * (cls._albedo(asset) / np.float32(np.pi))
-        if "gloss_neighbors" in asset.tables and len(light) > clusters:
-            layers = asset.tables["gloss_neighbors"].reshape(-1, asset.height, asset.width, 3)
-            pictures = pictures + _mixed(layers, light[clusters:]) * (asset.images["glossy"] / np.float32(np.pi))
+        for name, reflectance, own in (("gloss_neighbors", "glossy", light[clusters:]), (BEHIND, THROUGH, light[:clusters])):
+            if name in asset.tables and len(own):
+                layers = asset.tables[name].reshape(-1, asset.height, asset.width, 3)
+                pictures = pictures + _mixed(layers, own) * (asset.images[reflectance] / np.float32(np.pi))
         return np.ascontiguousarray(pictures)
 
     @classmethod

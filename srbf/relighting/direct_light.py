@@ -75,6 +75,21 @@ def by_receiver_depths(source: Asset | Capture) -> PcaDirect:
     return PcaDirect(receivers, kept_visibility(source, "receiver_visibility", normals))
 
 
+class BothSides:
+    """What the pixels of a view reflect, and what they let through of the light on the backs of their surfaces."""
+
+    def __init__(self, front: DirectLight, back: DirectLight) -> None:
+        self._front, self._back = front, back
+
+    def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
+        """Of both sides."""
+        return self._front.response(lights) + self._back.response(lights)
+
+    def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"]:
+        """Of both sides, to a white light from each of many directions."""
+        return self._front.directional(directions) + self._back.directional(directions)
+
+
 class Added:
     """The direct light of one asset or capture, made ready once; a context manager."""
 
@@ -87,11 +102,15 @@ class Added:
         if kind == "ray":
             receivers = Receivers.of(source)
             tracer = RayTracer(receivers)
-            self._light = GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
+            front: DirectLight = GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
+            back = receivers.behind()
+            self._light = front if back is None else BothSides(front, RayTracer(back))
         elif kind == "shadow-map":
             receivers = Receivers.of(source)
             mapper = self._stack.enter_context(ShadowMapper(receivers))
-            self._light = GlossyMaps(receivers, mapper) if has_gloss(receivers) else mapper
+            front = GlossyMaps(receivers, mapper) if has_gloss(receivers) else mapper
+            back = receivers.behind()
+            self._light = front if back is None else BothSides(front, self._stack.enter_context(ShadowMapper(back)))
         elif kind == "pca":
             self._light = by_receiver_depths(source)
 

@@ -53,6 +53,8 @@ def contents_of(
         notes.append("the page compares directional and point lights with a capture: of this one it uses the spectrum alone")
     if any("gloss_links" in asset.tables for asset in assets):
         notes.append("the page shows what surfaces reflect diffusely: `srbf relight` adds what gloss reflects")
+    if any("behind_neighbors" in asset.tables for asset in assets):
+        notes.append("the page shows translucent surfaces by what they reflect: `srbf relight` adds what they let through")
     shown = shown_mesh(assets[0], mesh, notes)
     probed = None if probes is None else _probes_beside(assets[0], Asset.open(probes), probes)
     measures = Measures(assets, references.capture if references else None)

@@ -17,6 +17,7 @@ from srbf.arrays import Float32, Int
 from srbf.errors import ImageError
 from srbf.io import files
 from srbf.io.image import read_image, write_image
+from srbf.visibility.behind import Behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.form_factors import RayOrigins, form_factors
 from srbf.visibility.glossy_gather import GlossyGather, Lobes
@@ -24,10 +25,11 @@ from srbf.visibility.pixel_points import PixelPoints
 from srbf.visibility.sparse_links import SparseLinks
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfels import Surfels
-from srbf.visibility.view_clusters import ViewClusters
+from srbf.visibility.view_clusters import MOST_CLUSTERS, ViewClusters
 
 POOL_FILE = "pool.exr"
 GATHER_FILE = "gather.npz"
+BEHIND = ("behind_nearest", "behind_weights")
 VIEW_RAYS, MOST_VIEW_RAYS = 512, 2048  # of a view cluster: more where there are fewer than DEFAULT_CLUSTERS
 SURFEL_RAYS = 64
 SURFEL_POINTS = 4  # of a surfel, that its rays start from
@@ -41,7 +43,7 @@ class GatherOperator:
     """Links from C view clusters to a pool of S surfels, and between surfels; `nearest` (P, K) clusters of every pixel, `weights` of each.
 
     Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
-    lobes gather, where there are any.
+    lobes gather, where there are any. `behind`: as `nearest` and `weights`, of what falls on the backs of pixels that let light through.
     """
 
     cells: Cells
@@ -50,6 +52,7 @@ class GatherOperator:
     nearest: Int[ndarray, "P K"]
     weights: Float32[ndarray, "P K"]
     gloss: GlossyGather | None = None
+    behind: tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]] | None = None
 
     @staticmethod
     def traced(
@@ -60,18 +63,33 @@ class GatherOperator:
         seed: int = 0,
         progress: Progress = lambda done, total: None,
         lobes: Lobes | None = None,
+        backs: PixelPoints | None = None,
     ) -> GatherOperator:
-        """By cosine rays from every cluster and surfel, and by rays of the density of specular lobes."""
+        """By cosine rays from every cluster and surfel, and by rays of the density of specular lobes.
+
+        `backs`: points behind translucent pixels. What these let through has clusters and surfels of its own, after the others.
+        """
         extent = float(np.ptp(pool.cells.places, axis=0).max(initial=0))
-        found = ViewClusters.of_points(pixels.points, pixels.normals, clusters, extent)
+        passing, behind = Behind.of(pool), None
+        of_backs = 0 if backs is None else max(1, int(clusters * len(np.unique(backs.pixels)) / len(np.unique(pixels.pixels))))
+        found = ViewClusters.of_points(pixels.points, pixels.normals, min(clusters, MOST_CLUSTERS - of_backs), extent)
         nearest, weights = pixels.gathered(*found.mixed(pixels.points, pixels.normals, occluders))
-        total = len(found.places) + pool.count
+        if backs is not None:
+            own = ViewClusters.of_points(backs.points, backs.normals, of_backs, extent)
+            back_nearest, back_weights = backs.gathered(*own.mixed(backs.points, backs.normals, occluders))
+            behind = np.where(back_weights > 0, back_nearest + len(found.places), 0), back_weights
+            found = ViewClusters(np.concatenate([found.places, own.places]), np.concatenate([found.normals, own.normals]), found.scale)
+        total = len(found.places) + pool.count + len(passing.surfels)
         rays = int(np.clip(VIEW_RAYS * DEFAULT_CLUSTERS // max(1, len(found.places)), VIEW_RAYS, MOST_VIEW_RAYS))
-        view = _traced(pool, RayOrigins.even(found.places[:, None], found.normals[:, None]), rays, seed, lambda n: progress(n, total))
-        origins = RayOrigins.even(*pool.spread(SURFEL_POINTS, seed))
-        own = _traced(pool, origins, SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total))
-        gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2)
-        return GatherOperator(pool.cells, view, own, nearest, weights, gloss)
+        origins = RayOrigins.even(found.places[:, None], found.normals[:, None])
+        view = _traced(pool, passing, origins, rays, seed, lambda n: progress(n, total))
+        points, normals = pool.spread(SURFEL_POINTS, seed)
+        points, normals = (np.concatenate([every, sign * every[passing.surfels]]) for every, sign in ((points, 1), (normals, -1)))
+        exchange = _traced(
+            pool, passing, RayOrigins.even(points, normals), SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total)
+        )
+        gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2, passing=passing)
+        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind)
 
     def write(self, folder: Path, key: str) -> None:
         """pool.exr, three rows (x, y, z, area), (normal, 0), (albedo, 0), and gather.npz; `key` tells what they are of."""
@@ -83,6 +101,7 @@ class GatherOperator:
             "nearest": self.nearest.astype(np.uint16),
             "weights": self.weights.astype(np.float16),
             **({} if self.gloss is None else self.gloss.arrays()),
+            **({} if self.behind is None else {BEHIND[0]: self.behind[0].astype(np.uint16), BEHIND[1]: self.behind[1].astype(np.float16)}),
         }
         with files.atomic_path(folder / GATHER_FILE) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, key=np.array(key), **arrays)
@@ -103,10 +122,15 @@ class GatherOperator:
             if own.rows != count or int(nearest.max(initial=0)) >= view.rows or nearest.shape != weights.shape:
                 raise ValueError("rows that fit each other")
             gloss = GlossyGather.of_arrays(arrays, count)
+            behind = None
+            if BEHIND[0] in arrays:
+                behind = arrays[BEHIND[0]].astype(np.int64), arrays[BEHIND[1]].astype(np.float32)
+                if int(behind[0].max(initial=0)) >= view.rows or behind[0].shape != behind[1].shape or len(behind[0]) != len(nearest):
+                    raise ValueError("backs that fit their pixels")
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected links of a view in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
-        return GatherOperator(cells, view, own, nearest, weights, gloss)
+        return GatherOperator(cells, view, own, nearest, weights, gloss, behind)
 
 
 def is_gathered(folder: Path, key: str) -> bool:
@@ -123,7 +147,7 @@ def cluster_count(asked: int | None, pixels: int) -> int:
     return min(pixels, DEFAULT_CLUSTERS if asked is None else asked)
 
 
-def _traced(pool: Surfels, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None]) -> SparseLinks:
+def _traced(pool: Surfels, passing: Behind, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None]) -> SparseLinks:
     from scipy.sparse import csr_array, vstack
 
     parts = [csr_array((0, pool.count), dtype=np.float32)]
@@ -132,4 +156,4 @@ def _traced(pool: Surfels, origins: RayOrigins, rays: int, seed: int, progress: 
         own = RayOrigins(origins.points[part], origins.normals[part], origins.weights[part])
         parts.append(form_factors(pool, own, rays // own.weights.shape[1], (seed * 0x9E3779B1 + start * 0x85EBCA77) & 0x7FFFFFFF))
         progress(min(start + ROWS, len(origins.points)))
-    return SparseLinks.of_shares(vstack(parts, format="csr"), rays)
+    return SparseLinks.of_shares(passing.met(vstack(parts, format="csr")), rays)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float, Float64, Int
+from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.solve.splitting import split_clusters
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.glossy_gather import Lobes
@@ -33,17 +33,20 @@ def pool_of(
     count: int,
     seed: int = 0,
     lobes: Lobes | None = None,
+    transmission: Float32[ndarray, "T 3"] | None = None,
 ) -> Surfels:
     """At most about `count` surfels of all surfaces that light reaches, small where cosine rays from the view's `points` end.
 
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well, and rays of specular
-    `lobes` do, by what these reflect.
+    `lobes` do, by what these reflect. `transmission`: what the triangles let through diffusely.
     """
     surfaces, source = cut_at_walls(surfaces, occluders, GAP * float(np.sqrt(surfaces.areas.sum() / count)))
     objects = objects[source]
     both = surfaces.both_sides()
-    able = np.flatnonzero((both.albedo.max(axis=1) >= DARK) & (both.areas > 0))
+    passed = None if transmission is None else np.tile(transmission[source], (2, 1))
+    color = both.albedo if passed is None else both.albedo + passed
+    able = np.flatnonzero((color.max(axis=1) >= DARK) & (both.areas > 0))
     seen = looked_at(surfaces, points, normals, seed)
     gathered = (seen if lobes is None else seen + mirrored(surfaces, lobes, float(len(points)), seed))[able]
     witnesses = lit(both.centers[able], both.normals[able], occluders, free[:WITNESSES])
@@ -57,16 +60,24 @@ def pool_of(
     weight = gathered / max(float(gathered.sum()), 1e-30) + EVENLY * sides.areas / sides.areas.sum()
     scale = float(np.ptp(sides.centers, axis=0).max())
     features = np.concatenate([sides.centers, NORMAL_WEIGHT * scale * sides.normals, ALBEDO_WEIGHT * scale * sides.albedo], axis=1)
+    through = np.zeros(len(kept), np.int64) if passed is None else (passed[kept].max(axis=1) >= DARK).astype(np.int64)
+
+    def groups(most: int) -> Int[ndarray, " N"]:
+        found = parted_groups(split_clusters(features, most, weight), witnesses)
+        return found if passed is None else np.unique(2 * found + through, return_inverse=True)[1].ravel()
+
     asked = count
-    owner = parted_groups(split_clusters(features, asked, weight), witnesses)
+    owner = groups(asked)
     while owner.max() >= count and asked > 1:  # walls part some
         asked = max(1, asked - int(1.1 * (owner.max() + 1 - count)) - 1)
-        owner = parted_groups(split_clusters(features, asked, weight), witnesses)
+        owner = groups(asked)
     owners[kept] = owner
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]
     dark = np.zeros((len(of_surfel), 3), np.float32)
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, np.zeros(len(of_surfel), bool))
+    own = None if passed is None else grouped_cells(Fragments(sides.corners, passed[kept].astype(np.float32)), owner).albedo
+    unseen = np.zeros(len(of_surfel), bool)
+    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own)
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

@@ -12,6 +12,7 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.microfacets import albedo_terms, fresnel, sampled
 from srbf.solve.splitting import split_clusters
+from srbf.visibility.behind import Behind
 from srbf.visibility.glossy_direct import GlossyPixels, has_gloss
 from srbf.visibility.hemisphere import GOLDEN
 from srbf.visibility.receivers import Receivers
@@ -56,9 +57,14 @@ class GlossyGather:
 
     @staticmethod
     def traced(
-        pool: Surfels, lobes: Lobes, most: int = MOST_LOBES, seed: int = 0, progress: Callable[[int, int], None] = lambda done, total: None
+        pool: Surfels,
+        lobes: Lobes,
+        most: int = MOST_LOBES,
+        seed: int = 0,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+        passing: Behind | None = None,
     ) -> GlossyGather:
-        """By RAYS rays of every lobe. `most`: rows."""
+        """By RAYS rays of every lobe. `most`: rows; `passing`: the surfels of the pool that let light through."""
         from scipy.sparse import csr_array, vstack
 
         extent = float(np.ptp(pool.cells.places, axis=0).max(initial=0))
@@ -78,7 +84,8 @@ class GlossyGather:
             progress(min(starts[number] + BATCH, len(chosen)), len(chosen))
 
         each(trace, len(starts))
-        links = SparseLinks.of_shares(vstack([csr_array((0, pool.count), dtype=np.float32), *parts], format="csr"), RAYS * STEPS)
+        shares = vstack([csr_array((0, pool.count), dtype=np.float32), *parts], format="csr")
+        links = SparseLinks.of_shares(shares if passing is None else passing.met(shares), RAYS * STEPS)
         return GlossyGather(links, *lobes.of_pixels(nearest, weights))
 
 

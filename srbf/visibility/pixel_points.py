@@ -43,9 +43,7 @@ class PixelPoints:
         if receivers.camera is None:
             return PixelPoints(positions[centered], normals[centered], centered, np.ones(len(centered), np.float32), size)
         tracer = RayTracer(receivers)
-        rest = np.flatnonzero(covered)
-        few = tracer.samples(rest, range(FEW))
-        edges = rest[_differ(few, len(rest), positions[rest], length[rest] > 0.5)]
+        edges = several_surfaces(tracer, np.flatnonzero(covered), positions, length > 0.5)
         many = tracer.samples(edges, range(FEW, FEW + MANY))
         real = np.flatnonzero(many.weight > 0)
         share = np.broadcast_to(many.share, many.point.shape)[real].mean(axis=1) + LEAST_SHARE
@@ -78,6 +76,14 @@ class PixelPoints:
         found[pixel[kept], place[kept]] = cluster[kept]
         amount[pixel[kept], place[kept]] = weight[kept]
         return found, amount / np.maximum(amount.sum(axis=1, keepdims=True), 1e-30)
+
+
+def several_surfaces(
+    tracer: RayTracer, pixels: Int[ndarray, " e"], positions: Float[ndarray, "P 3"], has_center: Bool[ndarray, " P"]
+) -> Int[ndarray, " d"]:
+    """Those of some pixels of a view where FEW samples, and the center's position (m) if there is one, are not all on one surface."""
+    few = tracer.samples(pixels, range(FEW))
+    return pixels[_differ(few, len(pixels), positions[pixels].astype(np.float64), has_center[pixels])]
 
 
 def _differ(few: Samples, pixels: int, center: Float64[ndarray, "P 3"], has_center: Bool[ndarray, " P"]) -> Bool[ndarray, " P"]:

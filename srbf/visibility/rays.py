@@ -107,6 +107,10 @@ class RayTracer:
         parts = [self._samples(texels, range(number, number + 1)) for number in numbers]
         return Samples(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Samples)))
 
+    def samples_at(self, texels: Int[ndarray, " n"], squares: Float64[ndarray, "n 2"]) -> Samples:
+        """Points on surfaces at the places `squares`, in [0, 1)^2, of the footprints of texels."""
+        return self._seen(texels, squares) if self._receivers.camera else self._on_lightmap(texels, squares)
+
     def shown(self, texels: Int[ndarray, " e"], numbers: range) -> tuple[Samples, Int[ndarray, " n"]]:
         """`samples` of a view, and the pixel that shows the material of each alone, or its own."""
         found = self.samples(texels, numbers)
@@ -223,7 +227,7 @@ class RayTracer:
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Sample points `numbers` of each texel, ordered by sample."""
         texel, square = np.tile(texels, len(numbers)), self._squares(texels, numbers)
-        return self._seen(texel, square) if self._receivers.camera else self._on_lightmap(texel, square)
+        return self.samples_at(texel, square)
 
     def _squares(self, texels: Int[ndarray, " e"], numbers: range) -> Float64[ndarray, "n 2"]:
         square = (self._square[numbers.start : numbers.stop, None] + self._turn[None, texels, :2]) % 1  # (s, e, 2)
@@ -243,6 +247,8 @@ class RayTracer:
         point = (origin + direction * np.where(real, far, 0)[:, None]).astype(np.float32)
         normal, face, lift = surface_at(self._receivers.triangles, triangle, bary)
         away = np.where(np.einsum("nc,nc->n", face, direction) > 0, -1, 1)[:, None].astype(np.float32)
+        if self._receivers.sampling.get("behind"):
+            away = -away
         normal = normal * away
         if self._bumps is not None:
             smooth, bump = self._bumps

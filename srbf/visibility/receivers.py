@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,14 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.channels import GLOSS
+from srbf.channels import GLOSS, THROUGH
 from srbf.errors import InputError
 from srbf.io.scene_glb import Triangles, read_triangles
 from srbf.receiver_images import Quantity
 
 SAME_SURFACE_COS = 0.9  # of the normals of two neighbors that lie on one smooth surface
 OFF_PLANE = 0.2  # of their distance, the largest distance of a neighbor from the tangent plane
+LEAST_THROUGH = 1e-3  # transmittance of a pixel that counts
 SEAM_RATIO = 2.0  # a neighbor farther than this many times the opposite one is across a seam
 
 
@@ -25,7 +26,8 @@ SEAM_RATIO = 2.0  # a neighbor farther than this many times the opposite one is 
 class Receivers:
     """Receivers under direct light: geometry (H, W, 3), optional unless needed, the scene, and the sampling of the bake.
 
-    `sampling` holds sun_angle (rad) and, for a lightmap, footprint (texels), for a view its camera.
+    `sampling` holds sun_angle (rad) and, for a lightmap, footprint (texels), for a view its camera;
+    `behind`: the backs of what the camera sees are lit.
     """
 
     width: int
@@ -42,7 +44,9 @@ class Receivers:
             images, data, what = dict(source.images), source.scene, "asset"
         else:
             data, what = source.scene(), "capture"
-            images = {name: image for name in ("position", "normal", "albedo", *GLOSS) if (image := source.channel(name)) is not None}
+            images = {
+                name: image for name in ("position", "normal", "albedo", *GLOSS, THROUGH) if (image := source.channel(name)) is not None
+            }
             images["coverage"] = source.coverage()
         if data is None:
             raise InputError(f"expected the {what} to hold scene.glb, found none: direct light needs the shadow casters; bake it indirect")
@@ -67,6 +71,19 @@ class Receivers:
     def reflectance(self) -> Float32[ndarray, "H W 3"] | float:
         """The factor from irradiance to the asset's quantity: 1, or albedo / pi."""
         return 1.0 if self.quantity == "irradiance" else self.images["albedo"] / np.float32(np.pi)
+
+    def behind(self) -> Receivers | None:
+        """The same surfaces from behind, where they let light through: normals turned over, what passes as albedo.
+
+        `sampling` says so: its rays' hits are turned over. None where nothing does, or where no radiance is asked for.
+        """
+        passed = self.images.get(THROUGH)
+        if passed is None or self.quantity != "radiance" or not (shown := passed.max(axis=2) > LEAST_THROUGH).any():
+            return None
+        coverage = self.images.get("coverage")
+        covered = np.where(shown, 1.0 if coverage is None else coverage, 0).astype(np.float32)
+        images = {"position": self.images["position"], "normal": -self.images["normal"], "albedo": passed, "coverage": covered}
+        return replace(self, images=images, sampling={**self.sampling, "behind": True})
 
     def gradients(self, name: str) -> tuple[Float32[ndarray, "H W 3"], Float32[ndarray, "H W 3"]]:
         """Change of position or normal per texel to the right and down; 0 without a neighbor on the same surface."""

@@ -15,10 +15,10 @@ from srbf.errors import ShaderError
 from srbf.gl.context import Limits, create_context
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, triple
 from srbf.unshadowed import irradiance_from
-from srbf.visibility.embree import EmbreeTriangles, has_embree
 from srbf.visibility.gl_resources import Resources, render
-from srbf.visibility.lightmap_points import LightmapPoints
 from srbf.visibility.looks import look_of, looks_over
+from srbf.visibility.lookup_points import EDGE_PARTS, LookupPoints
+from srbf.visibility.map_lookups import Lookups, PixelLookups, visible_part
 from srbf.visibility.receivers import Receivers, disc_points, spread_points
 from srbf.visibility.shadow import SunFrame
 from srbf.visibility.shadow_casters import POINT_STAGES, SUN_STAGES, ShadowCasters, ShadowMaps
@@ -31,8 +31,6 @@ SUN_SAMPLES = 16  # shadow maps of a sun with a disc
 LOOKS = 32  # places of a light with a size
 LOOK_SIZE = 512  # texels per side of their cubes' faces
 LAYERS_PER_LOOK = 4  # of a texel's lookups
-FINE, COARSE = 4, 2  # lookups per side of a texel's footprint
-FINE_TEXELS = 1 << 16  # largest lightmap with FINE lookups
 
 
 class ShadowMapper:
@@ -40,7 +38,7 @@ class ShadowMapper:
 
     A directional light has one orthographic map, a spot one perspective map, a point light (and a spot wider than 75 degrees) a cube of
     six, a sphere or an area many cubes. Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their
-    transmittance. ShaderError without OpenGL 3.3.
+    transmittance. A pixel of a view that shows several surfaces is the mean of points on all of them. ShaderError without OpenGL 3.3.
     """
 
     def __init__(self, receivers: Receivers, size: int = SIZE, context: moderngl.Context | None = None) -> None:
@@ -94,42 +92,57 @@ class ShadowMapper:
 
     def _of_sun(self, direction: Float64[ndarray, " 3"]) -> Float32[ndarray, "H W 3"]:
         suns = list(_suns(direction, self._receivers.sun_angle))
-        with self._context:
-            self._clear()
-            for sun in suns:
-                uniforms = _uniforms(SunFrame.around(self._points, sun))
-                self._casters.draw(self._maps(self._size), SUN_STAGES, uniforms)
-                self._look_up(self._sun_lookup, self._maps(self._size), {**uniforms, "weight": 1 / len(suns)}, range(len(self._places)))
-            return self._read()[..., :3]
+        frames = [{**_uniforms(SunFrame.around(self._points, sun)), "weight": 1 / len(suns)} for sun in suns]
+        return self._of_maps(SUN_STAGES, frames, self._size)
 
     def _of_point(self, light: PointLight) -> Float32[ndarray, "H W 3"]:
         look = look_of(light)
         size = max(1, self._size // 2) if look.faces else self._size
+        return self._of_maps(POINT_STAGES, [{**uniforms, "weight": 1.0} for uniforms in look.maps(size)], size)
+
+    def _of_maps(self, stages: tuple[str, str, str], looks: list[dict[str, Any]], size: int) -> Float32[ndarray, "H W 3"]:
+        """By a map of each look; once more at more points of the pixels that the edge of a shadow crosses."""
         with self._context:
             self._clear()
-            for uniforms in look.maps(size):
-                self._casters.draw(self._maps(size), POINT_STAGES, uniforms)
-                self._look_up(self._point_lookup, self._maps(size), {**uniforms, "weight": 1.0}, range(len(self._places)))
-            return self._read()[..., :3]
+            for uniforms in looks:
+                self._draw(stages, uniforms, size, [*self._layers, *self._edges.parts])
+            found = self._with(self._edges, self._sums()[..., :3])
+            for pixels, samples in self._lookup_points.of_shadows(found):
+                own = Resources(self._context)
+                try:
+                    more = PixelLookups.of(own, pixels, samples, self._center)
+                    for uniforms in looks:
+                        self._draw(stages, uniforms, size, more.parts)
+                    found = self._with(more, found)
+                finally:
+                    own.close()
+            return found
 
     def _of_size(self, light: SphereLight | AreaLight) -> Float32[ndarray, "H W 3"]:
         """The exact irradiance times the part of the looks, weighted by what each adds, that reaches a texel."""
         size = min(self._size, LOOK_SIZE)
-        strides = max(1, len(self._places) // LAYERS_PER_LOOK)
+        strides = max(1, len(self._layers) // LAYERS_PER_LOOK)
         with self._context:
             self._clear()
             for number, look in enumerate(looks_over(light, LOOKS)):
-                layers = range(number % strides, len(self._places), strides)
+                lookups = [*self._layers[number % strides :: strides], *self._edges.parts[number % EDGE_PARTS :: EDGE_PARTS]]
                 for uniforms in look.maps(size):
-                    self._casters.draw(self._maps(size), POINT_STAGES, uniforms)
-                    self._look_up(self._point_lookup, self._maps(size), {**uniforms, "weight": 1.0}, layers)
-            found = self._read()
-        exact = np.zeros(found.shape[0] * found.shape[1])
-        for point, normal, weight in self._layers:
-            exact += weight * irradiance_from(light, point, normal)
-        whole = found[..., 3:]
-        visible = np.where(whole > 0, found[..., :3] / np.where(whole > 0, whole, 1), 1)
-        return (visible * exact.reshape(*found.shape[:2], 1)).astype(np.float32)
+                    self._draw(POINT_STAGES, {**uniforms, "weight": 1.0}, size, lookups)
+            found = self._sums()
+            exact = np.zeros(found.shape[0] * found.shape[1])
+            for layer in self._layers:
+                exact += layer.weight * irradiance_from(light, layer.place, layer.normal)
+            return self._with(self._edges, (visible_part(found) * exact.reshape(*found.shape[:2], 1)).astype(np.float32), light)
+
+    @staticmethod
+    def _with(
+        lookups: PixelLookups, irradiance: Float32[ndarray, "H W 3"], sized: SphereLight | AreaLight | None = None
+    ) -> Float32[ndarray, "H W 3"]:
+        """With the pixels that have points of their own; `sized`: the light, if it has a size."""
+        result = irradiance.copy()
+        if len(lookups.pixels):
+            result.reshape(-1, 3)[lookups.pixels] = lookups.mean(sized)
+        return result
 
     def _prepare(self) -> None:
         receivers = self._receivers
@@ -144,29 +157,20 @@ class ShadowMapper:
         if not covered.any():
             covered[:] = True
         self._center = position[covered].mean(axis=0, dtype=np.float64)  # single precision is finest about the origin
-        by_rays = has_embree() and receivers.camera is None and receivers.triangles.lightmap is None
-        places = LightmapPoints(receivers, EmbreeTriangles(receivers.triangles.corners).first_hit if by_rays else None)
-        shape, every = position.shape[:2], np.arange(covered.size)
-        side = FINE if covered.size <= FINE_TEXELS else COARSE
-        grid = (np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2) + 0.5) / side
-        found = [places.at(every, np.broadcast_to(place, (covered.size, 2))) for place in grid]
-        total = np.sum([points.weight for points in found], axis=0)
-        self._places, self._layers = [], []
-        for points in found:
-            place, weight = points.point - self._center, points.weight / total
-            height = np.einsum("nc,nc->n", points.lift, points.normal)
-            images = (np.column_stack([place, weight]), np.column_stack([points.normal, height]), points.face)
-            self._places.append([self._resources.texture(image.astype(np.float32).reshape(*shape, -1)) for image in images])
-            self._layers.append((place, points.normal, weight))
-        self._points = np.concatenate([place[covered.ravel()] for place, _, _ in self._layers]).astype(np.float64)
+        points = self._lookup_points = LookupPoints.of(receivers)
+        self._sum = self._resources.target((receivers.width, receivers.height), 4, "f4")
+        self._layers = [Lookups.of(self._resources, layer, self._center, self._sum) for layer in points.layers]
+        self._edges = PixelLookups.of(self._resources, points.edges, points.parts, self._center)
+        real = [(layer, layer.weight > 0 if points.parts else covered.ravel()) for layer in self._layers]
+        real += [(part, part.weight > 0) for part in self._edges.parts]
+        self._points = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
         self._casters = ShadowCasters(self._resources, receivers.triangles, self._center)
-        self._sum_texture, self._sum = self._resources.target((receivers.width, receivers.height), 4, "f4")
         self._sized: dict[int, ShadowMaps] = {}
         corners = self._resources.buffer(np.array([[-1, -1], [3, -1], [-1, 3]]))
-        self._sun_lookup, self._point_lookup = (
-            self._resources.array(self._resources.program("fullscreen.vert", fragment), corners, "2f", "corner")
-            for fragment in ("direct_on_mesh.frag", "direct_point_on_mesh.frag")
-        )
+        self._lookup = {
+            stages: self._resources.array(self._resources.program("fullscreen.vert", fragment), corners, "2f", "corner")
+            for stages, fragment in ((SUN_STAGES, "direct_on_mesh.frag"), (POINT_STAGES, "direct_point_on_mesh.frag"))
+        }
 
     def _maps(self, size: int) -> ShadowMaps:
         if size not in self._sized:
@@ -174,27 +178,30 @@ class ShadowMapper:
         return self._sized[size]
 
     def _clear(self) -> None:
-        self._sum.use()
-        self._sum.clear()
+        for _, target in (self._sum, *(part.target for part in self._edges.parts)):
+            target.use()
+            target.clear()
 
-    def _read(self) -> Float32[ndarray, "H W 4"]:
-        data = self._sum.read(components=4, dtype="f4")
+    def _sums(self) -> Float32[ndarray, "H W 4"]:
+        data = self._sum[1].read(components=4, dtype="f4")
         return np.frombuffer(data, np.float32).reshape(self._receivers.height, self._receivers.width, 4)
 
-    def _look_up(self, lookup: moderngl.VertexArray, maps: ShadowMaps, uniforms: dict[str, Any], layers: range) -> None:
-        """Add what reaches the points of some `layers` of the texels."""
+    def _draw(self, stages: tuple[str, str, str], uniforms: dict[str, Any], size: int, lookups: Sequence[Lookups]) -> None:
+        """Draw one map of a light, and add what reaches the points of some `lookups` by it."""
         gl: Any = self._context
-        self._sum.use()
+        maps = self._maps(size)
+        self._casters.draw(maps, stages, uniforms)
         gl.enable_only(gl.BLEND)
         gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
         names = ("points", "normals", "faces")
         units = {name: unit for unit, name in enumerate((*names, *maps.textures()))}
         for name, texture in maps.textures().items():
             texture.use(units[name])
-        for layer in layers:
-            for name, texture in zip(names, self._places[layer], strict=True):
+        for own in lookups:
+            own.target[1].use()
+            for name, texture in zip(names, own.textures, strict=True):
                 texture.use(units[name])
-            render(lookup, {**uniforms, **units, "walls": self._casters.has_walls}, vertices=3)
+            render(self._lookup[stages], {**uniforms, **units, "walls": self._casters.has_walls}, vertices=3)
 
 
 def _uniforms(frame: SunFrame) -> dict[str, Any]:

@@ -112,3 +112,35 @@ def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
             with Added(opened, kind) as added:
                 near = np.asarray(added.response([light]))
             assert np.sqrt(((near - direct)[floor] ** 2).sum() / (direct[floor] ** 2).sum()) < most, kind
+
+
+def test_light_passes_through_cloth_as_cycles_renders_it(tmp_path: Path) -> None:
+    """Direct light and bounces on the curtain of a studio, lit from the side of the camera and from behind."""
+    scene, folder, asset = tmp_path / "studio.blend", tmp_path / "capture", tmp_path / "asset"
+    made = [sys.executable, str(SCENES / "studio.py"), str(scene), "--unlit", "--shiny"]
+    subprocess.run(made, check=True, capture_output=True, timeout=120)
+    size = [*VIEW[:3], "32x32", "--light-set", "gather", "--pool", "8000", "--seed", "77"]
+    done("bake", scene, "-o", folder, *size, "--holdout", "6", "--holdout-samples", "128")
+    done("fit", folder, "-o", asset)
+    capture, opened, operator = Capture.open(folder), Asset.open(asset), GatherOperator.read(folder)
+    transmission, albedo = capture.channel("transmission"), capture.channel("albedo")
+    assert transmission is not None and albedo is not None and operator.behind is not None
+    pure = (np.abs(transmission - [0.4, 0.4, 0.35]) < 1e-3).all(axis=2)
+    assert pure.sum() > 20
+    np.testing.assert_allclose(albedo[pure], transmission[pure], atol=1e-3)  # this cloth reflects as much as it lets through
+    cells = operator.cells
+    second = np.flatnonzero((np.abs(cells.albedo - [0.4, 0.4, 0.35]) < 1e-3).all(axis=1))
+    assert np.abs(cells.places[second, 0] - 2.7).max() < 1e-3 and cells.normals[second, 0].sum() == 0  # two of either side
+    whole, sides = np.zeros(2), set()
+    for index in capture.indices("holdout"):
+        x, y, z = capture.positions([index])[0].tolist()
+        light, file = PointLight((x, y, z), falloff="inverse-square"), capture.lights[index].direct
+        assert file is not None
+        with Added(opened, "ray") as added:
+            own = linear_response(opened, [light]) + added.response([light])
+        expected = capture.image(index) + read_image(folder / file, 3)
+        np.testing.assert_allclose(own[pure].sum() / expected[pure].sum(), 1, atol=0.08)
+        whole += own.sum(), expected.sum()
+        sides.add(x > 2.7)
+    assert sides == {False, True}
+    np.testing.assert_allclose(whole[0] / whole[1], 1, atol=0.05)

@@ -177,6 +177,7 @@ def test_sides_albedo_and_names() -> None:
         assert (outward > 0).all(), name
         np.testing.assert_allclose(found["albedo"][mine].mean(axis=0), albedo.get(name, (0.6, 0.1, 0.05)), atol=1e-3, err_msg=name)
         assert (found["transparent"][mine] == (name == "pane")).all()
+    assert (found["transmission"] == 0).all()
     assert found["occluders"].shape == (7 * 12 + 2, 3, 3)  # undivided; the pane casts no shadow, the unseen sheet does
 
 
@@ -269,12 +270,13 @@ def cloth() -> dict[str, Any]:
     links.new(both.outputs[0], output.inputs["Surface"])
     add("Curtain", mesh_of("Curtain", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)], material))
     found = surfaces.fragments(scene, 1.0, Silent())  # type: ignore[arg-type]
-    return {"albedo": found["albedo"], "linked": np.array(len(through.inputs["Color"].links))}
+    return {"albedo": found["albedo"], "transmission": found["transmission"], "linked": np.array(len(through.inputs["Color"].links))}
 
 
 def test_light_that_cloth_lets_through_is_not_reflected() -> None:
     found = in_blender(cloth)
     np.testing.assert_allclose(found["albedo"], 0.4, atol=2e-3)
+    np.testing.assert_allclose(found["transmission"], 0.3, atol=2e-3)
     assert found["linked"] == 1
 
 

@@ -12,7 +12,7 @@ from srbf.capture import Capture
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
 from srbf.lights import PointLight
-from srbf.methods import linear_response, transfer_choice
+from srbf.methods import linear_response
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility import transfer_basis
 from srbf.visibility.cloud_lights import CloudLights

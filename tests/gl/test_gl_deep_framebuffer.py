@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room, with_lobes
+from made_views import view_of_room, with_backs, with_lobes
 from typer.testing import CliRunner
 
 from srbf import methods
@@ -76,6 +76,15 @@ def test_lobes_gather_as_in_numpy(asset: Asset, context: Any) -> None:
     expected = methods.relight(shiny, [LIGHTS["point"], LIGHTS["spot"]])
     assert expected.max() > 1.2 * methods.relight(asset, [LIGHTS["point"], LIGHTS["spot"]]).max()
     with Relighter(shiny, context=context) as relighter:
+        np.testing.assert_allclose(relighter.relight([LIGHTS["point"], LIGHTS["spot"]]), expected, atol=TOLERANCE * expected.max())
+
+
+@pytest.mark.parametrize("glossy", [False, True], ids=["diffuse", "glossy"])
+def test_light_from_behind_passes_as_in_numpy(asset: Asset, context: Any, glossy: bool) -> None:
+    opaque = with_lobes(asset) if glossy else asset
+    expected = methods.relight(with_backs(opaque), [LIGHTS["point"], LIGHTS["spot"]])
+    assert expected.mean() > 1.2 * methods.relight(opaque, [LIGHTS["point"], LIGHTS["spot"]]).mean()
+    with Relighter(with_backs(opaque), context=context) as relighter:
         np.testing.assert_allclose(relighter.relight([LIGHTS["point"], LIGHTS["spot"]]), expected, atol=TOLERANCE * expected.max())
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room, room_of_surfels
-from made_views import surfaces_of, view_of_room
+from made_views import surfaces_of, view_of_room, with_backs
 
 from srbf import relight
 from srbf.asset import Asset
@@ -158,3 +158,20 @@ def test_damaged_links_are_refused(capture: Capture, tmp_path: Path) -> None:
     (tmp_path / GATHER_FILE).write_bytes((tmp_path / GATHER_FILE).read_bytes()[:2000])
     with pytest.raises(ImageError, match="bake again"):
         GatherOperator.read(tmp_path)
+
+
+def test_light_from_behind_is_kept_in_files_and_at_some_pixels(asset: Asset, tmp_path: Path) -> None:
+    """Of pixels alone, after a round trip; and what is let through is as much as transmittance says."""
+    thin = with_backs(asset)
+    thin.save(tmp_path / "thin")
+    read = Asset.open(tmp_path / "thin")
+    expected = linear_response(thin, LIGHTS)
+    np.testing.assert_allclose(linear_response(read, LIGHTS), expected, rtol=1e-5, atol=1e-6 * expected.max())
+    some = np.array([3, 40, 77])
+    np.testing.assert_allclose(
+        linear_response(read.at(some), LIGHTS)[0], expected.reshape(-1, 3)[some], rtol=1e-4, atol=1e-6 * expected.max()
+    )
+    without = linear_response(asset, LIGHTS)
+    half = replace(thin, images={**thin.images, "transmission": thin.images["transmission"] / 2})
+    np.testing.assert_allclose(linear_response(half, LIGHTS) - without, (expected - without) / 2, atol=1e-5 * expected.max())
+    assert (expected - without).max() > 0

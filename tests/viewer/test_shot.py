@@ -13,7 +13,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room, with_lobes
+from made_views import view_of_room, with_backs, with_lobes
 from test_page import HEIGHT, STEP, WIDTH, ZOOM, lights_of, shown_as
 
 from srbf.asset import Asset
@@ -146,8 +146,9 @@ def test_the_script_makes_the_lights_in_blender(chromium: Any, page: Callable[..
     assert size == pytest.approx(np.radians(70), rel=1e-5) and blend == pytest.approx((inner - outer) / (1 - outer), rel=1e-5)
 
 
-def test_the_page_says_that_it_shows_no_gloss(asset: Asset, tmp_path: Path) -> None:
-    for name, made in (("plain", asset), ("shiny", with_lobes(asset))):
-        made.save(tmp_path / name)
-    notes = {name: json.loads(read(contents_of([tmp_path / name])[page_manifest.NAME]))["notes"] for name in ("plain", "shiny")}
-    assert not notes["plain"] and any("gloss" in note for note in notes["shiny"])
+def test_the_page_says_that_it_shows_no_gloss_and_no_light_from_behind(asset: Asset, tmp_path: Path) -> None:
+    made = {"plain": asset, "shiny": with_lobes(asset), "thin": with_backs(asset)}
+    for name, one in made.items():
+        one.save(tmp_path / name)
+    notes = {name: json.loads(read(contents_of([tmp_path / name])[page_manifest.NAME]))["notes"] for name in made}
+    assert not notes["plain"] and any("gloss" in note for note in notes["shiny"]) and any("let through" in note for note in notes["thin"])
