@@ -128,8 +128,8 @@ class Accumulation:
         """The sum of `light`; an empty one where its file is missing or damaged."""
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(self._path(light.index)) as stored:
             passes, samples = (int(n) for n in stored["counts"])
-            arrays = [stored.get(name) for name in PARTS]
-            return Sum(passes, samples, *arrays, _noise_in(stored))
+            whole, direct, squares, harmonics = (stored.get(name) for name in PARTS)
+            return Sum(passes, samples, whole, direct, squares, harmonics, _noise_in(stored))
         return NOTHING
 
     def write(self, light: PlannedLight, total: Sum, keep: bool, checksum: str = "") -> None:

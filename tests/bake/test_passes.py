@@ -109,7 +109,7 @@ def test_passes_of_a_camera_add_up(bake, tmp_path: Path) -> None:
 
 
 def test_indirect_images_tell_their_noise(bake) -> None:
-    """About as they differ from the same of many samples. Combined captures tell none: direct light's passes differ by twice their noise."""
+    """About as they differ from the same of many samples. Combined captures tell none: passes of direct light differ by twice it."""
     settings = {"validation": 1, "holdout": 2, "transport": "indirect"}
     few, many = (bake("torus", "lightmap:Torus", name=str(n), holdout_samples=n, **settings).capture for n in (16, 1024))
     told = [i for i, light in enumerate(few.lights) if light.noise is not None]
