@@ -28,10 +28,10 @@ void srbfNeuralCodes(highp sampler2DArray planes, vec2 uv, float level, vec4 net
     }
     for (int i = 0; i < SRBF_LAYERS; ++i) {
         vec4 code = srbfDecodeComponents(textureLod(planes, vec3(uv, float(i)), level), scale[i], bias[i]);
-        for (int c = 0; c < min(4, SRBF_COMPONENTS - 4 * i); ++c) {
-            for (int u = 0; u < SRBF_UNIT_VECTORS; ++u) {
-                units[u] += code[c] * network[(4 * i + c) * SRBF_UNIT_VECTORS + u];
-            }
+        for (int u = 0; u < SRBF_UNIT_VECTORS; ++u) {
+            int row = 4 * i * SRBF_UNIT_VECTORS + u;  // rows past the code's are of the network, too, and unused channels are 0
+            units[u] += code.x * network[row] + code.y * network[row + SRBF_UNIT_VECTORS];
+            units[u] += code.z * network[row + 2 * SRBF_UNIT_VECTORS] + code.w * network[row + 3 * SRBF_UNIT_VECTORS];
         }
     }
 }

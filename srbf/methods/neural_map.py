@@ -83,7 +83,7 @@ class NeuralMap(Method):
 
     codes: int = setting(12, "How many numbers per texel.")
     hidden: int = setting(20, "Units in each hidden layer of the network.")
-    steps: int = setting(10000, "Steps of training, at most.")
+    steps: int = setting(15000, "Steps of training, at most.")
     time_limit: float = setting(600, "Seconds that training takes at most.", duration=True)
     domain: Literal["auto"] | Domain = setting("auto", "Where light can come from; auto: where the lights are.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
