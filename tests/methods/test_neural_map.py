@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +12,12 @@ import numpy as np
 import pytest
 from made_assets import build_neural
 from made_captures import write_capture
+from typer.testing import CliRunner
 
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.errors import ImageError, InputError, ManifestError
+from srbf.cli import app
+from srbf.errors import ImageError, InputError, ManifestError, MissingLibraryError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import implied_method
 from srbf.io import files
@@ -195,7 +198,6 @@ def test_a_moved_asset_is_lit_where_it_stands() -> None:
         ({"hidden": 18}, "expected a multiple of 4 up to 32 as `hidden`, found 18"),
         ({"steps": 0}, "expected 1 or more `steps`, found 0"),
         ({"time_limit": 0}, "expected a `time_limit` above 0 s, found 0"),
-        ({"encoding": "bc7"}, "expected an encoding of half, float, uint8, found 'bc7'"),
     ],
 )
 def test_wrong_settings_are_refused(settings: dict, words: str) -> None:
@@ -230,3 +232,20 @@ def test_a_network_of_another_size_is_refused(tmp_path: Path) -> None:
 
 def test_codes_imply_the_method() -> None:
     assert implied_method({"codes": 9}) == NeuralMap.name
+
+
+def test_without_jax_a_fit_says_what_to_install(bumps: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "jax", None)
+    with pytest.raises(MissingLibraryError, match=r"a neural map is trained by jax: pip install srbf\[neural\]"):
+        NeuralMap().encode(bumps)
+
+
+@pytest.mark.slow
+def test_the_command_takes_a_duration_and_refuses_another_word(bumps: Capture, tmp_path: Path) -> None:
+    arguments = ["fit", str(bumps.folder), "-o", str(tmp_path / "asset"), "--method", NeuralMap.name, "--time-limit"]
+    refused = CliRunner().invoke(app, [*arguments, "soon"])
+    assert refused.exit_code == 2 and "expected a duration as 90s, 30m or 8h, found 'soon'" in refused.output
+    if importlib.util.find_spec("jax") is not None:
+        assert CliRunner().invoke(app, [*arguments, "1m30s", "--steps", "2", "--hidden", "4"]).exit_code == 0
+        settings = Asset.open(tmp_path / "asset").manifest["source"]["settings"]
+        assert settings["time_limit"] == 90 and settings["steps"] == 2 and settings["hidden"] == 4
