@@ -56,5 +56,5 @@ def test_the_table_holds_every_number() -> None:
 
 
 def test_elu_is_smooth_at_zero_and_bounded_below() -> None:
-    x = np.array([-50, -1e-4, 0, 1e-4, 3], np.float32)
-    np.testing.assert_allclose(elu(x), [-1, math.expm1(-1e-4), 0, 1e-4, 3], rtol=1e-6)
+    x = np.array([[-50, -1e-4, 0, 1e-4, 3]], np.float32)
+    np.testing.assert_allclose(elu(x), [[-1, math.expm1(-1e-4), 0, 1e-4, 3]], rtol=1e-6)
