@@ -41,9 +41,9 @@ class NeuralMap(Method):
 
     T(p, L) ~ f(a(p), L), see `NeuralDecoder`; an encoder makes a(p) of all responses of p     [Dulecha2020]
 
-    The network is one for all texels and takes 3 kB. It follows what a sum of few components cannot, such as highlights and shadow edges
-    that move with the light, and predicts lights between the captured ones well. It is not linear in functions of the light: every
-    directional light costs an evaluation, an environment map NODES of them. The paper's decoder has two hidden layers of 50 units and no
+    The network is one for all texels and takes 3 kB. It follows what a sum of few components cannot, such as highlights that move with
+    the light; under hundreds of hard suns it holds less than an eigen map. It is not linear in functions of the light: every directional
+    light costs an evaluation, an environment map NODES of them. The paper's decoder has two hidden layers of 50 units and no
     bytes in training.
 
     Parameters
