@@ -9,6 +9,7 @@ import numpy as np
 from srbf.asset import Asset
 from srbf.basis.gaussian import r_table, spread_of
 from srbf.basis.light_functions import LightFunctions
+from srbf.basis.neural_decoder import rows_of
 from srbf.basis.octahedral_table import octahedral_table
 from srbf.encode.quantization import quantize
 from srbf.sphere import point_set
@@ -102,3 +103,37 @@ def build_planes(
         tables["cluster_index"] = (spots * (clusters // 3 + 1) % clusters).astype(np.uint8)
         tables["cluster_index"][-1, -1] = clusters - 1
     return Asset(manifest, stored, scale, bias, tables, images)
+
+
+def build_neural(codes: int = 9, hidden: int = 8, encoding: str = "uint8", height: int = 9, width: int = 14, seed: int = 0) -> Asset:
+    """A neural map of random codes and a random network, whose responses are of about unit size and bend with the direction."""
+    rng = np.random.default_rng([seed, codes, hidden])
+    layers = np.zeros((-(-codes // 4), height, width, 4), np.float32)
+    for j in range(codes):
+        layers[j // 4, :, :, j % 4] = rng.normal(size=(height, width))
+    stored, scale, bias = quantize(layers, encoding)  # type: ignore[arg-type]
+    unused = range(codes % 4 or 4, 4)
+    scale[-1, unused], bias[-1, unused] = 0, 0
+    rows = rows_of(codes, hidden)
+    network = (rng.normal(size=(rows, hidden)) * rng.uniform(0.5, 1.5, (rows, 1)) / np.sqrt(hidden)).astype(np.float32)
+    network[codes : codes + 3] *= 3
+    network[-1, 3:] = 0
+    manifest: dict[str, Any] = {
+        "method": "neural-map",
+        "width": width,
+        "height": height,
+        "domain": "hemisphere",
+        "quantity": "irradiance",
+        "scalars": codes,
+        "planes": [{"encoding": encoding} for _ in layers],
+        "network": {"file": "network.exr", "hidden": hidden, "activation": "elu"},
+    }
+    positions = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
+    return Asset(
+        manifest,
+        stored,
+        scale,
+        bias,
+        {"network": network},
+        {"position": positions, "ambient": rng.random((height, width, 3)).astype(np.float32)},
+    )

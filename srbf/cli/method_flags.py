@@ -13,7 +13,7 @@ import typer
 
 from srbf.cli.flags import flags_alone
 from srbf.cli.group import Command
-from srbf.cli.values import COUNT, Number, Parsed, parse_share
+from srbf.cli.values import COUNT, Number, Parsed, duration, parse_share
 from srbf.fitting.auto_method import DEFAULT_BUDGET
 from srbf.fitting.options import AUTO, check_settings
 from srbf.registry import all_methods, method_named, method_names
@@ -124,6 +124,8 @@ def _annotation(owners: list[tuple[str, Field[Any], Any]]) -> Any:
         implied = any(entry.name in method_named(method).implied_by for method, _, _ in owners)
         words = _flag(entry) if implied else f"{_flag(entry)}/--no-{_flag(entry).removeprefix('--')}"
         return Annotated[bool | None, typer.Option(words, help=help_text, show_default=False)]
+    if entry.metadata["duration"]:
+        return Annotated[float | None, typer.Option(_flag(entry), metavar="DURATION", parser=duration, help=help_text, show_default=False)]
     if hints == {str}:
         return Annotated[str | None, typer.Option(_flag(entry), metavar="TEXT", help=help_text, show_default=False)]
     if hints == {int}:

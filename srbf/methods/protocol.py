@@ -35,9 +35,12 @@ Moving = Callable[[Sequence[Light], float], np.ndarray]
 MOST_POINT_LIGHTS = 8  # that srbfAssetLights takes at once
 
 
-def setting(default: Any, help: str, *, flag: str | None = None, words: tuple[str, ...] = ()) -> Any:
-    """A field of a method's settings that the command line offers: `help`, a `flag` that is not its name, `words` besides a number."""
-    return field(default=default, metadata={"help": help, "flag": flag, "words": words})
+def setting(default: Any, help: str, *, flag: str | None = None, words: tuple[str, ...] = (), duration: bool = False) -> Any:
+    """A field of a method's settings that the command line offers: `help`, a `flag` that is not its name, `words` besides a number.
+
+    `duration`: seconds, which the command line takes as 90s or 30m, too.
+    """
+    return field(default=default, metadata={"help": help, "flag": flag, "words": words, "duration": duration})
 
 
 def check_error(error: float | None) -> None:

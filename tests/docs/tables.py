@@ -36,9 +36,11 @@ SHORTER = {
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
     "srbf evaluate --point-reference *": "--point-reference 2 --samples 1",
+    "srbf fit --method neural-map *": "--steps 2",
     "srbf view *": "--port 0",
     "python benchmarks/fit.py *": "--lights 12 --side 16 -k 4 --rounds 1",
     "python benchmarks/motion.py *": "--lights 26",
+    "python benchmarks/neural.py *": "--codes 2 --steps 2",
     "python benchmarks/pipeline.py *": "--lights 30 --side 16",
     "python benchmarks/shader.py *": "--sides 16 --runs 1 --point-lights 1",
 }

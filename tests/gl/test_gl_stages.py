@@ -31,6 +31,7 @@ LIT_PLANES = [{"SRBF_COMPONENTS": s} | point_lights for s in (9, 256) for point_
     {"SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_PLAIN": 1}
 ]
 UNITS: list[dict[str, object]] = [{}, *({"SRBF_UNITS": units} for units in range(1, 9))]
+NETWORK: dict[str, object] = {"SRBF_COMPONENTS": 9, "SRBF_UNIT_VECTORS": 2}
 METHODS = ("", "eigen_map_", "clustered_eigen_map_")
 DEFINES: dict[str, list[dict[str, object]]] = {
     "directional.frag": [{"SRBF_K": k} for k in (1, 25, 64)],  # 64 fit the 224 vec4 that ES 3.00 promises
@@ -44,6 +45,10 @@ DEFINES: dict[str, list[dict[str, object]]] = {
     **{f"{method}projected.frag": PROJECTED for method in METHODS[1:]},
     **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
     **{f"{method}accumulate.frag": UNITS for method in METHODS},
+    "neural_map_distant.frag": [NETWORK | {"SRBF_DISTANT": 4}],
+    "neural_map_points.frag": [
+        NETWORK | point_lights for point_lights in ({"SRBF_POINT_LIGHTS": 1}, {"SRBF_POINT_LIGHTS": 8, "SRBF_DEPTH": 1})
+    ],
 }
 CASES = [(name, defines) for name in STAGES for defines in DEFINES.get(name, [{}])]
 IDS = [f"{name}-{'-'.join(map(str, defines.values()))}" for name, defines in CASES]
@@ -63,7 +68,10 @@ def test_every_method_has_the_same_stages() -> None:
     ]
     environments = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
     pool = [f"deep_framebuffer_{part}.frag" for part in ("bounce", "clusters", "pixels", "sum", "surfels")]
-    assert sorted([*methods, *shadows, *environments, *pool, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    neural = ["neural_map_distant.frag", "neural_map_points.frag"]
+    assert (
+        sorted([*methods, *shadows, *environments, *pool, *neural, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
+    )
 
 
 @pytest.mark.parametrize("version", ["330 core", "300 es"])

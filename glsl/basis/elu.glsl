@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: MIT
+/* srbfElu: four numbers through the activation of a neural decoder: x above 0, exp(x) - 1 below.
+   use:    vec4 srbfElu(vec4 x)
+   domain: any; result above -1
+   twin:   srbf.basis.neural_decoder.elu
+   cite:   Dulecha2020 */
+vec4 srbfElu(vec4 x) {
+    return max(x, 0.0) + (exp(min(x, 0.0)) - 1.0);
+}
