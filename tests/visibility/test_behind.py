@@ -23,6 +23,7 @@ from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.surfels import Surfels
 
 pytest.importorskip("embreex")
+pytestmark = pytest.mark.slow
 
 SHEET = 2.0  # m: where it parts the room
 PARTED = Room.box((4, 3, 2.5), 0.25, 0.6, wall=(SHEET, 3.0, 3.0))  # from wall to wall
