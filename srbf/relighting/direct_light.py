@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy import ndarray
@@ -34,6 +34,7 @@ NAMES = {
 }
 
 
+@runtime_checkable
 class DirectLight(Protocol):
     """Adds what an indirect asset leaves out; lights are in the asset's frame."""
 
