@@ -72,6 +72,7 @@ class GlossyCloud(LightTableMaps):
     domains: ClassVar[tuple[str, ...]] = ("cloud",)
     receivers: ClassVar[tuple[str, ...]] = ("lightmap", "vertices")
     has_shader: ClassVar[bool] = False
+    on_page: ClassVar[bool] = False
     tables: ClassVar[dict[str, str]] = {
         **LightTableMaps.tables,
         "cells": "cells.exr",

@@ -95,6 +95,7 @@ class Method(ABC):
     rows_are_independent: ClassVar[bool] = False  # blocks of rows may be solved on other machines
     has_shader: ClassVar[bool] = True  # `glsl/methods/STEM.glsl` is there
     exportable: ClassVar[bool] = True  # layers may be encoded otherwise, for engines
+    on_page: ClassVar[bool] = True  # the viewer's page and the npm package show it
     takes_objects: ClassVar[bool] = False  # whether a named light is an object whose surfaces emit
     filterable: ClassVar[bool] = True  # layers mean the same at neighboring texels: they may be filtered, and have mip levels
 

@@ -88,6 +88,7 @@ class TransferPaper(Method):
     receivers: ClassVar[tuple[str, ...]] = ("lightmap", "view", "vertices")
     implied_by: ClassVar[tuple[str, ...]] = ("d2", "basis=paper")
     has_shader: ClassVar[bool] = False
+    on_page: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
     exportable: ClassVar[bool] = False
 

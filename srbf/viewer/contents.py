@@ -12,6 +12,7 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.light_domain import domain_of_asset
+from srbf.methods import method_of
 from srbf.viewer import page_manifest
 from srbf.viewer.built_page import page_files
 from srbf.viewer.measures import Measures
@@ -41,6 +42,9 @@ def contents_of(
     """
     page = page_files()
     assets = [Asset.open(folder) for folder in folders]
+    for asset, folder in zip(assets, folders, strict=True):
+        if not method_of(asset).on_page:
+            raise InputError(f"expected an asset that the page shows, found {asset.method} in {folder}; `srbf relight` shows it")
     _check_siblings(assets, folders)
     references = None
     if capture is not None:

@@ -55,6 +55,8 @@ def test_methods_are_listed_from_the_simplest() -> None:
         ("light-mix", "light-cloud", "named-maps", "glossy-cloud", "transfer", "deep-framebuffer", "neural-map", "transfer-paper"),
     )
     assert registry.method_names() == (*of_directions, *inside)
+    own = {path.stem for path in (ROOT.parent / "web" / "src" / "methods").glob("*.ts")} - {"index", "method", "node_kit"}
+    assert own == {method.stem() for method in registry.all_methods() if method.on_page}, "what the page shows"
     assert [registry.method_named(name).name for name in registry.method_names()] == list(registry.method_names())
 
 

@@ -119,6 +119,14 @@ def test_assets_of_other_captures_are_refused(make_asset: Callable[..., Asset], 
     assert "\n" not in str(refused.value)
 
 
+def test_what_the_page_does_not_know_is_refused(make_asset: Callable[..., Asset], built: Path, tmp_path: Path, monkeypatch) -> None:
+    complete(on_a_plane(make_asset(k=3))).save(tmp_path / "maps")
+    monkeypatch.setattr(RelightingMap, "on_page", False)
+    with pytest.raises(InputError, match="expected an asset that the page shows, found relighting-map") as refused:
+        contents_of([tmp_path / "maps"])
+    assert "srbf relight" in str(refused.value) and "\n" not in str(refused.value)
+
+
 @pytest.mark.parametrize("given", [[], ["capture", "capture"], ["asset", "capture", "capture"]])
 def test_the_command_wants_an_asset_and_at_most_one_capture(fitted: tuple[Capture, list[Path]], given: list[str]) -> None:
     capture, folders = fitted
