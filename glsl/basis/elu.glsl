@@ -5,5 +5,6 @@
    twin:   srbf.basis.neural_decoder.elu
    cite:   Dulecha2020 */
 vec4 srbfElu(vec4 x) {
-    return max(x, 0.0) + (exp(min(x, 0.0)) - 1.0);
+    vec4 zero = vec4(0.0);
+    return max(x, zero) + (exp(min(x, zero)) - 1.0);
 }

@@ -9,10 +9,10 @@
 #include "combine/decode_components.glsl"
 
 #ifndef SRBF_COMPONENTS
-#error define SRBF_COMPONENTS: numbers in a texel's code
+#error define SRBF_COMPONENTS: numbers in a code
 #endif
 #ifndef SRBF_UNIT_VECTORS
-#error define SRBF_UNIT_VECTORS: vec4 of a hidden layer's units
+#error define SRBF_UNIT_VECTORS: a fourth of the units in a hidden layer
 #endif
 #ifndef SRBF_LAYERS
 #define SRBF_LAYERS ((SRBF_COMPONENTS + 3) / 4)

@@ -8,10 +8,10 @@
 #include "basis/elu.glsl"
 
 #ifndef SRBF_COMPONENTS
-#error define SRBF_COMPONENTS: numbers in a texel's code
+#error define SRBF_COMPONENTS: numbers in a code
 #endif
 #ifndef SRBF_UNIT_VECTORS
-#error define SRBF_UNIT_VECTORS: vec4 of a hidden layer's units
+#error define SRBF_UNIT_VECTORS: a fourth of the units in a hidden layer
 #endif
 #ifndef SRBF_NETWORK
 #define SRBF_NETWORK ((SRBF_COMPONENTS + 4 * SRBF_UNIT_VECTORS + 8) * SRBF_UNIT_VECTORS + 1)

@@ -25,7 +25,7 @@ from srbf.lights import PointLight
 needs_chromium = pytest.mark.skipif(browser() is None, reason="needs chromium (Debian)")
 
 NAMES = ["relighting-map", "eigen-map", "clustered-eigen-map"]
-COUNTS = {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4}
+COUNTS = {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_UNIT_VECTORS": 2}
 STAGE = """
 @group(0) @binding(0) var layers: texture_2d_array<f32>;
 @group(0) @binding(1) var positions: texture_2d<f32>;
