@@ -175,7 +175,8 @@ def test_hlsl_gives_the_pixels_of_all_lights_at_once(make: Callable[..., Asset],
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (shader_root() / "stages").iterdir()))
 def test_every_stage_crosses_to_every_language(name: str, tmp_path: Path) -> None:
-    code = spirv.compile_stage(name, {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_UNIT_VECTORS": 2, "SRBF_DISTANT": 4})
+    counts = {"SRBF_K": 25, "SRBF_COMPONENTS": 9, "SRBF_POINT_LIGHTS": 4, "SRBF_UNIT_VECTORS": 2, "SRBF_DISTANT": 4}
+    code = spirv.compile_stage(name, counts)
     texts = {language: spirv.cross_compile(code, language) for language in spirv.ARGUMENTS}
     assert texts["es"].startswith("#version 300 es") and texts["glsl"].startswith("#version 330")
     assert "main0" in texts["metal"]  # no Metal compiler runs outside a Mac
