@@ -21,6 +21,7 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
+pytestmark = pytest.mark.slow
 
 BOX = Room.box((2, 1.5, 1.5), 0.25, 0.6)
 
@@ -48,7 +49,6 @@ def test_the_error_on_validation_lights_is_kept_to(capture: Capture) -> None:
     assert asset.bytes_per_texel()["directional"] < 13, "fewer components are enough"
 
 
-@pytest.mark.slow
 def test_random_lights_against_the_form_factors_where_none_are_held_out(capture: Capture) -> None:
     """By other random lights, as the choice cannot know them."""
     said: list[str] = []

@@ -27,6 +27,7 @@ from srbf.methods.light_cloud import LightCloud
 
 pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
+pytestmark = pytest.mark.slow
 
 BOX = Room.box((3, 2, 2), 0.25, 0.6)
 LIGHTS = 60
@@ -61,7 +62,6 @@ def relative(found: np.ndarray, true: np.ndarray) -> float:
     return float(np.sqrt(((found - true) ** 2).sum() / (true**2).sum()))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("interpolation", "most"), [("fingerprint", 0.2), ("kernel", 0.3)])
 def test_unseen_lights_are_relit_toward_unseen_viewers(capture: Capture, interpolation, most) -> None:
     """Seen from places that no viewer of the bake was at; surfaces that are seen at a slant of more than 11.5 degrees count."""
@@ -87,7 +87,6 @@ def test_errors_toward_viewers_are_measured(asset: Asset, capture: Capture) -> N
     assert asset.bytes_per_texel()["point"] == 17
 
 
-@pytest.mark.slow
 def test_lambert_looks_alike_from_everywhere(tmp_path: Path) -> None:
     asset = GlossyCloud(clusters=6, components=12).encode(glossy_room(tmp_path / "capture", BOX, 40, gloss=0.0))
     lights = [light((1.2, 0.9, 1.1))]
@@ -134,7 +133,6 @@ def test_seen_from_above_is_seen_along_the_normals(asset: Asset) -> None:
     np.testing.assert_array_equal(GlossyCloud.toward(asset, weights, asset.images["normal"]), linear_response(asset, lights))
 
 
-@pytest.mark.slow
 def test_it_is_chosen_where_the_capture_has_harmonics(capture: Capture) -> None:
     assert method_for(capture) == GlossyCloud()
     assert method_for(capture, None, {"clusters": 8}) == GlossyCloud(clusters=8)
@@ -142,7 +140,6 @@ def test_it_is_chosen_where_the_capture_has_harmonics(capture: Capture) -> None:
     assert fit(capture, clusters=4, components=4).method == "glossy-cloud"
 
 
-@pytest.mark.slow
 def test_a_combined_capture_has_no_walls(capture: Capture, tmp_path: Path) -> None:
     shutil.copytree(capture.folder, tmp_path / "combined")
     manifest = files.read_json(tmp_path / "combined" / "capture.json")

@@ -23,6 +23,7 @@ from srbf.unshadowed import irradiance_from
 
 pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
+pytestmark = pytest.mark.slow
 
 ROOM = Room.box((3, 2, 2), 0.5, 0.6, (1.5, 0.6, 1.4))
 POINT = PointLight((0.7, 0.8, 1.1), (1.0, 0.5, 0.2), falloff="inverse-square")

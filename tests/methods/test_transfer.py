@@ -27,6 +27,7 @@ from srbf.visibility.transfer_operator import OPERATOR_FILE, TransferOperator, i
 
 pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
+pytestmark = pytest.mark.slow
 
 BOX = Room.box((3, 2, 2), 0.25, 0.6)
 APART = Room.box((4, 3, 2.5), 0.25, 0.6, (2.0, 3.0, 3.0))  # a wall without a door
@@ -88,7 +89,6 @@ def test_lights_of_all_kinds_add_up_and_scale(asset: Asset) -> None:
     assert not linear_response(asset, [DirectionalLight((0.2, 0.3, 1.0))]).any(), "a sun through no window"
 
 
-@pytest.mark.slow
 def test_two_rooms_without_a_door_exchange_no_light(tmp_path: Path) -> None:
     apart = Transfer(clusters=16, rank=96, surfels=400).encode(room_of_surfels(tmp_path / "capture", APART, 1200))
     far = (APART.places[:, 0] > 2) | ((np.abs(APART.places[:, 0] - 2) < 1e-6) & (APART.normals[:, 0] > 0))
@@ -180,7 +180,6 @@ def test_an_object_that_emits_lights_the_room(editable: Asset, capture: Capture)
     np.testing.assert_allclose(both, apart, rtol=1e-4, atol=1e-4)
 
 
-@pytest.mark.slow
 def test_lights_are_not_measured_by_black_surfels(black: Capture) -> None:
     plain = replace(SETTINGS, surfels=200).encode(black)
     assert (plain.tables["cells"][0, :, 0] > 1e-3).all(), "the black wall is at x = 0"
@@ -230,7 +229,6 @@ def test_groups_sum_their_surfels() -> None:
     np.testing.assert_array_equal(grouped(values, np.array([0, 2, 0, 2]), 3), [[2, 0, 4], [10, 0, 12]])
 
 
-@pytest.mark.slow
 def test_a_number_of_surfels_and_bytes_are_kept(capture: Capture) -> None:
     few = fit(capture, surfels=50, rank=32, clusters=4, method="transfer")
     assert few.manifest["surfel_transfer"]["surfels"] <= 50 and few.manifest["surfel_transfer"]["rank"] == 32

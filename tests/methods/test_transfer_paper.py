@@ -30,6 +30,7 @@ from srbf.visibility.transfer_operator import TransferOperator
 
 pytest.importorskip("embreex")
 pytest.importorskip("sklearn")
+pytestmark = pytest.mark.slow
 
 BOX = Room.box((2, 2, 2), 0.4, 0.6)
 SIZE = 12  # surfels per cluster, and more coefficients than any cluster has surfels:

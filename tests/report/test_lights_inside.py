@@ -25,6 +25,7 @@ from srbf.report.by_place import TALLEST, WIDTH, arrange
 from srbf.report.subject import gather
 
 pytest.importorskip("embreex")
+pytestmark = pytest.mark.slow
 TESTED = 9
 DIRECTIONS_ONLY = ("By direction", "ABRDF", "Centers and lights", "The curve R", "Light functions", "elevation", "azimuth")
 
@@ -54,7 +55,6 @@ def page(case: Case) -> str:
     return page.read_text()
 
 
-@pytest.mark.slow
 def test_every_light_is_a_dot_in_plan_and_in_section(case: Case, page: str) -> None:
     found = re.findall(r'<circle class="spot"[^>]*><title>\(([^)]*)\) m: ([\d.]+)%</title>', page)
     assert len(found) == 2 * TESTED
@@ -66,7 +66,6 @@ def test_every_light_is_a_dot_in_plan_and_in_section(case: Case, page: str) -> N
     assert page.count('class="cells outline"') == 2
 
 
-@pytest.mark.slow
 def test_the_numbers_are_the_evaluations(case: Case, page: str) -> None:
     errors = [entry["relative_rmse"] for entry in case.evaluation["lights"] if entry["role"] == "holdout"]
     row = next(line for line in page.splitlines() if line.startswith(f"<tr><td>holdout, {TESTED} point lights</td>"))
@@ -74,7 +73,6 @@ def test_the_numbers_are_the_evaluations(case: Case, page: str) -> None:
         assert f">{100 * value:.1f} %<" in row
 
 
-@pytest.mark.slow
 def test_what_knows_directions_only_is_left_out(case: Case, page: str) -> None:
     text = re.sub(r"data:[^\"]*", "", page)
     assert not any(words in text for words in DIRECTIONS_ONLY)
@@ -85,7 +83,6 @@ def test_what_knows_directions_only_is_left_out(case: Case, page: str) -> None:
     assert "table of positions" in (case.folder / "report" / "report.md").read_text()
 
 
-@pytest.mark.slow
 def test_without_tested_point_lights_the_page_says_so(case: Case, tmp_path: Path) -> None:
     roles = ["train" if light.role == "train" else None for light in case.capture.lights]
     bare = case.capture.with_roles(roles)  # type: ignore[arg-type]
