@@ -31,8 +31,11 @@ STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one
 # The tables below are by the words of a command: all of them, in any order, with ` *` at the end also among others.
 
 # What is appended; the last value of a flag is the one that counts.
+FEW = "--lights 28 --size 24 --samples 1 --validation 4 --holdout 2 --holdout-samples 1"
 SHORTER = {
-    "srbf bake *": "--lights 28 --size 24 --samples 1 --validation 4 --holdout 2 --holdout-samples 1",
+    "srbf bake --light-set surfels *": f"{FEW} --surfels-per-m2 4",
+    "srbf bake --light-set cubemap:32 *": f"{FEW} --light-set cubemap:8",
+    "srbf bake *": FEW,
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
     "srbf evaluate --point-reference *": "--point-reference 2 --samples 1",
