@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfNeuralCodes: what a texel's code adds to the first hidden layer of a neural decoder, the same for all lights.
+/* srbfNeuralCodes: what the code of each texel adds to the first hidden layer of a neural decoder, the same for all lights.
    use:    void srbfNeuralCodes(sampler2DArray planes, vec2 uv, float level, vec4 network[SRBF_NETWORK], vec4 scale[SRBF_LAYERS],
                                 vec4 bias[SRBF_LAYERS], out vec4 units[SRBF_UNIT_VECTORS])
    domain: planes four numbers of the code to a layer, which may be filtered linearly; level: mip level, 0 without mip maps; network the

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-/* srbfNeuralMapDistant, srbfNeuralMapPoints: a texel's response to lights at infinity, or to point and spot lights, from its code; add the
+/* srbfNeuralMapDistant, srbfNeuralMapPoints: response per texel to lights at infinity, or to point and spot lights, from its code; add the
    results of all passes, then call srbfFinish once.
    use:    vec3 srbfNeuralMapDistant(vec4 units[SRBF_UNIT_VECTORS], vec4 network[SRBF_NETWORK],
                                      vec4 distant[2 * SRBF_DISTANT], int distantCount)

@@ -417,7 +417,7 @@ class _Passes:
         if self._shard is not None:
             return
         done = [light for light in self._lights if self._accumulation.passes(light)]
-        is_indirect = self._settings.transport == "indirect"  # passes of direct light, spread over a texel, differ by more than noise
+        is_indirect = self._settings.transport == "indirect"  # passes of direct light, spread over the texels, differ by more than noise
         noise = [self._accumulation.noise(light) if is_indirect else None for light in done]
         lights = [(light, self._accumulation.samples(light), own) for light, own in zip(done, noise, strict=True)]
         traced = self._settings.light_set is not None and self._settings.light_set.kind in ("surfels", "gather", "cubemap")

@@ -18,7 +18,7 @@ from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct
 
 SAMPLE_BYTES, SAMPLE_TEXELS = 1 << 29, 1 << 17  # what training sees at most
-AXES = 48  # principal components that the encoder sees of a texel
+AXES = 48  # principal components that the encoder sees, per texel
 CODED = 1 << 14  # texels at a time
 
 

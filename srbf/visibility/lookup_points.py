@@ -16,7 +16,7 @@ from srbf.visibility.pixel_points import several_surfaces
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers
 
-FINE, COARSE = 4, 2  # points per side of a texel's footprint
+FINE, COARSE = 4, 2  # points per side of the footprint, per texel
 FINE_TEXELS = 1 << 16  # of the largest image with FINE points
 EDGE_POINTS, EDGE_PARTS = 64, 8  # of a pixel with several surfaces, and in how many parts, as a light with a size looks at them
 SHADOW_POINTS, SHADOW_BUDGET = 128, 16  # of a pixel that the edge of a shadow crosses; in the mean over the image, at most

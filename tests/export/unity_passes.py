@@ -103,7 +103,7 @@ class Unity:
         return self.passes.read(numbers)[..., :3]
 
     def column(self, weights: np.ndarray) -> Any:
-        """A texel per row."""
+        """One texel in each row."""
         return self.passes.texture(np.pad(weights[:, None], ((0, 0), (0, 0), (0, 1))))
 
     def multiplied(
