@@ -83,7 +83,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
     with reflection_alone():
         transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
-    _let_through(scene, shapes)
+    _let_through(scene, shapes, gloss)
     _shine(scene, shapes)
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}
@@ -159,8 +159,8 @@ def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds:
     return transparent
 
 
-def _let_through(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) -> None:
-    """Set what every shape lets through diffusely."""
+def _let_through(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], gloss: bool) -> None:
+    """Set what every shape lets through diffusely; with `gloss` the shapes' albedo has more in it than diffuse reflection."""
     some = {}
     for key, shape in shapes.items():
         shape.transmission = np.zeros((len(shape.parents), 3))
@@ -168,8 +168,10 @@ def _let_through(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape]) 
             some[key] = shape
     if not some:
         return
-    with reflection_alone():
-        reflected = _colors(scene, some, ("DIFFUSE",))
+    reflected = {key: shape.albedo for key, shape in some.items()}
+    if gloss:
+        with reflection_alone():
+            reflected = _colors(scene, some, ("DIFFUSE",))
     for key, color in _colors(scene, some, ("DIFFUSE",)).items():
         some[key].transmission = np.maximum(color - reflected[key], 0)
 

@@ -62,6 +62,17 @@ def build_plane(
     return Receivers(size, size, "irradiance" if albedo is None else "radiance", images, triangles, {"sun_angle": 0.0, **sampling})
 
 
+def from_above(filter: str, width: float) -> dict[str, Any]:
+    """An orthographic camera 3 m above that sees the square [-1, 1]^2, with a pixel filter of `width` pixels."""
+    return {
+        "type": "ORTHO",
+        "matrix_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]],
+        "frame": [[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]],
+        "filter": filter,
+        "filter_width": width,
+    }
+
+
 TURN = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # quaternion of a root that turns z-up to y-up
 
 

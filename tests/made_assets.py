@@ -12,6 +12,7 @@ from srbf.basis.light_functions import LightFunctions
 from srbf.basis.neural_decoder import rows_of
 from srbf.basis.octahedral_table import octahedral_table
 from srbf.encode.quantization import quantize
+from srbf.io.image import Encoding
 from srbf.sphere import point_set
 
 WIDEST = 1.0  # rad: wider tables break their own tolerance
@@ -19,7 +20,7 @@ WIDEST = 1.0  # rad: wider tables break their own tolerance
 
 def build_asset(
     k: int = 7,
-    encoding: str = "float",
+    encoding: Encoding = "float",
     height: int = 9,
     width: int = 14,
     *,
@@ -36,7 +37,7 @@ def build_asset(
         spread = min(spread_of(centers, "mean"), WIDEST) if k > 1 else 0.9
     if coefficients is None:
         coefficients = rng.normal(size=(k, height, width, 3)).astype(np.float32)
-    stored, scale, bias = quantize(coefficients, encoding)  # type: ignore[arg-type]
+    stored, scale, bias = quantize(coefficients, encoding)
     images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
     if position:
         images["position"] = (rng.uniform(-1, 1, (height, width, 3)) * [1.3, 0.9, 0.2]).astype(np.float32)
@@ -56,7 +57,7 @@ def build_asset(
 def build_planes(
     components: int = 9,
     clusters: int | None = None,
-    encoding: str = "float",
+    encoding: Encoding = "float",
     height: int = 9,
     width: int = 14,
     *,
@@ -78,7 +79,7 @@ def build_planes(
     layers = np.zeros((-(-components // 4), height, width, 4), np.float32)
     for j in range(components):
         layers[j // 4, :, :, j % 4] = rng.normal(size=(height, width))
-    stored, scale, bias = quantize(layers, encoding)  # type: ignore[arg-type]
+    stored, scale, bias = quantize(layers, encoding)
     scale[-1, components % 4 or 4 :], bias[-1, components % 4 or 4 :] = 0, 0
     images = {"coverage": (rng.random((height, width)) > 0.2).astype(np.float32)}
     if position:
@@ -105,13 +106,13 @@ def build_planes(
     return Asset(manifest, stored, scale, bias, tables, images)
 
 
-def build_neural(codes: int = 9, hidden: int = 8, encoding: str = "uint8", height: int = 9, width: int = 14, seed: int = 0) -> Asset:
+def build_neural(codes: int = 9, hidden: int = 8, encoding: Encoding = "uint8", height: int = 9, width: int = 14, seed: int = 0) -> Asset:
     """A neural map of random codes and a random network, whose responses are of about unit size and bend with the direction."""
     rng = np.random.default_rng([seed, codes, hidden])
     layers = np.zeros((-(-codes // 4), height, width, 4), np.float32)
     for j in range(codes):
         layers[j // 4, :, :, j % 4] = rng.normal(size=(height, width))
-    stored, scale, bias = quantize(layers, encoding)  # type: ignore[arg-type]
+    stored, scale, bias = quantize(layers, encoding)
     unused = range(codes % 4 or 4, 4)
     scale[-1, unused], bias[-1, unused] = 0, 0
     rows = rows_of(codes, hidden)

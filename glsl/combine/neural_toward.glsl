@@ -11,7 +11,7 @@
 #error define SRBF_COMPONENTS: numbers in a code
 #endif
 #ifndef SRBF_UNIT_VECTORS
-#error define SRBF_UNIT_VECTORS: a fourth of the units in a hidden layer
+#error define SRBF_UNIT_VECTORS: a quarter of the units in a hidden layer
 #endif
 #ifndef SRBF_NETWORK
 #define SRBF_NETWORK ((SRBF_COMPONENTS + 4 * SRBF_UNIT_VECTORS + 8) * SRBF_UNIT_VECTORS + 1)

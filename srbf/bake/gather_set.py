@@ -31,6 +31,7 @@ from srbf.visibility.receivers import LEAST_THROUGH, Receivers
 from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.view_clusters import MOST_CLUSTERS
 
+FEWER = 0.95  # surfels that are asked for again, where those behind translucent ones do not fit as well
 POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
@@ -201,10 +202,13 @@ class GatherSet:
         backs = None if found.transmission is None else points_behind(view)
         looks = [pixels] if backs is None else [pixels, backs]
         points, normals = np.concatenate([own.points for own in looks]), np.concatenate([own.normals for own in looks])
-        pool, asked = None, self.count
-        while pool is None or pool.count + (doubled := len(Behind.of(pool).surfels)) > MOST_POOL:
-            asked = asked if pool is None else MOST_POOL - int(1.1 * doubled)
+        asked = self.count
+        while True:
             pool = pool_of(surfaces, found.objects, occluders, found.free, points, normals, asked, seed, lobes, found.transmission)
+            total = pool.count + len(Behind.of(pool).surfels)
+            if total <= MOST_POOL:
+                break
+            asked = int(FEWER * asked * MOST_POOL / total)
         if not pool.count:
             raise InputError("expected surfaces that light in free space can reach, found none; choose another `light_bounds`")
         clusters = cluster_count(self.clusters, len(np.unique(pixels.pixels)))

@@ -17,8 +17,8 @@ from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.gl.uniforms import VECTORS_PER_POINT_LIGHT, packed_point_lights, padded, point_light_groups, vectors_free
+from srbf.light_domain.distant_lights import distant_lights
 from srbf.lights import Light, PointLight
-from srbf.registry import method_named
 
 if TYPE_CHECKING:
     import moderngl
@@ -46,9 +46,7 @@ class NeuralPasses(Passes):
 
     def prepare(self, lights: Sequence[Light]) -> Callable[[], None]:
         """All lights at infinity, MOST_DISTANT in a pass; point and spot lights have passes of their own."""
-        directions, colors = method_named(self._asset.method).distant_lights(self._asset, lights)  # type: ignore[attr-defined]
-        shining = colors.any(axis=1)
-        return partial(self._distant, directions[shining], colors[shining])
+        return partial(self._distant, *distant_lights(self._asset.manifest, lights))
 
     def distant(self, weights: Float64[ndarray, "F 3"], units: int | None) -> None:
         """Nothing is left to project."""

@@ -18,21 +18,21 @@ from srbf.encode.dilation import nearest_covered
 from srbf.encode.learned_codes import learned_codes
 from srbf.errors import InputError, ManifestError
 from srbf.io.image import Encoding
-from srbf.light_domain import domain_of_asset, domain_of_capture
-from srbf.lights import DirectionalLight, Light, refuse_named
+from srbf.light_domain import domain_of_capture
+from srbf.light_domain.distant_lights import distant_lights, node_light
+from srbf.lights import DirectionalLight, Light
 from srbf.methods.carried import carried_images, carried_scene, common_manifest
 from srbf.methods.component_maps import CHANNELS, components_of, stored_components
 from srbf.methods.over_lights import row_chunks, sum_over_lights
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.methods.seam_report import seam_report
 from srbf.solve.autoencoder import require_jax
-from srbf.sphere import Domain, point_set
+from srbf.sphere import Domain
 
 if TYPE_CHECKING:
     from srbf.gl.passes import Passes
 
 MOST_CODES, MOST_HIDDEN = 32, 32
-NODES = 256  # directions that an environment is seen from
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ class NeuralMap(Method):
     @classmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """An evaluation per directional, point and spot light and receiver; environments shine from NODES directions."""
-        distant = [(direction, color) for direction, color in zip(*cls.distant_lights(asset, lights), strict=True) if color.any()]
+        distant = list(zip(*distant_lights(asset.manifest, lights), strict=True))
         decoder = NeuralDecoder.of_table(asset.tables["network"])
 
         def projected(layers: ndarray, rows: slice) -> ndarray:
@@ -203,16 +203,7 @@ class NeuralMap(Method):
             raise InputError(
                 f"expected environment lights for weights of a {cls.name} asset, found a directional light; relight it with lights"
             )
-        return node_light(asset, lights)
-
-    @classmethod
-    def distant_lights(cls, asset: Asset, lights: Sequence[Light]) -> tuple[Float64[ndarray, "n 3"], Float64[ndarray, "n 3"]]:
-        """(unit directions, colors) of everything at infinity: the directional lights, and the nodes that an environment shines from."""
-        refuse_named(lights, cls.name)
-        suns = domain_of_asset(asset.manifest).shared([light for light in lights if isinstance(light, DirectionalLight)])
-        shone = node_light(asset, [light for light in lights if not isinstance(light, DirectionalLight)])
-        pieces = [*suns, (nodes_of(asset), shone)] if shone.any() else suns
-        return tuple(np.concatenate([np.zeros((0, 3)), *(piece[i] for piece in pieces)]) for i in (0, 1))  # type: ignore[return-value]
+        return node_light(asset.manifest, lights)
 
     @classmethod
     def numbers_per_texel(cls, asset: Asset) -> int:
@@ -238,20 +229,6 @@ class NeuralMap(Method):
         from srbf.gl.neural_map import NeuralPasses
 
         return NeuralPasses
-
-
-def nodes_of(asset: Asset) -> Float64[ndarray, "NODES 3"]:
-    """Directions over the asset's domain, each for an equal part of it."""
-    return point_set("fibonacci", NODES, asset.domain)
-
-
-def node_light(asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "NODES 3"]:
-    """Light of environments by node: each of their texels shines from the node nearest to it."""
-    shone = np.zeros((NODES, 3))
-    nodes = nodes_of(asset)
-    for directions, colors in domain_of_asset(asset.manifest).shared(lights):
-        np.add.at(shone, np.argmax(directions @ nodes.T, axis=1), colors)
-    return shone
 
 
 def _codes(asset: Asset, layers: Float32[ndarray, "N h W 4"]) -> Float32[ndarray, "n C"]:

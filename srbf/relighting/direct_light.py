@@ -100,20 +100,20 @@ class Added:
         self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
         self._emits = isinstance(source, Asset) and method_of(source).takes_objects
         self._light: DirectLight | None = None
-        if kind == "ray":
-            receivers = Receivers.of(source)
-            tracer = RayTracer(receivers)
-            front: DirectLight = GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
-            back = receivers.behind()
-            self._light = front if back is None else BothSides(front, RayTracer(back))
-        elif kind == "shadow-map":
-            receivers = Receivers.of(source)
-            mapper = self._stack.enter_context(ShadowMapper(receivers))
-            front = GlossyMaps(receivers, mapper) if has_gloss(receivers) else mapper
-            back = receivers.behind()
-            self._light = front if back is None else BothSides(front, self._stack.enter_context(ShadowMapper(back)))
-        elif kind == "pca":
+        if kind == "pca":
             self._light = by_receiver_depths(source)
+        elif kind != "none":
+            receivers = Receivers.of(source)
+            front, back = self._on(receivers, kind), receivers.behind()
+            self._light = front if back is None else BothSides(front, self._on(back, kind))
+
+    def _on(self, receivers: Receivers, kind: Literal["ray", "shadow-map"]) -> DirectLight:
+        """What the surfaces of receivers reflect, lobes included."""
+        if kind == "ray":
+            tracer = RayTracer(receivers)
+            return GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
+        mapper = self._stack.enter_context(ShadowMapper(receivers))
+        return GlossyMaps(receivers, mapper) if has_gloss(receivers) else mapper
 
     def __enter__(self) -> Added:
         return self

@@ -79,7 +79,9 @@ def _of_view(receivers: Receivers, tracer: RayTracer, grid: Float64[ndarray, "g 
     beside = np.flatnonzero(outlines(position, normal).ravel())
     edges = np.union1d(several_surfaces(tracer, covered, position.reshape(-1, 3), has_center), np.intersect1d(beside, covered))
     found = [tracer.samples_at(np.arange(size), np.broadcast_to(place, (size, 2))) for place in grid]
-    plain = np.isin(np.arange(size), np.setdiff1d(covered, edges))
+    plain = np.zeros(size, bool)
+    plain[covered] = True
+    plain[edges] = False
     total = np.maximum(np.sum([samples.weight for samples in found], axis=0), 1)
     layers = [_weighed(samples, np.where(plain, samples.weight / total, 0)) for samples in found]
     each = EDGE_POINTS // EDGE_PARTS

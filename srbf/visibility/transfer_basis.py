@@ -131,7 +131,8 @@ def transfer_basis(
         if emitted is not None:
             first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
             shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), some)
-            own = np.concatenate([own, np.sqrt(emitted.counts).astype(np.float32) * shining], axis=1)
+            counts = emitted.counts / (len(bounces) if in_turn else 1)  # as a light is in one color then
+            own = np.concatenate([own, np.sqrt(counts).astype(np.float32) * shining], axis=1)
         radiosity.append(own)
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
     if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():

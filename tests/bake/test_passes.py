@@ -16,6 +16,7 @@ PASSES = 96
 HALF = 2.0**-11  # relative rounding of a stored half float
 WALL = 0.5  # m: the height of the wall on x = 0, y from 0 to 1, that shades the square of |x|, |y| < 1
 SIZE = 48
+LEAST, MOST = 0.7, 1.5  # times the noise: 16 samples have rare bright paths; passes are spread over texels against each other
 
 
 def suns(path: Path, direction: tuple[float, float, float], count: int) -> Path:
@@ -117,6 +118,6 @@ def test_indirect_images_tell_their_noise(bake) -> None:
     for i in told:
         true = many.image(i).astype(np.float64)
         noise = np.sqrt(((few.image(i) - true) ** 2).mean() / (true**2).mean())
-        assert 1e-3 < 0.7 * noise <= few.lights[i].noise <= 1.5 * noise
+        assert 1e-3 < LEAST * noise <= few.lights[i].noise <= MOST * noise
     combined = bake("torus", "lightmap:Torus", holdout_samples=16).capture
     assert all(light.noise is None for light in combined.lights)

@@ -10,6 +10,7 @@ from made_assets import build_neural
 
 from srbf.errors import InputError, ShaderError
 from srbf.gl.context import Limits
+from srbf.io.image import Encoding
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 from srbf.methods import relight
 from srbf.relighting.relighter import Relighter
@@ -30,7 +31,7 @@ POINTS: list[Light] = [PointLight(tuple(d), tuple(abs(d))) for d in random_direc
     [[SUN], [POINT], [SPOT], [ENVIRONMENT], [SUN, POINT, ENVIRONMENT, SPOT], MANY, POINTS],
     ids=lambda lights: f"{len(lights)}{lights[0].__class__.__name__}",
 )
-def test_equals_numpy(context: Any, encoding: str, lights: list[Light]) -> None:
+def test_equals_numpy(context: Any, encoding: Encoding, lights: list[Light]) -> None:
     asset = build_neural(9, 8, encoding)
     expected = relight(asset, lights)
     with Relighter(asset, context=context) as relighter:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_forms import flat_normals, quad
+from closed_forms import flat_normals, from_above, quad
 
 from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
@@ -17,6 +17,8 @@ from srbf.visibility.receivers import Receivers, pixel_filter
 from srbf.visibility.shadow_map import ShadowMapper
 
 SIDE, EDGE, HEIGHT = 24, 0.03, 0.5  # pixels; where the table ends, m, off the borders of pixels; how high it is
+FILTER = ("BLACKMAN_HARRIS", 1.5)  # Cycles' own
+WITHIN, MEAN = 0.01, 0.005  # of a pixel: a light's change over it, and few looks of one with a size; of all
 ALBEDO, OTHER = np.array([0.7, 0.6, 0.5]), np.array([0.2, 0.4, 0.1])
 LIGHTS: dict[str, Light] = {  # all from the side on which no shadow falls on the floor that is seen
     "point": PointLight((2.0, 0.1, 1.5), falloff="inverse-square"),
@@ -44,21 +46,14 @@ def view(*occluders: np.ndarray, table: bool = True, albedo: np.ndarray = ALBEDO
     normal = np.broadcast_to(np.array([0, 0, 1], np.float32), position.shape)
     share = table_share()[:, None] if table else np.zeros((SIDE, 1))
     mean = np.broadcast_to(share * albedo + (1 - share) * ALBEDO, position.shape).astype(np.float32)
-    camera = {
-        "type": "ORTHO",
-        "matrix_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]],
-        "frame": [[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]],
-        "filter": "BLACKMAN_HARRIS",
-        "filter_width": 1.5,
-    }
     images = {"position": position, "normal": normal, "albedo": mean}
-    return Receivers(SIDE, SIDE, "radiance", images, triangles, {"sun_angle": 0.0, "camera": camera})
+    return Receivers(SIDE, SIDE, "radiance", images, triangles, {"sun_angle": 0.0, "camera": from_above(*FILTER)})
 
 
 def table_share() -> np.ndarray:
     """What part of the filter of each column's pixels is on the table."""
     square = (np.arange(4096) + 0.5) / 4096
-    offset = pixel_filter("BLACKMAN_HARRIS", 1.5, np.stack([square, square], axis=1))[:, 0]
+    offset = pixel_filter(*FILTER, np.stack([square, square], axis=1))[:, 0]
     x = -1 + 2 * (np.arange(SIDE)[:, None] + 0.5 + offset) / SIDE
     return (x < EDGE).mean(axis=1)
 
@@ -81,8 +76,8 @@ def test_a_pixel_with_two_surfaces_shows_both(context: Any, kind: str) -> None:
     mixed = (share[:, 0] > 0.02) & (share[:, 0] < 0.98)
     assert mixed.any()
     step = np.abs(table - floor)[:, None] * ALBEDO / np.pi
-    np.testing.assert_array_less(np.abs(found - expected)[mixed], (2 / EDGE_POINTS * step + 0.01 * expected)[mixed])
-    assert found[mixed].mean() == pytest.approx(expected[mixed].mean(), rel=0.005)
+    np.testing.assert_array_less(np.abs(found - expected)[mixed], (2 / EDGE_POINTS * step + WITHIN * expected)[mixed])
+    assert found[mixed].mean() == pytest.approx(expected[mixed].mean(), rel=MEAN)
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
@@ -92,7 +87,7 @@ def test_materials_count_as_by_rays(context: Any, kind: str) -> None:
     with ShadowMapper(receivers, context=context) as mapper:
         found = mapper.response([LIGHTS[kind]])
     np.testing.assert_allclose(found, expected, atol=2 / EDGE_POINTS * expected.max())
-    assert np.sqrt(((found - expected) ** 2).mean()) < 0.005 * expected.max()
+    assert np.sqrt(((found - expected) ** 2).mean()) < MEAN * expected.max()
 
 
 def test_an_edge_of_a_shadow_is_as_wide_as_the_filter(context: Any) -> None:
@@ -101,7 +96,7 @@ def test_an_edge_of_a_shadow_is_as_wide_as_the_filter(context: Any) -> None:
     receivers = view(roof, table=False)
     sun = DirectionalLight((-0.6, 0.0, 0.8))
     square = (np.arange(4096) + 0.5) / 4096
-    offset = pixel_filter("BLACKMAN_HARRIS", 1.5, np.stack([square, square], axis=1))[:, 0]
+    offset = pixel_filter(*FILTER, np.stack([square, square], axis=1))[:, 0]
     lit = (-1 + 2 * (np.arange(SIDE)[:, None] + 0.5 + offset) / SIDE > 0.3).mean(axis=1)
     with ShadowMapper(receivers, context=context) as mapper:
         found = mapper.response([sun])[..., 0] / (ALBEDO[0] * 0.8 / np.pi)

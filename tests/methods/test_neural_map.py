@@ -21,10 +21,11 @@ from srbf.errors import ImageError, InputError, ManifestError, MissingLibraryErr
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import implied_method
 from srbf.io import files
+from srbf.light_domain.distant_lights import NODES, nodes_of
 from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SpotLight
 from srbf.methods import linear_response, projected_weights, relight, responses
 from srbf.methods.eigen_map import EigenMap
-from srbf.methods.neural_map import NODES, NeuralMap, nodes_of
+from srbf.methods.neural_map import NeuralMap
 from srbf.methods.protocol import FitRun
 from srbf.sphere import normalize, random_directions
 
@@ -117,6 +118,7 @@ def test_an_interrupted_training_keeps_what_it_has_learned(bumps: Capture) -> No
 
 
 @trained
+@pytest.mark.slow
 def test_the_disk_holds_all_of_it(learned: Asset, tmp_path: Path) -> None:
     learned.save(tmp_path / "asset")
     again = Asset.open(tmp_path / "asset")
@@ -127,6 +129,7 @@ def test_the_disk_holds_all_of_it(learned: Asset, tmp_path: Path) -> None:
 
 
 @trained
+@pytest.mark.slow
 def test_uncovered_texels_hold_the_code_of_a_covered_neighbor(learned: Asset) -> None:
     covered = np.argwhere(learned.covered)
     for row, column in np.argwhere(~learned.covered):
@@ -174,8 +177,8 @@ def test_an_environment_of_one_bright_texel_is_a_sun_from_the_nearest_node() -> 
     (node,) = np.flatnonzero(weights.any(axis=1))
     elevation, azimuth = np.pi / 2 - 9.5 * np.pi / 32, np.pi - 20.5 * np.pi / 32
     direction = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
-    assert weights.shape == (NODES, 3) and node == np.argmax(nodes_of(asset) @ direction)
-    sun = DirectionalLight(tuple(nodes_of(asset)[node]), tuple(weights[node]))
+    assert weights.shape == (NODES, 3) and node == np.argmax(nodes_of(asset.manifest) @ direction)
+    sun = DirectionalLight(tuple(nodes_of(asset.manifest)[node]), tuple(weights[node]))
     expected = linear_response(asset, [sun])
     np.testing.assert_allclose(linear_response(asset, [EnvironmentLight(image)]), expected, atol=FLOAT32 * np.abs(expected).max())
 

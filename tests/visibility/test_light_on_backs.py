@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from closed_forms import flat_normals, quad
+from closed_forms import build_plane, from_above, quad
 
-from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.pixel_points import PixelPoints
@@ -19,6 +18,7 @@ from srbf.visibility.shadow_map import ShadowMapper
 pytest.importorskip("embreex")
 
 SIDE = 16
+LOOKS = 0.02  # of the largest value: an area's light by a few looks
 PASSED = np.array([0.5, 0.2, 0.3], np.float32)
 LIGHTS: dict[str, Light] = {
     "point": PointLight((0.3, 0.1, -0.8), falloff="inverse-square"),
@@ -28,27 +28,11 @@ LIGHTS: dict[str, Light] = {
 
 
 def sheet(*occluders: np.ndarray, thin: bool = True) -> Receivers:
-    """A sheet of 2 x 2 m from above by an orthographic camera, whose half x < 0 lets light through."""
-    parts = [quad([-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]), *occluders]
-    corners = np.concatenate(parts).astype(np.float32)
-    triangles = Triangles(
-        corners, flat_normals(corners), np.zeros(len(corners), int), np.ones(len(corners), bool), np.zeros((1, KNOTS, 3), np.float32)
-    )
-    x = -1 + 2 * (np.arange(SIDE) + 0.5) / SIDE
-    position = np.zeros((SIDE, SIDE, 3), np.float32)
-    position[..., 0], position[..., 1] = x, -x[:, None]
-    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), position.shape)
-    images = {"position": position, "normal": normal, "albedo": np.full_like(position, 0.4)}
+    """A sheet of 2 x 2 m from above, whose half x < 0 lets light through."""
+    made = build_plane(*occluders, size=SIDE, albedo=(0.4, 0.4, 0.4), camera=from_above("BOX", 1.0))
     if thin:
-        images["transmission"] = np.where((position[..., :1] < 0), PASSED, 0).astype(np.float32)
-    camera = {
-        "type": "ORTHO",
-        "matrix_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 3], [0, 0, 0, 1]],
-        "frame": [[1, 1, -1], [1, -1, -1], [-1, -1, -1], [-1, 1, -1]],
-        "filter": "BOX",
-        "filter_width": 1.0,
-    }
-    return Receivers(SIDE, SIDE, "radiance", images, triangles, {"sun_angle": 0.0, "camera": camera})
+        made.images["transmission"] = np.where(made.images["position"][..., :1] < 0, PASSED, 0).astype(np.float32)
+    return made
 
 
 def behind(receivers: Receivers) -> Receivers:
@@ -72,7 +56,7 @@ def test_light_from_behind_passes(by: str, kind: str) -> None:
     else:
         with ShadowMapper(receivers) as mapper:
             found, none = (mapper.response([one]) for one in (light, above))
-    np.testing.assert_allclose(found.reshape(-1, 3), expected, atol=0.02 * expected.max())
+    np.testing.assert_allclose(found.reshape(-1, 3), expected, atol=LOOKS * expected.max())
     assert (none == 0).all()
 
 
