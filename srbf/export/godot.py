@@ -16,6 +16,7 @@ from srbf.export import dds, exr, png
 from srbf.export.asset_shader import LAST, WEIGHTED
 from srbf.export.engine_folder import below, engine_root
 from srbf.export.settings import PLAIN, Settings, Target, Written
+from srbf.export.surfel_textures import terms_of
 from srbf.gl.includes import resolve_text
 from srbf.io import files
 from srbf.io.image import write_image
@@ -64,13 +65,17 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
 
 
 def _series(asset: Asset, folder: Path) -> dict[str, Any]:
-    """Of an asset whose surfaces can change, what GDScript would take long to solve: all exchanges of light, half floats over `scale`."""
+    """Of an asset whose surfaces can change, what GDScript would take long to solve: all exchanges of light, half floats over `scale`.
+
+    `terms`: how many of them are summed after a change.
+    """
     if KEY not in asset.manifest:
         return {}
-    series = Surfaces.of(asset).series()
+    surfaces = Surfaces.of(asset)
+    series = surfaces.series()
     scale = float(2.0 ** np.ceil(np.log2(np.abs(series).max())))
     write_image(folder / DATA / SERIES, series / np.float32(scale), "half")
-    return {"surface_series": {"file": f"{DATA}/{SERIES}", "scale": scale}}
+    return {"surface_series": {"file": f"{DATA}/{SERIES}", "scale": scale, "terms": terms_of(surfaces)}}
 
 
 def method_include(name: str) -> str:

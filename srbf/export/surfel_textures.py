@@ -26,6 +26,7 @@ from srbf.visibility.surface_cells import OFFSET, Cells
 PASSES = "surfel_passes"
 LARGEST = 16384  # texels per side of a texture, as Direct3D 11 has them
 CORNERS_PER_ROW = 3 * 1024
+MOST_TERMS = 512  # of a series without end, which engines sum by nine doublings: 0.99^512, what a surface still reflects then, is 0.6 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,8 +132,8 @@ def write_surfels(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
 
 
 def _changes(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
-    """`gather`, `sent`, `feedback` and `series`, all exchanges of light, by `bounces` or without end; of surfels `shares`, a row per
-    object, and `albedo`; `first`: a row of weights per object that emits, without bounces.
+    """`gather`, `sent`, `feedback` and `series`, the sum of all exchanges of light; `terms`: how many an engine sums after a change; of
+    surfels `shares`, a row per object, and `albedo`; `first`: a row of weights per object that emits, without bounces.
     """
     surfaces = Surfaces.of(asset)
     write_image(folder / data / "surfel_series.exr", surfaces.series(), "float")
@@ -141,8 +142,16 @@ def _changes(asset: Asset, folder: Path, data: str) -> dict[str, Any]:
     write_image(folder / data / "surfel_albedo.exr", surfaces.albedo[None], "float")
     own = {name: _matrix(asset, f"surface_{name}", data) for name in ("gather", "sent", "feedback")}
     files_ = {name: f"{data}/surfel_{name}.exr" for name in ("series", "first", "shares", "albedo")}
-    endless = surfaces.bounces is None or surfaces.bounces >= SERIES
-    return {**own, **files_, **({} if endless else {"bounces": surfaces.bounces})}
+    return {**own, **files_, "terms": terms_of(surfaces)}
+
+
+def terms_of(surfaces: Surfaces) -> int:
+    """How many powers of the exchange of light an engine sums: the bounces of the bake, or so many that they stand for all.
+
+    numpy solves an equation for an endless series. An engine has only products of matrices: by 2n terms = n terms + (exchange to the
+    power n) times n terms, 512 cost 17 of them, and one of a few bounces fewer.
+    """
+    return MOST_TERMS if surfaces.bounces is None or surfaces.bounces >= SERIES else surfaces.bounces
 
 
 def _matrix(asset: Asset, name: str, data: str) -> dict[str, Any]:

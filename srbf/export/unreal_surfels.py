@@ -24,7 +24,6 @@ from srbf.visibility.surface_cells import Cells
 
 MAGIC = b"SRBFSRF2"
 NUMBERS = "SrbfSurfels.bin"
-MOST_TERMS = 64  # exchanges of light of a series without end
 SOURCES = ("SrbfSurfels.h", "SrbfSurfelLights.h", "SrbfSurfelLights.cpp", "SrbfSurfelShapes.cpp")
 PACK = [
     *(f"surfels/{name}.glsl" for name in ("cell_irradiance", "cell_on_cube", "cell_on_map", "patch_mean", "table_part", "block_sum")),
@@ -63,8 +62,6 @@ PRODUCT = """int3 Texel = SrbfTexel(UV, Size);
 return srbfMatrixProduct(First, Second, int(Matrix.x + 0.5), Texel.xy) * Matrix.y + Addend.Load(Texel).rgb * Matrix.z;"""
 EXCHANGE = """int3 Texel = SrbfTexel(UV, Size);
 return srbfChangedExchange(Gather, Sent, Albedo, int(Matrix.x + 0.5), Texel.xy) * Matrix.y + Feedback.Load(Texel).rgb * Matrix.z;"""
-SERIES = """int3 Texel = SrbfTexel(UV, Size);
-return srbfMatrixProduct(Exchange, Former, int(Matrix.x + 0.5), Texel.xy) + (Texel.x == Texel.y ? 1.0 : 0.0);"""
 REPAINTED = """int3 Texel = SrbfTexel(UV, Size);
 float3 Changed = srbfRepaintedEntry(Before, Series, Gather, Albedo, int(Matrix.x + 0.5), 1.0, Texel.xy);
 return Changed * Matrix.y + Table.Load(Texel).rgb * Matrix.z;"""
@@ -119,7 +116,6 @@ def _shapes(told: dict[str, Any], folder: Path, data: str, table: str) -> dict[s
         materials |= {
             "SurfelProduct": _material(["First", "Second", "Addend"], ["Matrix"], PRODUCT, {}),
             "SurfelExchange": _material(["Albedo"], ["Matrix"], EXCHANGE, {"Gather": gather, "Sent": sent, "Feedback": feedback}),
-            "SurfelSeries": _material(["Exchange", "Former"], ["Matrix"], SERIES, {}),
             "SurfelRepainted": _material(["Series", "Albedo"], ["Matrix"], REPAINTED, {"Before": before, "Gather": gather, "Table": table}),
         }
     return materials
@@ -174,7 +170,7 @@ def _shape_numbers(told: dict[str, Any], folder: Path) -> bytes:
     changes = told["changes"]
     gather, sent, feedback = (changes[name] for name in ("gather", "sent", "feedback"))
     names = [name.encode() for name in told["objects"]]
-    sizes = (len(names), gather["columns"], changes.get("bounces", MOST_TERMS))
+    sizes = (len(names), gather["columns"], changes["terms"])
     head += struct.pack("<3i3d", *sizes, gather["scale"] * sent["scale"], gather["scale"], feedback["scale"])
     head += b"".join(struct.pack("<i", len(name)) + name for name in names)
     images = (told["emission"], *(changes[name] for name in ("first", "shares", "albedo")))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
 
@@ -10,6 +11,20 @@ import numpy as np
 from pixels import corner_shader, shared_context
 
 from srbf.export import spirv
+
+
+def doublings(terms: int) -> list[bool]:
+    """How a sum of so many powers is made of the first: a step doubles the terms where true, and adds one where false."""
+    return [*doublings(terms // 2), True, *([False] if terms % 2 else [])] if terms > 1 else []
+
+
+def summed(product: Callable[[Any, Any, Any], Any], exchange: Any, one: Any, terms: int) -> Any:
+    """The sum of so many powers of `exchange`, as the engines draw it; `product`: left right + addend, None: nothing added."""
+    total, power = one, exchange
+    for doubling in doublings(terms):
+        left = power if doubling else exchange
+        total, power = product(left, total, total if doubling else one), product(left, power, None)
+    return total
 
 
 class Passes:

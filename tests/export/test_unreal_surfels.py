@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_surfels import LIGHTS, PANORAMA, RANK, SIDE, irradiance_of, made_asset, weights_of
+from made_surfels import LIGHTS, PANORAMA, RANK, SIDE, irradiance_of, made_asset, recolored, residual, table_of, weights_of
 from made_tables import made
-from passes import Passes
+from passes import Passes, doublings
 from test_unreal_tables import component_compiles
 from unreal_passes import Unreal, face_axes, frame_of, node_of, square
 from unreal_stand_in import StandIn
@@ -24,7 +24,8 @@ from srbf.asset import Asset
 from srbf.errors import InputError
 from srbf.export import spirv, surfel_textures, unreal
 from srbf.export.engine_folder import engine_root
-from srbf.export.unreal_surfels import MOST_TERMS, NUMBERS
+from srbf.export.surfel_textures import MOST_TERMS
+from srbf.export.unreal_surfels import NUMBERS
 from srbf.lights import DirectionalLight, EnvironmentLight, NamedLight, PointLight
 from srbf.methods import in_asset_frame
 from srbf.methods.kept_visibility import add_visibility, by_depths, kept_visibility
@@ -41,20 +42,21 @@ SOURCE = engine_root("unreal") / "Source"
 HERE = Path(__file__).parent / "unreal"
 CLOSE = 5e-6  # of the largest: sums of floats
 HALF = 1e-3  # of the largest: numpy rounds a repainted table to half floats
+SOLVED = 1e-5  # of one: what 512 terms and sums of floats leave; 64 terms leave 100 times as much
 CELLS = 0.005  # of all weights: texels that straddle cells count in parts here, wholly in numpy, which has them finer
 MOVED = np.array([[0.0, -1.25, 0.0, 0.3], [1.25, 0.0, 0.0, -0.2], [0.0, 0.0, 1.25, 0.1], [0.0, 0.0, 0.0, 1.0]])  # asset from world
 
 
 @pytest.fixture(scope="module")
 def assets() -> dict[str, Asset]:
-    """Shadows by captures of the scene, and by compressed depths."""
+    """Shadows by captures of the scene, and by compressed depths; surfaces that change with three bounces."""
     plain = made_asset()
     kept = made_asset()
     cells = Cells.of_image(kept.tables["cells"])
     inside = replace(CloudLights.of_asset(kept), cells=cells, free=np.array(kept.manifest["free_places"]))
     add_visibility(kept, inside, "pca:12", False)
     plain.manifest["asset_from_world"] = MOVED.tolist()
-    return {"faces": plain, "depths": kept}
+    return {"faces": plain, "depths": kept, "few": made_asset(bounces=3)}
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +107,8 @@ def test_an_environment_and_changed_surfaces_add_what_numpy_says(
     surfaces = Surfaces.of(asset)
     light, painted = NamedLight("Screen", (0.5, 2.0, 1.0)), {"Walls": (0.1, 0.6, 0.9)}
     first = drawn.column(surfaces.emission[:, 1] * light.color)
-    exchange, series, table = drawn.repainted(np.stack([surfaces.repainted(painted)[0].albedo, surfaces.albedo], axis=1))
+    exchange, series, table = drawn.repainted(recolored(asset, painted))
+    assert np.abs(residual(passes.read(exchange), passes.read(series))).max() < SOLVED
     images = {"First": series, "Second": first, "Addend": first}
     reflected = drawn.made_by("SurfelProduct", 1, RANK, images, Matrix=(RANK, 1, 0, 0))
     images = {"First": exchange, "Second": reflected, "Addend": first}
@@ -116,7 +119,17 @@ def test_an_environment_and_changed_surfaces_add_what_numpy_says(
     found = drawn.weights(passes.texture(lit.reshape(*drawn.made.places.shape[:2], 4)), bounced, table)
     after = weights_of(with_albedo(Asset.open(folders["faces"]), painted), [point, light])
     np.testing.assert_allclose(found, after, atol=HALF * np.abs(after).max())
-    assert np.abs(after - weights_of(asset, [point, light])).max() > 0.05 * np.abs(after).max()
+    assert np.abs(after - weights_of(asset, [point, light])).max() > 20 * HALF * np.abs(after).max()
+
+
+@needs_spirv
+def test_repainting_sums_as_few_bounces_as_the_bake_has(passes: Passes, assets: dict[str, Asset], folders: dict[str, Path]) -> None:
+    few, painted = assets["few"], {"Walls": (0.1, 0.6, 0.9)}
+    exchange, series, table = (passes.read(image) for image in Unreal(passes, folders["few"], few).repainted(recolored(few, painted)))
+    left = -np.linalg.matrix_power(np.moveaxis(exchange[..., :3], 2, 0), 3)
+    np.testing.assert_allclose(residual(exchange, series), left, atol=SOLVED)
+    expected = table_of(few) + Surfaces.of(few).repainted(painted)[1]
+    np.testing.assert_allclose(table[..., :3], expected, atol=CLOSE * np.abs(expected).max())
 
 
 @needs_spirv
@@ -158,6 +171,8 @@ def test_c_plus_plus_takes_lights_into_the_assets_frame(assets: dict[str, Asset]
     assert said["environment"].tolist() == [[len(told["cells"]), SIDE, told["scale"]]]
     products = (scales["surface_gather"] * scales["surface_sent"], scales["surface_gather"], scales["surface_feedback"])
     assert said["changes"].tolist() == [[len(surfaces.albedo), MOST_TERMS, *products]] and said["object"].ravel().tolist() == [0, 1]
+    assert said["doubling"].ravel().tolist() == doublings(MOST_TERMS)
+    assert ask(folders["few"] / NUMBERS)["doubling"].ravel().tolist() == [True, False]
     radiance = np.array([0.5, 2.0, 1.0])
     bounced, first = (said[name].reshape(-1, 4)[:, :3] for name in ("emitted", "first"))
     np.testing.assert_allclose(bounced, surfaces.emitted("Screen", radiance), rtol=1e-5, atol=1e-6)
@@ -209,7 +224,7 @@ def test_the_script_makes_the_passes(
         connected = [call[4] for call in stand_in.calls if call[0].endswith("connect_material_expressions") and call[3] is custom]
         assert connected == told["inputs"] and custom.properties["code"] == told["code"]
     signed = [made_ for made_ in stand_in.made if made_.properties.get("allow_negative_emissive_color")]
-    assert len(signed) == len(node["materials"]) == 12
+    assert len(signed) == len(node["materials"]) == 11
     shadows = {"Face0", "Face5", "Across"} if kind == "faces" else {"Coefficients", "Bases", "Clusters"}
     assert shadows <= set(node["materials"]["SurfelIrradiance"]["inputs"])
     assert {path.name for path in (folder / "Source").iterdir()} == {path.name for path in SOURCE.iterdir()}

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from passes import Passes
+from passes import Passes, summed
 
 from srbf.asset import Asset
 from srbf.gl.uniforms import NO_CONE, versine
@@ -142,9 +142,12 @@ class Unity:
         images = {"_SrbfAlbedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1)))), "_SrbfEntries": matrix["gather"]}
         addend, scale = (matrix["feedback"], told["feedback"]["scale"]), told["gather"]["scale"] * told["sent"]["scale"]
         exchange = self.multiplied("exchange", (rank, rank), matrix["gather"], matrix["sent"], count, scale, addend, images)
-        series = one = self.passes.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
-        for term in range(told.get("bounces", 64)):
-            series = self.multiplied("product", (rank, rank), exchange, series, rank if term else 0, 1, (one, 1))
+        one = self.passes.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
+
+        def product(left: Any, right: Any, addend: Any) -> Any:
+            return self.multiplied("product", (rank, rank), left, right, rank, 1, (one, 0) if addend is None else (addend, 1))
+
+        series = summed(product, exchange, one, told["terms"])
         before, own = (
             self.passes.texture(read_image(self.folder / told["series"])),
             self.passes.texture(read_image(self.folder / table["file"])),

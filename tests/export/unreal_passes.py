@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 from made_surfels import RANK
-from passes import Passes
+from passes import Passes, summed
 
 from srbf.asset import Asset
 from srbf.export import surfel_textures
-from srbf.export.unreal_surfels import MOST_TERMS
 from srbf.gl.uniforms import NO_CONE, versine
 from srbf.io.image import read_image
 from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
 from srbf.methods.kept_visibility import kept_visibility
+from srbf.methods.surface_changes import Surfaces
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.surface_cells import Cells
@@ -169,10 +169,13 @@ class Unreal:
         images = {"Albedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1))))}
         scale, feedback = scales["surface_gather"] * scales["surface_sent"], scales["surface_feedback"]
         exchange = self.made_by("SurfelExchange", RANK, RANK, images, Matrix=(count, scale, feedback, 0))
-        series = self.passes.texture(np.zeros((RANK, RANK, 4)))
-        for term in range(MOST_TERMS):
-            former = {"Exchange": exchange, "Former": series}
-            series = self.made_by("SurfelSeries", RANK, RANK, former, Matrix=(RANK if term else 0, 1, 0, 0))
+        one = self.passes.texture(np.repeat(np.eye(RANK)[..., None], 4, axis=2))
+
+        def product(left: Any, right: Any, addend: Any) -> Any:
+            own = {"First": left, "Second": right, "Addend": one if addend is None else addend}
+            return self.made_by("SurfelProduct", RANK, RANK, own, Matrix=(RANK, 1, 0 if addend is None else 1, 0))
+
+        series = summed(product, exchange, one, surfel_textures.terms_of(Surfaces.of(self.asset)))
         matrix = (RANK, scales["surface_gather"], self.asset.manifest["surfel_transfer"]["scale"], 0)
         return exchange, series, self.made_by("SurfelRepainted", count, RANK, images | {"Series": series}, Matrix=matrix)
 

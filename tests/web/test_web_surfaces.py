@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 from cloud_assets import Room, room, with_table, with_transfer
 from surface_assets import with_surfaces
 from test_web_cloud import LIGHTS, POINT, received
+
+from srbf.export.surfel_textures import MOST_TERMS
 
 CLOSE = 2e-3  # of the largest value, as for other lights
 RED, DIM = (0.9, 0.1, 0.2), (0.05, 0.1, 0.15)
@@ -43,6 +46,12 @@ def test_changed_surfaces_light_the_room(browser: Any, bounces: int | None) -> N
             expected = expected_of(made, surfaces, lights, changes)
             assert expected.max() > 0.1
             np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=f"{weights} {changes}")
+
+
+def test_as_many_bounces_are_summed_as_in_exports() -> None:
+    """The web reads assets as they are fitted, so no export can tell it the count."""
+    source = (Path(__file__).resolve().parents[2] / "web/src/surface_changes.ts").read_text()
+    assert f"MOST_TERMS = {MOST_TERMS};" in source
 
 
 @pytest.mark.parametrize("backend", ["webgl", "webgpu"])

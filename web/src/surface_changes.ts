@@ -9,6 +9,7 @@ import type { Triple } from "./matrix";
 const FILES = ["surface_gather", "surface_sent", "surface_feedback", "surface_objects", "surface_albedo"] as const;
 const MOST_REFLECTED = 0.99; // share of light that a bounce keeps at most
 const SERIES = 24; // reflections from which on all are summed
+export const MOST_TERMS = 512; // of a series without end, as exports have it
 const SMALL = 1e-7; // of the sum: a reflection that no longer counts
 const TOLD = 12; // names in an error
 
@@ -136,12 +137,15 @@ export class Surfaces {
     return out;
   }
 
-  /** sum over k < `terms` of F^k first, F = feedback + gather `change` sent; undefined: until terms no longer count. */
+  /**
+   * sum over k < `terms` of F^k first, F = feedback + gather `change` sent; undefined: until terms no longer count, MOST_TERMS at most. Term by term, since
+   * that takes products of a matrix and a vector alone.
+   */
   private series(first: Float64Array, terms: number | undefined, change?: Float64Array): Float64Array {
     const { gather, sent, feedback } = this.known;
     const total = terms === 0 ? new Float64Array(first.length) : first.slice();
     let last = first;
-    for (let k = 1; k < (terms ?? Infinity) && largest(last) > SMALL * largest(total); ++k) {
+    for (let k = 1; k < (terms ?? MOST_TERMS) && largest(last) > SMALL * largest(total); ++k) {
       const next = summed(feedback, last);
       if (change) product(gather, productTransposed(sent, last).map((x, i) => x * change[i])).forEach((x, i) => (next[i] += x));
       next.forEach((x, i) => (total[i] += x));

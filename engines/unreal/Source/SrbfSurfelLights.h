@@ -102,7 +102,11 @@ private:
     UPROPERTY(Transient)
     UTexture* OwnTable = nullptr;  // of the asset, from surfels to shapes
 
-    UTexture* Added = nullptr;  // one of those above, as is the next
+    UPROPERTY(Transient)
+    UTexture2D* One = nullptr;  // the identity matrix
+
+    UTexture* Added = nullptr;  // one of those above, as are the next two
+    UTexture* Series = nullptr;
     UTexture* RepaintedTable = nullptr;
     UTexture* LastEnvironment = nullptr;
     float LastEnergy = 0;
@@ -119,7 +123,8 @@ private:
     std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors) const;
     bool DrawShapes();
     void DrawPaint(const std::vector<float>& Painted);
-    void DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, FLinearColor Numbers);
+    void DrawSum();
+    void DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, UTexture* Addend, FLinearColor Numbers);
     void DrawInto(UTextureRenderTarget2D* Target, UMaterialInstanceDynamic* Material);
     static UTexture2D* MakeNumbers(int Width, int Height);
     static void Upload(UTexture2D* Texture, const std::vector<float>& Texels);

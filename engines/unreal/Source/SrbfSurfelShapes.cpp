@@ -8,9 +8,9 @@
 
 namespace
 {
-constexpr int Radiances = 0, Lit = 1, Reflected = 2, Bounced = 3, Exchange = 4, Series = 5, Next = 6, Repainted = 7;  // of ShapeTargets
-constexpr int CellsOf = 0, EnvironmentOf = 1, ProductOf = 2, ExchangeOf = 3, SeriesOf = 4, RepaintedOf = 5;           // of ShapeMaterials
-const TCHAR* const MaterialNames[] = {TEXT("SurfelCells"), TEXT("SurfelEnvironment"), TEXT("SurfelProduct"), TEXT("SurfelExchange"), TEXT("SurfelSeries"), TEXT("SurfelRepainted")};
+constexpr int Radiances = 0, Lit = 1, Reflected = 2, Bounced = 3, Exchange = 4, Sums = 5, Powers = 7, Repainted = 9;  // of ShapeTargets; Sums and Powers: two each, drawn in turn
+constexpr int CellsOf = 0, EnvironmentOf = 1, ProductOf = 2, ExchangeOf = 3, RepaintedOf = 4;                         // of ShapeMaterials
+const TCHAR* const MaterialNames[] = {TEXT("SurfelCells"), TEXT("SurfelEnvironment"), TEXT("SurfelProduct"), TEXT("SurfelExchange"), TEXT("SurfelRepainted")};
 
 FLinearColor Matrix(int Columns, double Scale, double Added) { return FLinearColor(float(Columns), float(Scale), float(Added), 0.0f); }
 
@@ -41,20 +41,28 @@ bool USrbfSurfelLights::Changes(const FString& Name) const
 bool USrbfSurfelLights::MakeShapes()
 {
     const int Rows = Known.Tables[0].Rows, Objects = int(Known.Names.size());
-    for (int Name = 0; Name < 6; ++Name)
+    for (int Name = 0; Name < 5; ++Name)
     {
         const bool bUsed = Name < ProductOf ? Known.Cells > 0 : Objects > 0;
         if (bUsed && !MakeMaterial(MaterialNames[Name], ShapeMaterials)) return false;
         if (!bUsed) ShapeMaterials.Add(nullptr);
     }
-    const int Sizes[][2] = {{1, Known.Cells}, {1, Rows}, {1, Rows}, {1, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Known.Count, Rows}};
-    for (int Target = 0; Target < 8; ++Target)
+    const int Sizes[][2] = {{1, Known.Cells}, {1, Rows}, {1, Rows}, {1, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Known.Count, Rows}};
+    for (int Target = 0; Target < 10; ++Target)
     {
         const bool bUsed = Target <= Lit ? Known.Cells > 0 : Objects > 0;
         ShapeTargets.Add(bUsed ? MakeTarget(Sizes[Target][0], Sizes[Target][1], false) : nullptr);
     }
     Emitted = MakeNumbers(1, Rows);
-    if (Objects > 0) Albedo = MakeNumbers(2, Known.Count);
+    if (Objects > 0)
+    {
+        Albedo = MakeNumbers(2, Known.Count);
+        One = MakeNumbers(Rows, Rows);
+        std::vector<float> Identity(size_t(4 * Rows * Rows), 0.0f);
+        for (size_t Row = 0; Row < size_t(Rows); ++Row)
+            for (size_t Channel = 0; Channel < 3; ++Channel) Identity[4 * Row * size_t(Rows + 1) + Channel] = 1.0f;
+        Upload(One, Identity);
+    }
     return true;
 }
 
@@ -97,8 +105,8 @@ bool USrbfSurfelLights::DrawShapes()
     if (bPainted)
     {
         const int Rows = Known.Tables[0].Rows;
-        DrawProduct(ProductOf, Reflected, ShapeTargets[Series], Emitted, Matrix(Rows, 1, 0));
-        DrawProduct(ProductOf, Bounced, ShapeTargets[Exchange], ShapeTargets[Reflected], Matrix(Rows, 1, 1));
+        DrawProduct(ProductOf, Reflected, Series, Emitted, Emitted, Matrix(Rows, 1, 0));
+        DrawProduct(ProductOf, Bounced, ShapeTargets[Exchange], ShapeTargets[Reflected], Emitted, Matrix(Rows, 1, 1));
         Added = ShapeTargets[Bounced];
     }
     if (Environment != nullptr && Known.Cells > 0)
@@ -110,13 +118,13 @@ bool USrbfSurfelLights::DrawShapes()
         Cells->SetVectorParameterValue(TEXT("Left"), Axis(Known.Direction(0, -1, 0), 0));
         Cells->SetVectorParameterValue(TEXT("Up"), Axis(Known.Direction(0, 0, 1), EnvironmentEnergy));
         DrawInto(ShapeTargets[Radiances], Cells);
-        DrawProduct(EnvironmentOf, Lit, nullptr, ShapeTargets[Radiances], Matrix(Known.Cells, Known.EnvironmentScale, 1));
+        DrawProduct(EnvironmentOf, Lit, nullptr, ShapeTargets[Radiances], Added, Matrix(Known.Cells, Known.EnvironmentScale, 1));
         Added = ShapeTargets[Lit];
     }
     return true;
 }
 
-/** The exchange of light, then the sum of its powers, one + exchange (one + exchange (…)), then the table. */
+/** The exchange of light, then the sum of its powers, then the table. */
 void USrbfSurfelLights::DrawPaint(const std::vector<float>& Painted)
 {
     bPainted = false;
@@ -128,30 +136,41 @@ void USrbfSurfelLights::DrawPaint(const std::vector<float>& Painted)
     Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Known.Count, Known.ExchangeScale, Known.FeedbackScale));
     DrawInto(ShapeTargets[Exchange], Material);
-    Material = ShapeMaterials[SeriesOf];
-    Material->SetTextureParameterValue(TEXT("Exchange"), ShapeTargets[Exchange]);
-    for (int Term = 0; Term < Known.Terms; ++Term)
-    {
-        Material->SetTextureParameterValue(TEXT("Former"), ShapeTargets[Series]);
-        Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Term == 0 ? 0 : Rows, 1, 0));
-        DrawInto(ShapeTargets[Next], Material);
-        ShapeTargets.Swap(Series, Next);
-    }
+    DrawSum();
     Material = ShapeMaterials[RepaintedOf];
-    Material->SetTextureParameterValue(TEXT("Series"), ShapeTargets[Series]);
+    Material->SetTextureParameterValue(TEXT("Series"), Series);
     Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Rows, Known.GatherScale, Known.Tables[0].Scale));
     DrawInto(ShapeTargets[Repainted], Material);
     RepaintedTable = ShapeTargets[Repainted];
 }
 
-/** `First` null: the material's own. What is added is Added so far. */
-void USrbfSurfelLights::DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, FLinearColor Numbers)
+/** Powers of the exchange: of n terms 2n by sum + power sum, or n + 1 by one + exchange sum. Hundreds of terms take few passes. */
+void USrbfSurfelLights::DrawSum()
+{
+    const int Rows = Known.Tables[0].Rows;
+    const std::vector<bool> Steps = Known.Doublings();
+    UTexture* Power = ShapeTargets[Exchange];
+    Series = One;
+    for (int Step = 0; Step < int(Steps.size()); ++Step)
+    {
+        const bool bDoubling = Steps[size_t(Step)];
+        UTexture* Left = bDoubling ? Power : ShapeTargets[Exchange];
+        DrawProduct(ProductOf, Sums + Step % 2, Left, Series, bDoubling ? Series : One, Matrix(Rows, 1, 1));
+        Series = ShapeTargets[Sums + Step % 2];
+        if (Step + 1 == int(Steps.size())) break;
+        DrawProduct(ProductOf, Powers + Step % 2, Left, Power, One, Matrix(Rows, 1, 0));
+        Power = ShapeTargets[Powers + Step % 2];
+    }
+}
+
+/** `First` null: the material's own. */
+void USrbfSurfelLights::DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, UTexture* Addend, FLinearColor Numbers)
 {
     UMaterialInstanceDynamic* Product = ShapeMaterials[Material];
     if (First != nullptr) Product->SetTextureParameterValue(TEXT("First"), First);
     Product->SetTextureParameterValue(TEXT("Second"), Second);
-    Product->SetTextureParameterValue(TEXT("Addend"), Added);
+    Product->SetTextureParameterValue(TEXT("Addend"), Addend);
     Product->SetVectorParameterValue(TEXT("Matrix"), Numbers);
     DrawInto(ShapeTargets[Target], Product);
 }

@@ -34,7 +34,7 @@ public:
     int Cells = 0, Side = 0;  // of the environment that surfels see; cells per side of the octahedral map of directions
     double EnvironmentScale = 0;
     std::vector<std::string> Names;  // of objects that change
-    int Count = 0, Terms = 0;        // surfels; how often light is exchanged
+    int Count = 0, Terms = 0;        // surfels; powers of the exchange of light that are summed
     double ExchangeScale = 0, GatherScale = 0, FeedbackScale = 0;
 
     /// A file in memory; an empty text, or what was expected and found.
@@ -78,6 +78,18 @@ public:
                 for (size_t Channel = 0; Channel < 3; ++Channel)
                     Added[4 * size_t(Row) + Channel] += Radiances[3 * Object + Channel] * Of[3 * (Object * size_t(Rows) + size_t(Row)) + Channel];
         return Added;
+    }
+
+    /// How the sum of Terms powers is made of the first: a step doubles the terms where true, and adds one where false.
+    std::vector<bool> Doublings() const
+    {
+        std::vector<bool> Steps;
+        for (int Left = Terms; Left > 1; Left /= 2)
+        {
+            if (Left % 2 == 1) Steps.insert(Steps.begin(), false);
+            Steps.insert(Steps.begin(), true);
+        }
+        return Steps;
     }
 
     /// RGBA of every surfel: its albedo where objects have others, RGB and 1 of each, and that of the bake.

@@ -92,6 +92,7 @@ static class Responses
         Print("added", surfels.Emitted(new[] { radiance }, surfels.emission));
         Print("first", surfels.Emitted(new[] { radiance }, surfels.changes.first));
         Print("changes", surfels.changes.terms, surfels.changes.gather.columns, surfels.changes.gather.scale, surfels.changes.sent.scale, surfels.changes.feedback.columns, surfels.changes.feedback.scale);
+        Print("doublings", surfels.changes.Doublings().ConvertAll(doubling => doubling ? 1.0 : 0.0).ToArray());
         Print("environment", surfels.environment.columns, surfels.environment.scale, surfels.environmentSide);
         Print("painted", surfels.changes.Repainted(new[] { radiance }, surfels.objects));
         try { surfels.changes.Repainted(new[] { new KeyValuePair<string, Vector>("none", new Vector()) }, surfels.objects); }

@@ -27,6 +27,7 @@ int main(int, char** arguments)
     for (const SrbfSurfelTable& table : surfels.Tables) std::printf("table %d %d %.17g %d\n", table.Rows, table.Columns, table.Scale, table.Blocks());
     std::printf("environment %d %d %.17g\n", surfels.Cells, surfels.Side, surfels.EnvironmentScale);
     std::printf("changes %d %d %.17g %.17g %.17g\n", surfels.Count, surfels.Terms, surfels.ExchangeScale, surfels.GatherScale, surfels.FeedbackScale);
+    for (const bool doubling : surfels.Doublings()) std::printf("doubling %d\n", int(doubling));
     for (const std::string& name : surfels.Names) std::printf("object %d\n", surfels.Index(name));
     const std::vector<float> radiances{0.0f, 0.0f, 0.0f, 0.5f, 2.0f, 1.0f}, painted{0.0f, 0.0f, 0.0f, 0.0f, 0.5f, 2.0f, 1.0f, 1.0f};  // of the second of two objects
     for (const float value : surfels.Emitted(radiances, true)) std::printf("emitted %.9g\n", value);

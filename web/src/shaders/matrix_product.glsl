@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A product of matrices, RGB: row i of a matrix is row i of its texture. By default added + left right. SRBF_BETWEEN: `left` and `right` have one channel, and
 // column k of `left` is taken times number k of a list. SRBF_COLUMNS: `right` has one channel, column j of the product is taken times number j, nothing is added.
+// SRBF_PLAIN: nothing is added.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -27,8 +28,10 @@ void main() {
         total += first.rgb * second.rgb;
 #endif
     }
-#ifdef SRBF_COLUMNS
+#if defined(SRBF_COLUMNS)
     product = vec4(total * texelFetch(numbers, ivec2(at.x, 0), 0).rgb, 1.0);
+#elif defined(SRBF_PLAIN)
+    product = vec4(total, 1.0);
 #else
     product = vec4(total + texelFetch(added, at, 0).rgb, 1.0);
 #endif

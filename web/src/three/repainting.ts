@@ -2,23 +2,25 @@
 import type { DataTexture, IUniform, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import matrixProduct from "../shaders/matrix_product.glsl";
 import repaintedTable from "../shaders/repainted_table.glsl";
-import type { Surfaces } from "../surface_changes";
+import { MOST_TERMS, type Surfaces } from "../surface_changes";
 import { floatTarget, floatTexture, grayTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
-
-const MOST_TERMS = 64; // of a series without end
 
 export class Repainting {
   private readonly numbers: DataTexture; // of every surfel
   private readonly own: DataTexture;
   private readonly textures: DataTexture[];
-  /** feedback + gather `numbers` sent; one + feedback x; x gather `numbers`; the table. */
+  private readonly one: DataTexture;
+  /** feedback + gather `numbers` sent; added + left right, and left right; x gather `numbers`; the table. */
   private readonly feedback: FullscreenPass;
-  private readonly term: FullscreenPass;
+  private readonly added: FullscreenPass;
+  private readonly plain: FullscreenPass;
   private readonly reflected: FullscreenPass;
   private readonly sum: FullscreenPass;
   private readonly changed: WebGLRenderTarget;
-  private readonly terms: [WebGLRenderTarget, WebGLRenderTarget];
+  /** Drawn in turn. */
+  private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
+  private readonly powers: [WebGLRenderTarget, WebGLRenderTarget];
   private readonly before: WebGLRenderTarget;
   private readonly after: WebGLRenderTarget;
   private readonly table: WebGLRenderTarget;
@@ -35,18 +37,20 @@ export class Repainting {
     const transposed = Float32Array.from({ length: sent.length }, (_, i) => sent[(i % rank) * count + Math.floor(i / rank)]);
     const gathered = grayTexture(Float32Array.from(gather), count, rank);
     const back = grayTexture(transposed, rank, count);
-    const one = floatTexture(fours(Float32Array.from({ length: 3 * rank * rank }, (_, i) => (Math.floor(i / 3) % (rank + 1) === 0 ? 1 : 0))), rank, rank);
+    this.one = floatTexture(fours(Float32Array.from({ length: 3 * rank * rank }, (_, i) => (Math.floor(i / 3) % (rank + 1) === 0 ? 1 : 0))), rank, rank);
     this.own = floatTexture(fours(feedback.data), rank, rank);
     this.numbers = floatTexture(new Float32Array(4 * count), count, 1);
-    this.textures = [gathered, back, one, this.own, this.numbers];
+    this.textures = [gathered, back, this.one, this.own, this.numbers];
     this.changed = floatTarget(rank, rank);
-    this.terms = [floatTarget(rank, rank), floatTarget(rank, rank)];
+    this.sums = [floatTarget(rank, rank), floatTarget(rank, rank)];
+    this.powers = [floatTarget(rank, rank), floatTarget(rank, rank)];
     this.before = floatTarget(count, rank);
     this.after = floatTarget(count, rank);
     this.table = floatTarget(count, rank);
     const product = (values: Record<string, unknown>, defines: Record<string, number> = {}) => new FullscreenPass(matrixProduct, uniforms({ added: null, numbers: this.numbers, ...values }), defines);
     this.feedback = product({ added: this.own, left: gathered, right: back, count }, { SRBF_BETWEEN: 1 });
-    this.term = product({ added: one, left: null, right: null, count: 0 });
+    this.added = product({ left: null, right: null, count: rank });
+    this.plain = product({ left: null, right: null, count: rank }, { SRBF_PLAIN: 1 });
     this.reflected = product({ left: null, right: gathered, count: rank }, { SRBF_COLUMNS: 1 });
     this.sum = new FullscreenPass(repaintedTable, uniforms({ table, scale, before: this.before.texture, after: this.after.texture }));
   }
@@ -69,27 +73,42 @@ export class Repainting {
   }
 
   dispose(): void {
-    for (const one of [...this.textures, ...this.terms, this.changed, this.before, this.after, this.table, this.feedback, this.term, this.reflected, this.sum]) one.dispose();
+    for (const one of [...this.textures, ...this.sums, ...this.powers, this.changed, this.before, this.after, this.table, this.feedback, this.added, this.plain, this.reflected, this.sum]) one.dispose();
   }
 
-  /** sum over k of feedback^k gather rho: x = one + feedback x again and again, then x gather rho. */
+  /** sum over k of feedback^k gather rho. */
   private drawReflected(renderer: WebGLRenderer, feedback: Texture, albedo: Float64Array, target: WebGLRenderTarget): void {
     const terms = this.surfaces.bounces ?? MOST_TERMS;
-    let [last, next] = this.terms;
-    for (let k = 0; k < terms; ++k) {
-      Object.assign(this.term.uniforms, uniforms({ left: feedback, right: last.texture, count: k === 0 ? 0 : last.width }));
-      this.term.draw(renderer, next);
-      [last, next] = [next, last];
-    }
+    const series = this.drawSum(renderer, feedback, terms);
     this.setNumbers(albedo);
-    Object.assign(this.reflected.uniforms, uniforms({ left: last.texture, count: terms === 0 ? 0 : last.width }));
+    Object.assign(this.reflected.uniforms, uniforms({ left: series, count: terms === 0 ? 0 : this.changed.width }));
     this.reflected.draw(renderer, target);
+  }
+
+  /** Powers of `feedback`: of n terms 2n by sum + power sum, or n + 1 by one + feedback sum. Hundreds of terms take few passes. */
+  private drawSum(renderer: WebGLRenderer, feedback: Texture, terms: number): Texture {
+    let [sum, power]: Texture[] = [this.one, feedback];
+    doublings(terms).forEach((doubling, step) => {
+      const left = doubling ? power : feedback;
+      Object.assign(this.added.uniforms, uniforms({ left, right: sum, added: doubling ? sum : this.one }));
+      this.added.draw(renderer, this.sums[step % 2]);
+      Object.assign(this.plain.uniforms, uniforms({ left, right: power }));
+      this.plain.draw(renderer, this.powers[step % 2]);
+      [sum, power] = [this.sums[step % 2].texture, this.powers[step % 2].texture];
+    });
+    return sum;
   }
 
   private setNumbers(rgb: Float64Array): void {
     (this.numbers.image.data as Float32Array).set(fours(rgb));
     this.numbers.needsUpdate = true;
   }
+}
+
+/** How the sum of `terms` powers is made of the first: a step doubles the terms where true, and adds one where false. */
+function doublings(terms: number): boolean[] {
+  if (terms < 2) return [];
+  return [...doublings(Math.floor(terms / 2)), true, ...(terms % 2 ? [false] : [])];
 }
 
 function uniforms(values: Record<string, unknown>): Record<string, IUniform> {

@@ -82,7 +82,7 @@ func _add_albedo() -> void:
 		one.set_pixel(i, i, Color.WHITE)
 	var power := feedback
 	var sum: Texture2D = _texture(one)
-	for bit in range(_bits(own.terms) - 2, -1, -1):  # one + f + f² + … of twice as many terms, or one more
+	for bit in range(_bits(own.terms) - 2, -1, -1):  # one + f + f² + … of twice as many terms, or one more: hundreds take few passes
 		sum = _product(square, {"srbf_left": power, "srbf_right": sum, "srbf_count": rank, "srbf_added": sum}, _seldom)
 		power = _product(square, {"srbf_left": power, "srbf_right": power, "srbf_count": rank}, _seldom)
 		if own.terms >> bit & 1:

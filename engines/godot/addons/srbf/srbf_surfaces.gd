@@ -5,8 +5,6 @@ extends Resource
 ## What an asset that was fitted with --editable knows of its objects: albedo that changes, and emission. Matrices are half floats over their `scales`.
 
 const MOST_REFLECTED := 0.99  # share of light that a bounce keeps at most
-const ENDLESS := 24  # exchanges from which on all count
-const MOST_TERMS := 64  # of a series without end
 const GRAY := ["gather", "sent"]
 
 @export var names: PackedStringArray
@@ -19,7 +17,7 @@ const GRAY := ["gather", "sent"]
 ## Weights under objects that emit a mean radiance of 1, without bounces: a row per shape, a column per object.
 @export var emission: Image
 @export var scales := {}
-## How often light is exchanged.
+## Powers of the exchange that are summed after a change.
 @export var terms: int
 ## Of object o and surfel s at o S + s: the object's part of the surfel's area.
 @export var shares: PackedFloat32Array
@@ -33,8 +31,7 @@ static func read(folder: String, manifest: Dictionary) -> SrbfSurfaces:
 		return null
 	var surfaces := SrbfSurfaces.new()
 	surfaces.names = PackedStringArray(manifest.surfaces.objects)
-	var bounces := int(manifest.surfaces.get("bounces", MOST_TERMS))
-	surfaces.terms = bounces if bounces < ENDLESS else MOST_TERMS
+	surfaces.terms = int(manifest.surface_series.terms)
 	for name in ["gather", "sent", "feedback", "series", "emission"]:
 		var key: String = "surface_" + name
 		if not manifest.has(key):

@@ -21,16 +21,27 @@ namespace Srbf
     public sealed class SrbfChanges
     {
         const double MostReflected = 0.99;  // share of light that a bounce keeps at most
-        const int MostTerms = 64;           // of a series without end
 
         public SrbfMatrix gather, sent, feedback;
         public string seriesFile, firstFile, sharesFile, albedoFile;
-        public int terms = MostTerms;  // how often light is exchanged
-        public float[] shares;         // of surfels in objects, row by row
-        public float[] albedo;         // RGB of every surfel
-        public float[] first;          // RGB of every object that emits and row of the first table, without bounces
+        public int terms;       // powers of the exchange of light that are summed
+        public float[] shares;  // of surfels in objects, row by row
+        public float[] albedo;  // RGB of every surfel
+        public float[] first;   // RGB of every object that emits and row of the first table, without bounces
 
         public bool Exists { get { return gather != null && gather.Exists; } }
+
+        /// <summary>How the sum of `terms` powers is made of the first: a step doubles the terms where true, and adds one where false.</summary>
+        public List<bool> Doublings()
+        {
+            var steps = new List<bool>();
+            for (int left = terms; left > 1; left /= 2)
+            {
+                if (left % 2 == 1) steps.Insert(0, false);
+                steps.Insert(0, true);
+            }
+            return steps;
+        }
 
         /// <summary>RGBA of every surfel: its albedo where objects have others, linear, and that of the bake.</summary>
         public float[] Repainted(IList<KeyValuePair<string, Vector>> painted, string[] objects)

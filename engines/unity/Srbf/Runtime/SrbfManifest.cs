@@ -129,7 +129,7 @@ namespace Srbf
             changes.firstFile = Text(told, "first");
             changes.sharesFile = Text(told, "shares");
             changes.albedoFile = Text(told, "albedo");
-            if (told.ContainsKey("bounces")) changes.terms = (int)Number(told, "bounces");
+            changes.terms = (int)Number(told, "terms");
         }
 
         static SrbfMatrix Matrix(object told)

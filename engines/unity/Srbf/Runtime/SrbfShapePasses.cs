@@ -34,7 +34,9 @@ namespace Srbf
         readonly Texture2D emitted, nothing;
         readonly RenderTexture radiances, reflected, bounced, sum;
         Texture2D albedo, one;
-        RenderTexture exchange, series, next, table;
+        readonly RenderTexture[] sums = new RenderTexture[2], powers = new RenderTexture[2];  // drawn in turn
+        RenderTexture exchange, table;
+        Texture series;
         List<KeyValuePair<string, Vector>> painted = new List<KeyValuePair<string, Vector>>();
 
         public SrbfShapePasses(SrbfAsset asset, Material material)
@@ -86,11 +88,11 @@ namespace Srbf
 
         public void Dispose()
         {
-            foreach (UnityEngine.Object used in new UnityEngine.Object[] { emitted, nothing, radiances, reflected, bounced, sum, albedo, one, exchange, series, next, table })
+            foreach (UnityEngine.Object used in new UnityEngine.Object[] { emitted, nothing, radiances, reflected, bounced, sum, albedo, one, exchange, sums[0], sums[1], powers[0], powers[1], table })
                 if (used != null) UnityEngine.Object.DestroyImmediate(used);
         }
 
-        /// <summary>The exchange of light, then the sum of its powers, one + exchange (one + exchange (…)), then the table.</summary>
+        /// <summary>The exchange of light, then the sum of its powers, then the table.</summary>
         void Paint(CommandBuffer commands, List<KeyValuePair<string, Vector>> now)
         {
             SrbfSurfels surfels = asset.surfels;
@@ -107,17 +109,27 @@ namespace Srbf
             commands.SetGlobalTexture("_SrbfAlbedo", albedo);
             Set(commands, asset.gather, asset.sent, count, changes.gather.scale * changes.sent.scale, asset.feedback, changes.feedback.scale);
             Fill(commands, exchange, Exchange);
-            for (int term = 0; term < changes.terms; term++)
-            {
-                Multiply(commands, next, exchange, term == 0 ? (Texture)one : series, term == 0 ? 0 : rank, 1, one, 1);
-                RenderTexture last = series;
-                series = next;
-                next = last;
-            }
+            Sum(commands, changes.Doublings(), rank);
             Set(commands, asset.series, series, rank, changes.gather.scale, asset.surfelTables[0], surfels.tables[0].scale);
             commands.SetGlobalTexture("_SrbfEntries", asset.gather);
             Fill(commands, table, Repainted);
             Table = table;
+        }
+
+        /// <summary>Powers of the exchange: of n terms 2n by sum + power sum, or n + 1 by one + exchange sum. Hundreds of terms take few passes.</summary>
+        void Sum(CommandBuffer commands, List<bool> doublings, int rank)
+        {
+            Texture power = exchange;
+            series = one;
+            for (int step = 0; step < doublings.Count; step++)
+            {
+                Texture left = doublings[step] ? power : exchange;
+                Multiply(commands, sums[step % 2], left, series, rank, 1, doublings[step] ? series : one, 1);
+                series = sums[step % 2];
+                if (step + 1 == doublings.Count) break;
+                Multiply(commands, powers[step % 2], left, power, rank, 1, null, 0);
+                power = powers[step % 2];
+            }
         }
 
         void Prepare(int rank, int count)
@@ -130,8 +142,11 @@ namespace Srbf
             one.SetPixelData(values, 0);
             one.Apply(false);
             exchange = Target(rank, rank);
-            series = Target(rank, rank);
-            next = Target(rank, rank);
+            for (int i = 0; i < 2; i++)
+            {
+                sums[i] = Target(rank, rank);
+                powers[i] = Target(rank, rank);
+            }
             table = Target(count, rank);
         }
 
