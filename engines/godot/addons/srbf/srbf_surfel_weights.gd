@@ -107,6 +107,8 @@ func _add_passes(asset: SrbfAsset, parts: int) -> void:
 		})
 		if i == 0:
 			_own_table = table
+			if shapes:
+				shapes.own_table = table
 			_first = viewports[-1].get_child(0).material
 		var is_last := i == surfels.tables.size() - 1
 		var size := Vector2i(rows / asset.clusters, asset.clusters) if is_last else _square(rows)
