@@ -20,7 +20,7 @@ bool USrbfRelit::SetLight(const FString& Name, float Intensity, FLinearColor Col
 {
     if (Weights.Index(TCHAR_TO_UTF8(*Name)) < 0)
     {
-        UE_LOG(LogTemp, Warning, TEXT("expected a light of the asset, found %s"), *Name);
+        if (Warned.insert(TCHAR_TO_UTF8(*Name)).second) UE_LOG(LogTemp, Warning, TEXT("expected a light of the asset, found %s"), *Name);
         return false;
     }
     FSrbfNamedLight& Light = Mix.FindOrAdd(Name);

@@ -4,6 +4,8 @@
 
 #include "CoreMinimal.h"
 #include "Components/ActorComponent.h"
+#include <set>
+#include <string>
 #include "SrbfWeights.h"
 #include "SrbfRelit.generated.h"
 
@@ -43,7 +45,7 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
     TMap<FString, FSrbfNamedLight> Mix;
 
-    /** Dim, recolor or switch one of the scene's own lights; false, with a line in the log, where the asset has none of that name. */
+    /** Dim, recolor or switch one of the scene's own lights; false, with a line in the log at the first time, where the asset has none of that name. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
     bool SetLight(const FString& Name, float Intensity, FLinearColor Color);
 
@@ -53,6 +55,7 @@ public:
 private:
     SrbfWeights Weights;
     std::vector<float> Last;
+    std::set<std::string> Warned;  // names that the log has
 
     UPROPERTY(Transient)
     UTexture2D* Texture = nullptr;

@@ -105,7 +105,7 @@ void USrbfSurfelLights::TickComponent(float DeltaTime, ELevelTick TickType, FAct
         const FLinearColor Entries(float(Sizes.Rows), float(Sizes.Columns), float(Sizes.Blocks()), bRepainted ? 1.0f : float(Sizes.Scale));
         for (int Pass = 0; Pass < 2; ++Pass) Materials[Material + Pass]->SetVectorParameterValue(TEXT("Entries"), Entries);
         if (Table == 0) Materials[Material]->SetTextureParameterValue(TEXT("Table"), bRepainted ? RepaintedTable : OwnTable);
-        if (Table == 0 && ShapeMaterials.Num() > 0) Materials[Material + 1]->SetTextureParameterValue(TEXT("Added"), Added);
+        if (Table == 0 && Emitted != nullptr) Materials[Material + 1]->SetTextureParameterValue(TEXT("Added"), Added);
         Materials[Material]->SetTextureParameterValue(TEXT("Numbers"), Targets[Numbers]);
         Draw(Parts, Material);
         Materials[Material + 1]->SetTextureParameterValue(TEXT("Parts"), Targets[Parts]);

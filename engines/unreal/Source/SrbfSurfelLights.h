@@ -4,6 +4,8 @@
 
 #include "CoreMinimal.h"
 #include "Components/ActorComponent.h"
+#include <set>
+#include <string>
 #include "SrbfSurfels.h"
 #include "SrbfSurfelLights.generated.h"
 
@@ -57,7 +59,7 @@ public:
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
     TMap<FString, FLinearColor> Paint;
 
-    /** Energy times color is the radiance; energy 0 ends it. False, with a warning, where no object of that name changes. */
+    /** Energy times color is the radiance; energy 0 ends it. False, with one warning, where no object of that name changes. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
     bool SetEmission(const FString& Name, float Energy, FLinearColor Color);
 
@@ -88,13 +90,19 @@ private:
     TArray<UMaterialInstanceDynamic*> Materials;  // irradiance, means, then parts and sums of each table
 
     UPROPERTY(Transient)
-    TArray<UTextureRenderTarget2D*> ShapeTargets;
+    TArray<UTextureRenderTarget2D*> EnvironmentTargets;
 
     UPROPERTY(Transient)
-    TArray<UMaterialInstanceDynamic*> ShapeMaterials;  // none where the asset knows of neither an environment nor objects that change
+    TArray<UMaterialInstanceDynamic*> EnvironmentMaterials;  // none where no surfel sees an environment
 
     UPROPERTY(Transient)
-    UTexture2D* Emitted = nullptr;  // a row for every row of the first table
+    TArray<UTextureRenderTarget2D*> RepaintTargets;
+
+    UPROPERTY(Transient)
+    TArray<UMaterialInstanceDynamic*> RepaintMaterials;  // none until an object is repainted
+
+    UPROPERTY(Transient)
+    UTexture2D* Emitted = nullptr;  // a row for every row of the first table; null where the asset knows of neither an environment nor objects that change
 
     UPROPERTY(Transient)
     UTexture2D* Albedo = nullptr;
@@ -111,7 +119,8 @@ private:
     UTexture* LastEnvironment = nullptr;
     float LastEnergy = 0;
     std::vector<float> LastEmission, LastPaint;
-    bool bShapesDrawn = false, bPainted = false;
+    bool bShapesDrawn = false, bPainted = false, bRepaintingMade = false;
+    std::set<std::string> Warned;  // what the log has
 
     UPROPERTY(Transient)
     USceneCaptureComponent2D* Capture = nullptr;
@@ -119,12 +128,16 @@ private:
     UTextureRenderTarget2D* MakeTarget(int Width, int Height, bool bDepth);
     bool MakeMaterial(const FString& Name, TArray<UMaterialInstanceDynamic*>& Made);
     bool MakeShapes();
-    bool Changes(const FString& Name) const;
-    std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors) const;
+    bool MakeRepainting();
+    bool Changes(const FString& Name);
+    void Warn(const FString& Text);
+    std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors);
     bool DrawShapes();
     void DrawPaint(const std::vector<float>& Painted);
     void DrawSum();
-    void DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, UTexture* Addend, FLinearColor Numbers);
+    void DrawEnvironment();
+    void Multiply(int Target, UTexture* Left, UTexture* Right, UTexture* Addend);
+    void DrawProduct(UMaterialInstanceDynamic* Material, UTextureRenderTarget2D* Target, UTexture* Second, UTexture* Addend, FLinearColor Numbers);
     void DrawInto(UTextureRenderTarget2D* Target, UMaterialInstanceDynamic* Material);
     static UTexture2D* MakeNumbers(int Width, int Height);
     static void Upload(UTexture2D* Texture, const std::vector<float>& Texels);

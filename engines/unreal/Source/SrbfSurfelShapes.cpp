@@ -8,9 +8,10 @@
 
 namespace
 {
-constexpr int Radiances = 0, Lit = 1, Reflected = 2, Bounced = 3, Exchange = 4, Sums = 5, Powers = 7, Repainted = 9;  // of ShapeTargets; Sums and Powers: two each, drawn in turn
-constexpr int CellsOf = 0, EnvironmentOf = 1, ProductOf = 2, ExchangeOf = 3, RepaintedOf = 4;                         // of ShapeMaterials
-const TCHAR* const MaterialNames[] = {TEXT("SurfelCells"), TEXT("SurfelEnvironment"), TEXT("SurfelProduct"), TEXT("SurfelExchange"), TEXT("SurfelRepainted")};
+constexpr int Radiances = 0, Lit = 1;                                                         // of EnvironmentTargets
+constexpr int CellsOf = 0, EnvironmentOf = 1;                                                 // of EnvironmentMaterials
+constexpr int Reflected = 0, Bounced = 1, Exchange = 2, Sums = 3, Powers = 5, Repainted = 7;  // of RepaintTargets; Sums and Powers: two each, drawn in turn
+constexpr int ProductOf = 0, ExchangeOf = 1, RepaintedOf = 2;                                 // of RepaintMaterials
 
 FLinearColor Matrix(int Columns, double Scale, double Added) { return FLinearColor(float(Columns), float(Scale), float(Added), 0.0f); }
 
@@ -31,48 +32,54 @@ bool USrbfSurfelLights::SetAlbedo(const FString& Name, FLinearColor Color)
     return bKnown;
 }
 
-bool USrbfSurfelLights::Changes(const FString& Name) const
+bool USrbfSurfelLights::Changes(const FString& Name)
 {
     const bool bKnown = Known.Index(TCHAR_TO_UTF8(*Name)) >= 0;
-    if (!bKnown) UE_LOG(LogTemp, Warning, TEXT("expected an object of an asset fitted with --editable, found %s"), *Name);
+    if (!bKnown) Warn(FString::Printf(TEXT("expected an object of an asset fitted with --editable, found %s"), *Name));
     return bKnown;
+}
+
+/** Each text once, since it may be found in every tick. */
+void USrbfSurfelLights::Warn(const FString& Text)
+{
+    if (Warned.insert(TCHAR_TO_UTF8(*Text)).second) UE_LOG(LogTemp, Warning, TEXT("%s"), *Text);
 }
 
 bool USrbfSurfelLights::MakeShapes()
 {
-    const int Rows = Known.Tables[0].Rows, Objects = int(Known.Names.size());
-    for (int Name = 0; Name < 5; ++Name)
-    {
-        const bool bUsed = Name < ProductOf ? Known.Cells > 0 : Objects > 0;
-        if (bUsed && !MakeMaterial(MaterialNames[Name], ShapeMaterials)) return false;
-        if (!bUsed) ShapeMaterials.Add(nullptr);
-    }
-    const int Sizes[][2] = {{1, Known.Cells}, {1, Rows}, {1, Rows}, {1, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Rows, Rows}, {Known.Count, Rows}};
-    for (int Target = 0; Target < 10; ++Target)
-    {
-        const bool bUsed = Target <= Lit ? Known.Cells > 0 : Objects > 0;
-        ShapeTargets.Add(bUsed ? MakeTarget(Sizes[Target][0], Sizes[Target][1], false) : nullptr);
-    }
+    const int Rows = Known.Tables[0].Rows;
     Emitted = MakeNumbers(1, Rows);
-    if (Objects > 0)
-    {
-        Albedo = MakeNumbers(2, Known.Count);
-        One = MakeNumbers(Rows, Rows);
-        std::vector<float> Identity(size_t(4 * Rows * Rows), 0.0f);
-        for (size_t Row = 0; Row < size_t(Rows); ++Row)
-            for (size_t Channel = 0; Channel < 3; ++Channel) Identity[4 * Row * size_t(Rows + 1) + Channel] = 1.0f;
-        Upload(One, Identity);
-    }
+    if (Known.Cells == 0) return true;
+    for (const int Height : {Known.Cells, Rows}) EnvironmentTargets.Add(MakeTarget(1, Height, false));
+    return MakeMaterial(TEXT("SurfelCells"), EnvironmentMaterials) && MakeMaterial(TEXT("SurfelEnvironment"), EnvironmentMaterials);
+}
+
+/** At the first object that is repainted: the targets and the textures of the materials take much memory. */
+bool USrbfSurfelLights::MakeRepainting()
+{
+    if (bRepaintingMade) return RepaintTargets.Num() > 0;
+    bRepaintingMade = true;
+    for (const TCHAR* Name : {TEXT("SurfelProduct"), TEXT("SurfelExchange"), TEXT("SurfelRepainted")})
+        if (!MakeMaterial(Name, RepaintMaterials)) return false;
+    const int Rows = Known.Tables[0].Rows;
+    for (int Target = 0; Target < Repainted; ++Target) RepaintTargets.Add(MakeTarget(Target < Exchange ? 1 : Rows, Rows, false));
+    RepaintTargets.Add(MakeTarget(Known.Count, Rows, false));
+    Albedo = MakeNumbers(2, Known.Count);
+    One = MakeNumbers(Rows, Rows);
+    std::vector<float> Identity(size_t(4 * Rows * Rows), 0.0f);
+    for (size_t Row = 0; Row < size_t(Rows); ++Row)
+        for (size_t Channel = 0; Channel < 3; ++Channel) Identity[4 * Row * size_t(Rows + 1) + Channel] = 1.0f;
+    Upload(One, Identity);
     return true;
 }
 
-std::vector<float> USrbfSurfelLights::Listed(const TMap<FString, FLinearColor>& Colors) const
+std::vector<float> USrbfSurfelLights::Listed(const TMap<FString, FLinearColor>& Colors)
 {
     std::vector<float> Found(4 * Known.Names.size(), 0.0f);
     for (const TPair<FString, FLinearColor>& Entry : Colors)
     {
+        if (!Changes(Entry.Key)) continue;
         const int Object = Known.Index(TCHAR_TO_UTF8(*Entry.Key));
-        if (Object < 0) continue;
         const float Values[] = {Entry.Value.R, Entry.Value.G, Entry.Value.B, 1.0f};
         std::copy(Values, Values + 4, Found.begin() + 4 * Object);
     }
@@ -81,13 +88,9 @@ std::vector<float> USrbfSurfelLights::Listed(const TMap<FString, FLinearColor>& 
 
 bool USrbfSurfelLights::DrawShapes()
 {
-    if (Environment != LastEnvironment && Environment != nullptr && Known.Cells == 0)
-        UE_LOG(LogTemp, Warning, TEXT("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again"));
-    if (ShapeMaterials.Num() == 0)
-    {
-        LastEnvironment = Environment;
-        return false;
-    }
+    if (Environment != nullptr && Known.Cells == 0)
+        Warn(TEXT("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again"));
+    if (Emitted == nullptr) return false;
     const std::vector<float> Shining = Listed(Emission), Painted = Listed(Paint);
     const bool bNewPaint = Painted != LastPaint, bNewEnvironment = Environment != LastEnvironment || EnvironmentEnergy != LastEnergy;
     if (bShapesDrawn && Shining == LastEmission && !bNewPaint && !bNewEnvironment) return false;
@@ -104,24 +107,25 @@ bool USrbfSurfelLights::DrawShapes()
     Added = Emitted;
     if (bPainted)
     {
-        const int Rows = Known.Tables[0].Rows;
-        DrawProduct(ProductOf, Reflected, Series, Emitted, Emitted, Matrix(Rows, 1, 0));
-        DrawProduct(ProductOf, Bounced, ShapeTargets[Exchange], ShapeTargets[Reflected], Emitted, Matrix(Rows, 1, 1));
-        Added = ShapeTargets[Bounced];
+        Multiply(Reflected, Series, Emitted, nullptr);
+        Multiply(Bounced, RepaintTargets[Exchange], RepaintTargets[Reflected], Emitted);
+        Added = RepaintTargets[Bounced];
     }
-    if (Environment != nullptr && Known.Cells > 0)
-    {
-        if (bPainted) UE_LOG(LogTemp, Warning, TEXT("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo"));
-        UMaterialInstanceDynamic* Cells = ShapeMaterials[CellsOf];
-        Cells->SetTextureParameterValue(TEXT("Environment"), Environment);
-        Cells->SetVectorParameterValue(TEXT("Ahead"), Axis(Known.Direction(1, 0, 0), float(Known.Side)));
-        Cells->SetVectorParameterValue(TEXT("Left"), Axis(Known.Direction(0, -1, 0), 0));
-        Cells->SetVectorParameterValue(TEXT("Up"), Axis(Known.Direction(0, 0, 1), EnvironmentEnergy));
-        DrawInto(ShapeTargets[Radiances], Cells);
-        DrawProduct(EnvironmentOf, Lit, nullptr, ShapeTargets[Radiances], Added, Matrix(Known.Cells, Known.EnvironmentScale, 1));
-        Added = ShapeTargets[Lit];
-    }
+    if (Environment != nullptr && Known.Cells > 0) DrawEnvironment();
     return true;
+}
+
+void USrbfSurfelLights::DrawEnvironment()
+{
+    if (bPainted) Warn(TEXT("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo"));
+    UMaterialInstanceDynamic* Cells = EnvironmentMaterials[CellsOf];
+    Cells->SetTextureParameterValue(TEXT("Environment"), Environment);
+    Cells->SetVectorParameterValue(TEXT("Ahead"), Axis(Known.Direction(1, 0, 0), float(Known.Side)));
+    Cells->SetVectorParameterValue(TEXT("Left"), Axis(Known.Direction(0, -1, 0), 0));
+    Cells->SetVectorParameterValue(TEXT("Up"), Axis(Known.Direction(0, 0, 1), EnvironmentEnergy));
+    DrawInto(EnvironmentTargets[Radiances], Cells);
+    DrawProduct(EnvironmentMaterials[EnvironmentOf], EnvironmentTargets[Lit], EnvironmentTargets[Radiances], Added, Matrix(Known.Cells, Known.EnvironmentScale, 1));
+    Added = EnvironmentTargets[Lit];
 }
 
 /** The exchange of light, then the sum of its powers, then the table. */
@@ -129,50 +133,54 @@ void USrbfSurfelLights::DrawPaint(const std::vector<float>& Painted)
 {
     bPainted = false;
     for (size_t Object = 0; Object < Known.Names.size(); ++Object) bPainted = bPainted || (Painted[4 * Object + 3] > 0 && Known.Terms > 0);
+    bPainted = bPainted && MakeRepainting();
     if (!bPainted) return;
     const int Rows = Known.Tables[0].Rows;
     Upload(Albedo, Known.Repainted(Painted));
-    UMaterialInstanceDynamic* Material = ShapeMaterials[ExchangeOf];
+    UMaterialInstanceDynamic* Material = RepaintMaterials[ExchangeOf];
     Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Known.Count, Known.ExchangeScale, Known.FeedbackScale));
-    DrawInto(ShapeTargets[Exchange], Material);
+    DrawInto(RepaintTargets[Exchange], Material);
     DrawSum();
-    Material = ShapeMaterials[RepaintedOf];
+    Material = RepaintMaterials[RepaintedOf];
     Material->SetTextureParameterValue(TEXT("Series"), Series);
     Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Rows, Known.GatherScale, Known.Tables[0].Scale));
-    DrawInto(ShapeTargets[Repainted], Material);
-    RepaintedTable = ShapeTargets[Repainted];
+    DrawInto(RepaintTargets[Repainted], Material);
+    RepaintedTable = RepaintTargets[Repainted];
 }
 
 /** Powers of the exchange: of n terms 2n by sum + power sum, or n + 1 by one + exchange sum. Hundreds of terms take few passes. */
 void USrbfSurfelLights::DrawSum()
 {
-    const int Rows = Known.Tables[0].Rows;
     const std::vector<bool> Steps = Known.Doublings();
-    UTexture* Power = ShapeTargets[Exchange];
+    UTexture* Power = RepaintTargets[Exchange];
     Series = One;
     for (int Step = 0; Step < int(Steps.size()); ++Step)
     {
         const bool bDoubling = Steps[size_t(Step)];
-        UTexture* Left = bDoubling ? Power : ShapeTargets[Exchange];
-        DrawProduct(ProductOf, Sums + Step % 2, Left, Series, bDoubling ? Series : One, Matrix(Rows, 1, 1));
-        Series = ShapeTargets[Sums + Step % 2];
+        UTexture* Left = bDoubling ? Power : RepaintTargets[Exchange];
+        Multiply(Sums + Step % 2, Left, Series, bDoubling ? Series : One);
+        Series = RepaintTargets[Sums + Step % 2];
         if (Step + 1 == int(Steps.size())) break;
-        DrawProduct(ProductOf, Powers + Step % 2, Left, Power, One, Matrix(Rows, 1, 0));
-        Power = ShapeTargets[Powers + Step % 2];
+        Multiply(Powers + Step % 2, Left, Power, nullptr);
+        Power = RepaintTargets[Powers + Step % 2];
     }
 }
 
-/** `First` null: the material's own. */
-void USrbfSurfelLights::DrawProduct(int Material, int Target, UTexture* First, UTexture* Second, UTexture* Addend, FLinearColor Numbers)
+/** Into a target of RepaintTargets, a product of matrices of a row per row of the first table; `Addend` null: nothing is added. */
+void USrbfSurfelLights::Multiply(int Target, UTexture* Left, UTexture* Right, UTexture* Addend)
 {
-    UMaterialInstanceDynamic* Product = ShapeMaterials[Material];
-    if (First != nullptr) Product->SetTextureParameterValue(TEXT("First"), First);
-    Product->SetTextureParameterValue(TEXT("Second"), Second);
-    Product->SetTextureParameterValue(TEXT("Addend"), Addend);
-    Product->SetVectorParameterValue(TEXT("Matrix"), Numbers);
-    DrawInto(ShapeTargets[Target], Product);
+    RepaintMaterials[ProductOf]->SetTextureParameterValue(TEXT("First"), Left);
+    DrawProduct(RepaintMaterials[ProductOf], RepaintTargets[Target], Right, Addend != nullptr ? Addend : One, Matrix(Known.Tables[0].Rows, 1, Addend != nullptr ? 1 : 0));
+}
+
+void USrbfSurfelLights::DrawProduct(UMaterialInstanceDynamic* Material, UTextureRenderTarget2D* Target, UTexture* Second, UTexture* Addend, FLinearColor Numbers)
+{
+    Material->SetTextureParameterValue(TEXT("Second"), Second);
+    Material->SetTextureParameterValue(TEXT("Addend"), Addend);
+    Material->SetVectorParameterValue(TEXT("Matrix"), Numbers);
+    DrawInto(Target, Material);
 }
 
 UTexture2D* USrbfSurfelLights::MakeNumbers(int Width, int Height)
