@@ -101,10 +101,10 @@ void USrbfSurfelLights::TickComponent(float DeltaTime, ELevelTick TickType, FAct
     {
         const SrbfSurfelTable& Sizes = Known.Tables[Table];
         const int Parts = FirstTable + 2 * int(Table), Sums = Parts + 1, Material = FirstSum + 2 * int(Table);
-        const bool bRepainted = bPainted && Table == 0;
-        const FLinearColor Entries(float(Sizes.Rows), float(Sizes.Columns), float(Sizes.Blocks()), bRepainted ? 1.0f : float(Sizes.Scale));
+        const bool bOtherAlbedo = bRepainted && Table == 0;
+        const FLinearColor Entries(float(Sizes.Rows), float(Sizes.Columns), float(Sizes.Blocks()), bOtherAlbedo ? 1.0f : float(Sizes.Scale));
         for (int Pass = 0; Pass < 2; ++Pass) Materials[Material + Pass]->SetVectorParameterValue(TEXT("Entries"), Entries);
-        if (Table == 0) Materials[Material]->SetTextureParameterValue(TEXT("Table"), bRepainted ? RepaintedTable : OwnTable);
+        if (Table == 0) Materials[Material]->SetTextureParameterValue(TEXT("Table"), bOtherAlbedo ? RepaintedTable : OwnTable);
         if (Table == 0 && Emitted != nullptr) Materials[Material + 1]->SetTextureParameterValue(TEXT("Added"), Added);
         Materials[Material]->SetTextureParameterValue(TEXT("Numbers"), Targets[Numbers]);
         Draw(Parts, Material);

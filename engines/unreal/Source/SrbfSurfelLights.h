@@ -57,13 +57,13 @@ public:
     TMap<FString, FLinearColor> Emission;
 
     UPROPERTY(EditAnywhere, BlueprintReadWrite, Category = "Srbf")
-    TMap<FString, FLinearColor> Paint;
+    TMap<FString, FLinearColor> Albedo;
 
     /** Energy times color is the radiance; energy 0 ends it. False, with one warning, where no object of that name changes. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
     bool SetEmission(const FString& Name, float Energy, FLinearColor Color);
 
-    /** In the bounces alone: materials are yours. An object has its own albedo again when it is removed from Paint. */
+    /** In the bounces alone: materials are yours. An object has its own albedo again when it is removed from Albedo. */
     UFUNCTION(BlueprintCallable, Category = "Srbf")
     bool SetAlbedo(const FString& Name, FLinearColor Color);
 
@@ -105,7 +105,7 @@ private:
     UTexture2D* Emitted = nullptr;  // a row for every row of the first table; null where the asset knows of neither an environment nor objects that change
 
     UPROPERTY(Transient)
-    UTexture2D* Albedo = nullptr;
+    UTexture2D* AlbedoNumbers = nullptr;
 
     UPROPERTY(Transient)
     UTexture* OwnTable = nullptr;  // of the asset, from surfels to shapes
@@ -118,8 +118,8 @@ private:
     UTexture* RepaintedTable = nullptr;
     UTexture* LastEnvironment = nullptr;
     float LastEnergy = 0;
-    std::vector<float> LastEmission, LastPaint;
-    bool bShapesDrawn = false, bPainted = false, bRepaintingMade = false;
+    std::vector<float> LastEmission, LastAlbedo;
+    bool bShapesDrawn = false, bRepainted = false, bRepaintingMade = false;
     std::set<std::string> Warned;  // what the log has
 
     UPROPERTY(Transient)
@@ -133,7 +133,7 @@ private:
     void Warn(const FString& Text);
     std::vector<float> Listed(const TMap<FString, FLinearColor>& Colors);
     bool DrawShapes();
-    void DrawPaint(const std::vector<float>& Painted);
+    void Repaint(const std::vector<float>& Colors);
     void DrawSum();
     void DrawEnvironment();
     void Multiply(int Target, UTexture* Left, UTexture* Right, UTexture* Addend);

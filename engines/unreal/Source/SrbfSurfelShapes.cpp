@@ -28,7 +28,7 @@ bool USrbfSurfelLights::SetEmission(const FString& Name, float Energy, FLinearCo
 bool USrbfSurfelLights::SetAlbedo(const FString& Name, FLinearColor Color)
 {
     const bool bKnown = Changes(Name);
-    if (bKnown) Paint.FindOrAdd(Name) = Color;
+    if (bKnown) Albedo.FindOrAdd(Name) = Color;
     return bKnown;
 }
 
@@ -64,7 +64,7 @@ bool USrbfSurfelLights::MakeRepainting()
     const int Rows = Known.Tables[0].Rows;
     for (int Target = 0; Target < Repainted; ++Target) RepaintTargets.Add(MakeTarget(Target < Exchange ? 1 : Rows, Rows, false));
     RepaintTargets.Add(MakeTarget(Known.Count, Rows, false));
-    Albedo = MakeNumbers(2, Known.Count);
+    AlbedoNumbers = MakeNumbers(2, Known.Count);
     One = MakeNumbers(Rows, Rows);
     std::vector<float> Identity(size_t(4 * Rows * Rows), 0.0f);
     for (size_t Row = 0; Row < size_t(Rows); ++Row)
@@ -91,21 +91,21 @@ bool USrbfSurfelLights::DrawShapes()
     if (Environment != nullptr && Known.Cells == 0)
         Warn(TEXT("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again"));
     if (Emitted == nullptr) return false;
-    const std::vector<float> Shining = Listed(Emission), Painted = Listed(Paint);
-    const bool bNewPaint = Painted != LastPaint, bNewEnvironment = Environment != LastEnvironment || EnvironmentEnergy != LastEnergy;
-    if (bShapesDrawn && Shining == LastEmission && !bNewPaint && !bNewEnvironment) return false;
+    const std::vector<float> Emitters = Listed(Emission), Colors = Listed(Albedo);
+    const bool bNewAlbedo = Colors != LastAlbedo, bNewEnvironment = Environment != LastEnvironment || EnvironmentEnergy != LastEnergy;
+    if (bShapesDrawn && Emitters == LastEmission && !bNewAlbedo && !bNewEnvironment) return false;
     bShapesDrawn = true;
-    LastEmission = Shining;
-    LastPaint = Painted;
+    LastEmission = Emitters;
+    LastAlbedo = Colors;
     LastEnvironment = Environment;
     LastEnergy = EnvironmentEnergy;
-    if (bNewPaint) DrawPaint(Painted);
+    if (bNewAlbedo) Repaint(Colors);
     std::vector<float> Radiance;
-    for (size_t Value = 0; Value < Shining.size(); ++Value)
-        if (Value % 4 < 3) Radiance.push_back(Shining[Value]);
-    Upload(Emitted, Known.Emitted(Radiance, !bPainted));
+    for (size_t Value = 0; Value < Emitters.size(); ++Value)
+        if (Value % 4 < 3) Radiance.push_back(Emitters[Value]);
+    Upload(Emitted, Known.Emitted(Radiance, !bRepainted));
     Added = Emitted;
-    if (bPainted)
+    if (bRepainted)
     {
         Multiply(Reflected, Series, Emitted, nullptr);
         Multiply(Bounced, RepaintTargets[Exchange], RepaintTargets[Reflected], Emitted);
@@ -117,7 +117,7 @@ bool USrbfSurfelLights::DrawShapes()
 
 void USrbfSurfelLights::DrawEnvironment()
 {
-    if (bPainted) Warn(TEXT("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo"));
+    if (bRepainted) Warn(TEXT("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo"));
     UMaterialInstanceDynamic* Cells = EnvironmentMaterials[CellsOf];
     Cells->SetTextureParameterValue(TEXT("Environment"), Environment);
     Cells->SetVectorParameterValue(TEXT("Ahead"), Axis(Known.Direction(1, 0, 0), float(Known.Side)));
@@ -129,22 +129,22 @@ void USrbfSurfelLights::DrawEnvironment()
 }
 
 /** The exchange of light, then the sum of its powers, then the table. */
-void USrbfSurfelLights::DrawPaint(const std::vector<float>& Painted)
+void USrbfSurfelLights::Repaint(const std::vector<float>& Colors)
 {
-    bPainted = false;
-    for (size_t Object = 0; Object < Known.Names.size(); ++Object) bPainted = bPainted || (Painted[4 * Object + 3] > 0 && Known.Terms > 0);
-    bPainted = bPainted && MakeRepainting();
-    if (!bPainted) return;
+    bRepainted = false;
+    for (size_t Object = 0; Object < Known.Names.size(); ++Object) bRepainted = bRepainted || (Colors[4 * Object + 3] > 0 && Known.Terms > 0);
+    bRepainted = bRepainted && MakeRepainting();
+    if (!bRepainted) return;
     const int Rows = Known.Tables[0].Rows;
-    Upload(Albedo, Known.Repainted(Painted));
+    Upload(AlbedoNumbers, Known.Repainted(Colors));
     UMaterialInstanceDynamic* Material = RepaintMaterials[ExchangeOf];
-    Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
+    Material->SetTextureParameterValue(TEXT("Albedo"), AlbedoNumbers);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Known.Count, Known.ExchangeScale, Known.FeedbackScale));
     DrawInto(RepaintTargets[Exchange], Material);
     DrawSum();
     Material = RepaintMaterials[RepaintedOf];
     Material->SetTextureParameterValue(TEXT("Series"), Series);
-    Material->SetTextureParameterValue(TEXT("Albedo"), Albedo);
+    Material->SetTextureParameterValue(TEXT("Albedo"), AlbedoNumbers);
     Material->SetVectorParameterValue(TEXT("Matrix"), Matrix(Rows, Known.GatherScale, Known.Tables[0].Scale));
     DrawInto(RepaintTargets[Repainted], Material);
     RepaintedTable = RepaintTargets[Repainted];

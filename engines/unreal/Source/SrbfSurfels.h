@@ -93,7 +93,7 @@ public:
     }
 
     /// RGBA of every surfel: its albedo where objects have others, RGB and 1 of each, and that of the bake.
-    std::vector<float> Repainted(const std::vector<float>& Painted) const
+    std::vector<float> Repainted(const std::vector<float>& Colors) const
     {
         std::vector<float> Both(size_t(8 * Count), 0.0f);
         for (size_t Surfel = 0; Surfel < size_t(Count); ++Surfel)
@@ -102,7 +102,7 @@ public:
                 const float Own = Albedo[3 * Surfel + Channel];
                 float Now = Own;
                 for (size_t Object = 0; Object < Names.size(); ++Object)
-                    if (Painted[4 * Object + 3] > 0) Now += Shares[Object * size_t(Count) + Surfel] * (Limited(Painted[4 * Object + Channel]) - Own);
+                    if (Colors[4 * Object + 3] > 0) Now += Shares[Object * size_t(Count) + Surfel] * (Limited(Colors[4 * Object + Channel]) - Own);
                 Both[8 * Surfel + Channel] = Limited(Now);
                 Both[8 * Surfel + 4 + Channel] = Own;
             }

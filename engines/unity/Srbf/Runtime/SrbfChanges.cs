@@ -44,13 +44,13 @@ namespace Srbf
         }
 
         /// <summary>RGBA of every surfel: its albedo where objects have others, linear, and that of the bake.</summary>
-        public float[] Repainted(IList<KeyValuePair<string, Vector>> painted, string[] objects)
+        public float[] Repainted(IList<KeyValuePair<string, Vector>> colors, string[] objects)
         {
             int count = albedo.Length / 3;
             var values = new float[8 * count];
             for (int i = 0; i < count; i++)
                 for (int c = 0; c < 3; c++) values[8 * i + c] = values[8 * i + 4 + c] = albedo[3 * i + c];
-            foreach (KeyValuePair<string, Vector> entry in painted)
+            foreach (KeyValuePair<string, Vector> entry in colors)
             {
                 int found = Array.IndexOf(objects, entry.Key);
                 if (found < 0) throw new ArgumentException("expected an object that can be repainted, found " + entry.Key + "; there are " + string.Join(", ", objects));

@@ -50,7 +50,7 @@ namespace Srbf
         public List<SrbfNamedLight> emission = new List<SrbfNamedLight>();
 
         [Tooltip("Objects of an editable asset with another color, in the bounces alone; intensities do nothing.")]
-        public List<SrbfNamedLight> paint = new List<SrbfNamedLight>();
+        public List<SrbfNamedLight> albedo = new List<SrbfNamedLight>();
         [Tooltip("An equirectangular map, as Unity's panoramic skyboxes have it, that shines through the windows of a scene.")]
         public Texture environment;
         public float environmentIntensity = 1;
@@ -85,11 +85,11 @@ namespace Srbf
             found.color = color;
         }
 
-        /// <summary>Give an object of an editable asset another color, in the bounces alone; to end it, take the entry from `paint`.</summary>
+        /// <summary>Give an object of an editable asset another color, in the bounces alone; to end it, take the entry from `albedo`.</summary>
         public void SetAlbedo(string objectName, Color color)
         {
-            SrbfNamedLight found = paint.Find(entry => entry.name == objectName);
-            if (found == null) paint.Add(found = new SrbfNamedLight { name = objectName });
+            SrbfNamedLight found = albedo.Find(entry => entry.name == objectName);
+            if (found == null) albedo.Add(found = new SrbfNamedLight { name = objectName });
             found.color = color;
         }
 
@@ -197,20 +197,20 @@ namespace Srbf
             if (passes != null && (weighed != asset || passes.ShadowSize != shadowSize)) passes.Dispose();
             if (passes == null || passes.IsDisposed) passes = new SrbfSurfelPasses(asset, shadowSize);
             weighed = asset;
-            passes.Draw(looks, Shining());
+            passes.Draw(looks, Surroundings());
         }
 
         /// <summary>Objects that emit, those with other colors, and the environment; radiances in Blender's units, as ambient light is.</summary>
-        public SrbfShining Shining()
+        public SrbfSurroundings Surroundings()
         {
             Matrix4x4 assetFromUnity = AssetFromUnity();
             Vector3 x = assetFromUnity.MultiplyVector(Vector3.right).normalized, y = assetFromUnity.MultiplyVector(Vector3.up).normalized, z = assetFromUnity.MultiplyVector(Vector3.forward).normalized;
             if (environment != null && !asset.surfels.environment.Exists) Warn("expected an asset whose surfels see an environment, found one without; its scene is closed, or the asset is older: bake and fit again");
-            else if (environment != null && paint.Count > 0) Warn("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo");
-            return new SrbfShining
+            else if (environment != null && albedo.Count > 0) Warn("expected the albedo of the bake under an environment, found objects that are repainted; its bounces are those of their own albedo");
+            return new SrbfSurroundings
             {
                 Radiances = emission.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, InBlendersUnits(entry.color.linear * entry.intensity))),
-                Painted = paint.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, new Vector(entry.color.linear.r, entry.color.linear.g, entry.color.linear.b))),
+                Albedo = albedo.ConvertAll(entry => new KeyValuePair<string, Vector>(entry.name, new Vector(entry.color.linear.r, entry.color.linear.g, entry.color.linear.b))),
                 Environment = environment,
                 AtMiddle = new Vector4(x.x, x.y, x.z, 0),
                 AtLeft = new Vector4(z.x, z.y, z.z, 0),

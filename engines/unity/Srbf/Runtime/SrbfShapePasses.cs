@@ -6,17 +6,17 @@ using UnityEngine.Rendering;
 
 namespace Srbf
 {
-    /// <summary>What shines and how surfaces look, besides lights.</summary>
-    public struct SrbfShining
+    /// <summary>Objects that emit, objects with other albedo, and the environment.</summary>
+    public struct SrbfSurroundings
     {
-        public List<KeyValuePair<string, Vector>> Radiances;  // of objects
-        public List<KeyValuePair<string, Vector>> Painted;    // linear albedo of objects
+        public List<KeyValuePair<string, Vector>> Radiances;  // of objects that emit
+        public List<KeyValuePair<string, Vector>> Albedo;     // linear, of objects that have another than in the bake
         public Texture Environment;                           // null: none
         public Vector4 AtMiddle, AtLeft, AtRowZero;           // directions in the asset's frame; the last one's w: energy
 
-        public bool Equals(SrbfShining other)
+        public bool Equals(SrbfSurroundings other)
         {
-            return Radiances != null && SrbfSurfelPasses.Same(Radiances, other.Radiances) && SrbfSurfelPasses.Same(Painted, other.Painted) && Environment == other.Environment && !(Environment is RenderTexture)
+            return Radiances != null && SrbfSurfelPasses.Same(Radiances, other.Radiances) && SrbfSurfelPasses.Same(Albedo, other.Albedo) && Environment == other.Environment && !(Environment is RenderTexture)
                 && AtMiddle.Equals(other.AtMiddle) && AtLeft.Equals(other.AtLeft) && AtRowZero.Equals(other.AtRowZero);
         }
     }
@@ -37,7 +37,7 @@ namespace Srbf
         readonly RenderTexture[] sums = new RenderTexture[2], powers = new RenderTexture[2];  // drawn in turn
         RenderTexture exchange, table;
         Texture series;
-        List<KeyValuePair<string, Vector>> painted = new List<KeyValuePair<string, Vector>>();
+        List<KeyValuePair<string, Vector>> repainted = new List<KeyValuePair<string, Vector>>();
 
         public SrbfShapePasses(SrbfAsset asset, Material material)
         {
@@ -60,11 +60,11 @@ namespace Srbf
         public Texture Table { get; private set; }
 
         /// <summary>Add the passes for what has changed to a buffer.</summary>
-        public void Draw(CommandBuffer commands, SrbfShining now)
+        public void Draw(CommandBuffer commands, SrbfSurroundings now)
         {
             SrbfSurfels surfels = asset.surfels;
             SrbfChanges changes = surfels.changes;
-            if (!SrbfSurfelPasses.Same(now.Painted, painted)) Paint(commands, now.Painted);
+            if (!SrbfSurfelPasses.Same(now.Albedo, repainted)) Repaint(commands, now.Albedo);
             float[] weights = surfels.Emitted(now.Radiances, Table != null ? changes.first : surfels.emission);
             emitted.SetPixelData(weights, 0);
             emitted.Apply(false);
@@ -93,11 +93,11 @@ namespace Srbf
         }
 
         /// <summary>The exchange of light, then the sum of its powers, then the table.</summary>
-        void Paint(CommandBuffer commands, List<KeyValuePair<string, Vector>> now)
+        void Repaint(CommandBuffer commands, List<KeyValuePair<string, Vector>> now)
         {
             SrbfSurfels surfels = asset.surfels;
             SrbfChanges changes = surfels.changes;
-            painted = new List<KeyValuePair<string, Vector>>(now);
+            repainted = new List<KeyValuePair<string, Vector>>(now);
             Table = null;
             if (now.Count == 0) return;
             if (!changes.Exists) throw new ArgumentException("expected an asset whose surfaces can change, found one without; fit with --editable");

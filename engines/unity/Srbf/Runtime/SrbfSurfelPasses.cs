@@ -23,7 +23,7 @@ namespace Srbf
         readonly Texture2D nothing;
         readonly SrbfShapePasses shapes;
         readonly List<SrbfLook> known = new List<SrbfLook>();
-        SrbfShining shining;
+        SrbfSurroundings surroundings;
         bool drawn;
 
         public int ShadowSize { get; private set; }
@@ -67,9 +67,9 @@ namespace Srbf
         public RenderTexture Irradiance { get { return irradiance; } }
 
         /// <summary>Draw the weights, where a light or what shines besides is not as before.</summary>
-        public void Draw(List<SrbfLook> looks, SrbfShining now)
+        public void Draw(List<SrbfLook> looks, SrbfSurroundings now)
         {
-            if (drawn && Same(looks, known) && shining.Equals(now)) return;
+            if (drawn && Same(looks, known) && surroundings.Equals(now)) return;
             Keep(looks, known);
             buffer.Clear();
             buffer.SetRenderTarget(irradiance);
@@ -80,10 +80,10 @@ namespace Srbf
         }
 
         /// <summary>Add the passes from Irradiance to Weights to a buffer.</summary>
-        public void Finish(CommandBuffer commands, SrbfShining now)
+        public void Finish(CommandBuffer commands, SrbfSurroundings now)
         {
-            if (!drawn || !shining.Equals(now)) shapes.Draw(commands, now);
-            shining = now;
+            if (!drawn || !surroundings.Equals(now)) shapes.Draw(commands, now);
+            surroundings = now;
             drawn = true;
             commands.SetGlobalTexture("_SrbfNormals", asset.normals);
             commands.SetGlobalTexture("_SrbfRanges", asset.ranges);

@@ -80,7 +80,7 @@ namespace Srbf
         {
             if (rendered != view || passes == null) return;
             buffer.Clear();
-            passes.Finish(buffer, GetComponent<SrbfRelitRenderer>().Shining());
+            passes.Finish(buffer, GetComponent<SrbfRelitRenderer>().Surroundings());
             context.ExecuteCommandBuffer(buffer);
             context.Submit();
         }
