@@ -1,4 +1,4 @@
-"""Godot in its chroot, on both renderers."""
+"""Godot in its chroot, on both renderers; importing this module puts the checkout and the modules of its tests on the path."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), *(str(ROOT / "tests" / folder) for folder in ("export", "web", "viewer"))]
 
 RENDERERS = {
     "gl_compatibility": ["--rendering-method", "gl_compatibility", "--rendering-driver", "opengl3"],

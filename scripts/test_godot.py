@@ -17,24 +17,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import godot_renderers as godot
 import numpy as np
-from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
+from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform
+from made_assets import build_asset, build_planes
+from made_tables import KINDS, by_places, linear, made
 from numpy import ndarray
 
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
-
-from godot_lights import ASKEW, LIGHTS, MIX, RANGE, STRAIGHT, SUN, TIPPED, Z_UP, Lit, transform  # noqa: E402
-from made_assets import build_asset, build_planes  # noqa: E402
-from made_tables import KINDS, by_places, linear, made  # noqa: E402
-
-from srbf.asset import Asset  # noqa: E402
-from srbf.export.godot import write  # noqa: E402
-from srbf.export.settings import PLAIN, Settings  # noqa: E402
-from srbf.io.image import decode_srgb, encode_srgb  # noqa: E402
-from srbf.light_geometry import attenuation  # noqa: E402
-from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight  # noqa: E402
-from srbf.methods import in_asset_frame, relight  # noqa: E402
-from srbf.methods.over_lights import finish  # noqa: E402
+from srbf.asset import Asset
+from srbf.export.godot import write
+from srbf.export.settings import PLAIN, Settings
+from srbf.io.image import decode_srgb, encode_srgb
+from srbf.light_geometry import attenuation
+from srbf.lights import DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight
+from srbf.methods import in_asset_frame, relight
+from srbf.methods.over_lights import finish
 
 HALF_STEP = 2.0**-10  # of a value: targets are half floats, and a renderer may cut instead of rounding
 STEPS = {"canvas": 1, "spatial": 2, "white": 2}  # a 3D picture goes through a buffer of its own before the viewport's
@@ -182,7 +179,7 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
     write(made, folder, settings)
     asset = Asset.open(folder)  # blocks decoded
-    shutil.copy(ROOT / "tests" / "export" / "godot_compare.gd", folder)
+    shutil.copy(godot.ROOT / "tests" / "export" / "godot_compare.gd", folder)
     asked = list(jobs(asset))
     camera = np.array([[1, 0, 0, 0], [0, 0, 1, 5], [0, -1, 0, 0], [0, 0, 0, 1]], np.float64)  # looks down, north up
     written = [
@@ -200,10 +197,10 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
         for i, job in enumerate(asked)
     ]
     (folder / "jobs.json").write_text(json.dumps(written))
-    run(folder, chroot, "--headless", "--import")
+    godot.run(folder, chroot, "--headless", "--import")
     missed = 0
-    for renderer, arguments in RENDERERS.items():
-        run(folder, chroot, *arguments, "--script", "res://godot_compare.gd", display=True)
+    for renderer, arguments in godot.RENDERERS.items():
+        godot.run(folder, chroot, *arguments, "--script", "res://godot_compare.gd", display=True)
         for i, job in enumerate(asked):
             found = np.frombuffer((folder / f"{i}.raw").read_bytes(), np.float32).reshape(asset.height, asset.width, 4)[..., :3]
             wanted = held(white(asset, *LIGHTS[job["name"]]) if job["mode"] == "white" else expected(asset, job), job, renderer)
@@ -213,12 +210,12 @@ def compare(title: str, made: Asset, settings: Settings, chroot: Path, keep: boo
             missed += steps > 1
             target = "half" if job["hdr"] else "8 bit"
             verdict = "" if steps <= 1 else "  MISSED"
-            say(
+            godot.say(
                 f"{title:28}{renderer:18}{job['mode']:9}{target:7}{job['name']:13}"
                 f"{float(wanted.max()):7.2f}{float(error.max()):11.6f}{steps:7.2f}{verdict}"
             )
     if keep:
-        say(f"kept {folder}")
+        godot.say(f"kept {folder}")
     else:
         shutil.rmtree(folder)
     return missed
@@ -229,12 +226,12 @@ def main() -> None:
     parser.add_argument("--keep", action="store_true", help="leave the projects in the chroot's /tmp")
     parser.add_argument("--only", default="", metavar="WORD", help="only assets with this word in their title")
     arguments = parser.parse_args()
-    chroot = chroot_of_godot()
-    say(f"{'asset':28}{'renderer':18}{'mode':9}{'target':7}{'lights':13}{'largest':>7}{'error':>11}{'/ bound':>7}")
+    chroot = godot.chroot_of_godot()
+    godot.say(f"{'asset':28}{'renderer':18}{'mode':9}{'target':7}{'lights':13}{'largest':>7}{'error':>11}{'/ bound':>7}")
     missed = sum(compare(title, asset, settings, chroot, arguments.keep) for title, asset, settings in assets() if arguments.only in title)
     if missed:
         sys.exit(f"{missed} pictures differ from numpy's by more than the bound")
-    say("all within the bound")
+    godot.say("all within the bound")
 
 
 if __name__ == "__main__":

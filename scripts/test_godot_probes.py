@@ -16,19 +16,17 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import godot_renderers as godot
 import numpy as np
-from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
+from godot_lights import Z_UP, transform
+from godot_surfels import lights
+from probe_assets import probes_of_room, write_probes
 from test_godot_surfels import edge_of, read, relative
 
 from srbf.asset import Asset
 from srbf.export.godot import write
 from srbf.methods import relight
 from srbf.relighting.probe_light import harmonics, light_at
-
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), *(str(ROOT / "tests" / folder) for folder in ("export", "web", "viewer"))]
-from godot_lights import Z_UP, transform  # noqa: E402
-from godot_surfels import lights  # noqa: E402
-from probe_assets import probes_of_room, write_probes  # noqa: E402
 
 SIZE = (96, 64)  # pixels of a plane
 MOST_FACETS = 0.1  # of random tables, which add up the differences of shadow maps and rays
@@ -67,15 +65,15 @@ def compare(chroot: Path, keep: bool) -> int:
         asset = Asset.open(Path(scratch) / "asset")
     write(asset, folder)
     for script in ("godot_probes.gd", "godot_scene.gd"):
-        shutil.copy(ROOT / "tests" / "export" / script, folder)
+        shutil.copy(godot.ROOT / "tests" / "export" / script, folder)
     sets = lights(np.array([-1.2, 0.1, 1.2]), np.array([1.1, 0.7, 1.6]))
     jobs = [(name, across) for name in sets for across in PLANES]
     written = [{**plane(across)[2], "lights": [lit.node for lit in sets[name]], "output": f"{name}_{across}.raw"} for name, across in jobs]
     (folder / "jobs.json").write_text(json.dumps(written))
-    run(folder, chroot, "--headless", "--import")
+    godot.run(folder, chroot, "--headless", "--import")
     missed = 0
-    for renderer, arguments in RENDERERS.items():
-        run(folder, chroot, *arguments, "--script", "res://godot_probes.gd", display=True)
+    for renderer, arguments in godot.RENDERERS.items():
+        godot.run(folder, chroot, *arguments, "--script", "res://godot_probes.gd", display=True)
         for name, across in jobs:
             with edge_of(sets[name]):
                 wanted = relight(asset, [lit.light() for lit in sets[name]])
@@ -89,9 +87,9 @@ def compare(chroot: Path, keep: bool) -> int:
             errors = relative(facets, wanted), relative(found, mixed)
             missed += errors[0] > MOST_FACETS or errors[1] > MOST
             verdict = "" if errors[0] <= MOST_FACETS and errors[1] <= MOST else "  MISSED"
-            say(f"{renderer:18}{name:12}{across:8}{errors[0]:9.4f}{errors[1]:9.5f}{verdict}")
+            godot.say(f"{renderer:18}{name:12}{across:8}{errors[0]:9.4f}{errors[1]:9.5f}{verdict}")
     if keep:
-        say(f"kept {folder}")
+        godot.say(f"kept {folder}")
     else:
         shutil.rmtree(folder)
     return missed
@@ -101,10 +99,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--keep", action="store_true", help="leave the project in the chroot's /tmp")
     arguments = parser.parse_args()
-    say(f"{'renderer':18}{'lights':12}{'plane':8}{'facets':>9}{'light':>9}")
-    if missed := compare(chroot_of_godot(), arguments.keep):
+    godot.say(f"{'renderer':18}{'lights':12}{'plane':8}{'facets':>9}{'light':>9}")
+    if missed := compare(godot.chroot_of_godot(), arguments.keep):
         sys.exit(f"{missed} planes differ from numpy's by more than {MOST}, or their probes by more than {MOST_FACETS}")
-    say("all within the bound")
+    godot.say("all within the bound")
 
 
 if __name__ == "__main__":

@@ -18,8 +18,10 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import godot_renderers as godot
 import numpy as np
-from godot_renderers import RENDERERS, ROOT, chroot_of_godot, run, say
+from godot_lights import Lit
+from godot_surfels import Shown, assets
 from numpy import ndarray
 
 from srbf.asset import Asset
@@ -27,11 +29,8 @@ from srbf.export.godot import write
 from srbf.methods import in_asset_frame, relight
 from srbf.methods.kept_visibility import light_on_patches
 
-sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "tests" / "export")]
-from godot_lights import Lit  # noqa: E402
-from godot_surfels import Shown, assets  # noqa: E402
-
 MOST = 0.05  # of the picture: numpy sees each cell's middle by a ray, Godot its squares by shadow maps
+ALONE = 0.003  # of the picture without Godot's lights, whose passes differ from numpy by half floats: 0.0016 was measured
 
 
 def relative(found: ndarray, wanted: ndarray) -> float:
@@ -43,15 +42,15 @@ def compare(title: str, asset: Asset, lights: dict[str, Shown], parts: int, chro
     folder = Path(tempfile.mkdtemp(prefix="srbf-", dir=chroot / "tmp"))
     write(asset, folder)
     for script in ("godot_surfels.gd", "godot_scene.gd"):
-        shutil.copy(ROOT / "tests" / "export" / script, folder)
+        shutil.copy(godot.ROOT / "tests" / "export" / script, folder)
     jobs = [{**lights[name].job(), "parts": parts, "output": f"{name}.raw"} for name in lights]
     (folder / "jobs.json").write_text(json.dumps(jobs))
-    run(folder, chroot, "--headless", "--import")
+    godot.run(folder, chroot, "--headless", "--import")
     on_patches = light_on_patches(asset)
     areas = np.bincount(asset.tables["cells"][1, :, 3].round().astype(int), asset.tables["cells"][0, :, 3])[:, None]
     missed, none = 0, np.zeros((len(areas), 3))
-    for renderer, arguments in RENDERERS.items():
-        run(folder, chroot, *arguments, "--script", "res://godot_surfels.gd", display=True)
+    for renderer, arguments in godot.RENDERERS.items():
+        godot.run(folder, chroot, *arguments, "--script", "res://godot_surfels.gd", display=True)
         for name, shown in lights.items():
             with edge_of(shown.lights):
                 wanted = relight(*shown.meant(asset)) / np.pi
@@ -61,12 +60,13 @@ def compare(title: str, asset: Asset, lights: dict[str, Shown], parts: int, chro
             found = read(folder / f"{name}.raw")[: wanted.size // 3].reshape(wanted.shape)
             received = read(folder / f"received_{name}.raw")[: len(lit)]
             error = relative(found[asset.covered], wanted[asset.covered])
-            missed += error > MOST
+            most = MOST if shown.lights else ALONE
+            missed += error > most
             spread = relative(received * np.sqrt(areas), lit * np.sqrt(areas)) if lit.any() else float(np.abs(received).max())
-            verdict = "" if error <= MOST else "  MISSED"
-            say(f"{title:22}{renderer:18}{name:12}{spread:9.4f}{error:9.4f}{verdict}")
+            verdict = "" if error <= most else "  MISSED"
+            godot.say(f"{title:22}{renderer:18}{name:12}{spread:9.4f}{error:9.4f}{verdict}")
     if keep:
-        say(f"kept {folder}")
+        godot.say(f"kept {folder}")
     else:
         shutil.rmtree(folder)
     return missed
@@ -93,8 +93,8 @@ def main() -> None:
     parser.add_argument("--parts", type=int, default=2, help="pixels along each side of a surfel")
     parser.add_argument("--only", default="", metavar="WORD", help="only assets with this word in their title")
     arguments = parser.parse_args()
-    chroot = chroot_of_godot()
-    say(f"{'asset':22}{'renderer':18}{'lights':12}{'surfels':>9}{'picture':>9}")
+    chroot = godot.chroot_of_godot()
+    godot.say(f"{'asset':22}{'renderer':18}{'lights':12}{'surfels':>9}{'picture':>9}")
     with tempfile.TemporaryDirectory() as scratch:
         missed = sum(
             compare(title, asset, lights, arguments.parts, chroot, arguments.keep)
@@ -102,8 +102,8 @@ def main() -> None:
             if arguments.only in title
         )
     if missed:
-        sys.exit(f"{missed} pictures differ from numpy's by more than {MOST}")
-    say("all within the bound")
+        sys.exit(f"{missed} pictures differ from numpy's by more than {MOST}, or {ALONE} without lights")
+    godot.say("all within the bound")
 
 
 if __name__ == "__main__":

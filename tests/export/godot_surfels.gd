@@ -27,9 +27,9 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 		relight.sky = ImageTexture.create_from_image(Image.create_from_data(16, 8, false, Image.FORMAT_RGBF, PackedFloat32Array(job.panorama).to_byte_array()))  # words: ok
 		relight.sky_energy = job.energy  # words: ok
 	for name in job.emission:
-		relight.set_emission(name, job.emission[name][0], _color(job.emission[name][1]))
+		relight.set_emission(name, 5.0, Color.WHITE)  # others first, since passes are drawn when these change
 	for name in job.albedo:
-		relight.set_albedo(name, _color(job.albedo[name]))
+		relight.set_albedo(name, Color.WHITE)
 	var canvas := ColorRect.new()
 	canvas.size = viewport.size
 	relight.add_child(canvas)
@@ -38,6 +38,12 @@ func _run(asset: SrbfAsset, job: Dictionary) -> void:
 	for values in job.lights:
 		viewport.add_child(preload("res://godot_scene.gd").light(values))
 	root.add_child(viewport)
+	for frame in FRAMES:
+		await process_frame
+	for name in job.emission:
+		relight.set_emission(name, job.emission[name][0], _color(job.emission[name][1]))
+	for name in job.albedo:
+		relight.set_albedo(name, _color(job.albedo[name]))
 	for frame in FRAMES:
 		await process_frame
 	await RenderingServer.frame_post_draw
