@@ -1,16 +1,25 @@
-"""Passes of translated shaders, one after the other: programs of HLSL through SPIR-V, textures and targets of floats."""
+"""Passes of translated shaders, one after the other: programs of HLSL through SPIR-V, textures and targets of floats.
+
+And what the passes of Unity and Unreal share: sides of targets, axes of shadow maps, a light as a pass looks at it, sums of powers.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from pixels import corner_shader, shared_context
 
 from srbf.export import spirv
+from srbf.gl.uniforms import NO_CONE, versine
+from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
+
+PART = 64  # entries of a table that one texel adds up
 
 
 def doublings(terms: int) -> list[bool]:
@@ -25,6 +34,48 @@ def summed(product: Callable[[Any, Any, Any], Any], exchange: Any, one: Any, ter
         left = power if doubling else exchange
         total, power = product(left, total, total if doubling else one), product(left, power, None)
     return total
+
+
+@dataclass(frozen=True)
+class Look:
+    """A light in the asset's frame, less the middle of the cells: `place` is the direction to a distant one."""
+
+    distant: bool
+    place: tuple[float, ...]
+    color: tuple[float, ...]
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    shape: tuple[float, ...] = (1.0, 1e-4, *NO_CONE)  # a0, radius (m), 1 - cos of a spot's half-angles
+    squared: bool = True
+
+    @staticmethod
+    def of(light: Light, middle: np.ndarray) -> Look:
+        if isinstance(light, DirectionalLight):
+            return Look(True, light.direction, light.color)
+        assert isinstance(light, PointLight)
+        place, squared = tuple(np.array(light.position) - middle), light.falloff == "inverse-square"
+        cone, axis = NO_CONE, (0.0, 0.0, 1.0)
+        if isinstance(light, SpotLight):
+            cone, axis = (versine(light.inner), versine(light.outer)), light.direction
+        return Look(False, place, light.color, axis, (light.a0, light.radius, *cone), squared)
+
+
+def face_axes(face: int) -> list[np.ndarray]:
+    """Columns, rows and the way that a face of a cube looks."""
+    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
+    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
+
+
+def frame_of(toward: np.ndarray) -> list[np.ndarray]:
+    """Columns and rows of a distant light's map, and the way to the light."""
+    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
+    across /= np.linalg.norm(across)
+    return [across, np.cross(toward, across), toward]
+
+
+def square(count: int) -> tuple[int, int]:
+    """(width, height) of a texture of so many texels."""
+    width = max(1, math.ceil(math.sqrt(count)))
+    return width, -(-count // width)
 
 
 class Passes:
@@ -59,6 +110,16 @@ class Passes:
             made = self._context.texture((pixels.shape[1], pixels.shape[0]), pixels.shape[2], pixels, dtype="f4")
         made.filter = (self._context.NEAREST, self._context.NEAREST)
         return self.kept(made)
+
+    def target(self, width: int, height: int, channels: int = 4) -> Any:
+        return self.texture(np.zeros((height, width, channels)))
+
+    def column(self, numbers: np.ndarray) -> Any:
+        """One RGB texel in each row."""
+        return self.texture(np.pad(numbers[:, None], ((0, 0), (0, 0), (0, 1))))
+
+    def identity(self, rank: int) -> Any:
+        return self.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
 
     def draw(
         self,

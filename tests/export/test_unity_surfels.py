@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from closed_forms import glb
 from made_surfels import DOOR, LIGHTS, PANORAMA, RANK, WALL, irradiance_of, made_asset, recolored, residual, table_of, weights_of
-from passes import Passes, doublings
+from passes import Passes, doublings, face_axes, frame_of
 from test_unity import needs_mono, needs_spirv
-from unity_passes import Unity, face_axes, frame_of, shader_of
+from unity_passes import Unity, shader_of
 
 from srbf.asset import Asset
 from srbf.export import spirv, unity
@@ -83,15 +83,15 @@ def test_tables_give_numpys_weights(drawn: Unity, asset: Asset, folder: Path, to
     rays = np.zeros((shape[0] * shape[1], 4))
     rays[: len(order), :3] = np.sum([irradiance_of(asset, light) for light in lights], axis=0)[order]
     name, radiance = told["objects"][1], np.array([0.5, 2.0, 1.0])
-    added = drawn.column(read_image(folder / told["emission"])[1] * radiance)
+    added = drawn.passes.column(read_image(folder / told["emission"])[1] * radiance)
     found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), added)
     emitting = NamedLight(name, tuple(radiance))
     expected = weights_of(asset, [*lights, emitting])
     np.testing.assert_allclose(found, expected, atol=CLOSE * np.abs(expected).max())
     painted = {told["objects"][0]: (0.1, 0.6, 0.9)}
     exchange, series, table = drawn.repainted(recolored(asset, painted))
-    first = drawn.column(read_image(folder / told["changes"]["first"])[1] * radiance)
-    reflected = drawn.multiplied("product", (RANK, 1), series, first, RANK, 1, (drawn.target(1, 1), 0))
+    first = drawn.passes.column(read_image(folder / told["changes"]["first"])[1] * radiance)
+    reflected = drawn.multiplied("product", (RANK, 1), series, first, RANK, 1, (drawn.passes.target(1, 1), 0))
     bounced = drawn.multiplied("product", (RANK, 1), exchange, reflected, RANK, 1, (first, 1))
     found = drawn.weights(drawn.passes.texture(rays.reshape(*shape, 4)), bounced, table)
     after = weights_of(with_albedo(asset, painted), [*lights, emitting])
@@ -129,7 +129,7 @@ def test_c_sharp_doubles_as_often_as_the_bake_bounces(tmp_path: Path, ask: Calla
 def test_an_environment_adds_what_numpy_says(drawn: Unity, asset: Asset) -> None:
     """Of a map in Unity's layout, u = 1/2 - atan2(z, x) / 2 pi, whose rows start below; Unity's (x, y, z) is the asset's (-x, -z, y)."""
     axes = np.array([[-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)  # of Unity's x, z, -y
-    found = drawn.weights(drawn.irradiance([]), drawn.lit_by(PANORAMA[::-1], axes, 0.7, drawn.target(1, 1)))
+    found = drawn.weights(drawn.irradiance([]), drawn.lit_by(PANORAMA[::-1], axes, 0.7, drawn.passes.target(1, 1)))
     turned = np.roll(PANORAMA, PANORAMA.shape[1] // 2, axis=1)  # whose middle is at -x
     expected = weights_of(asset, [EnvironmentLight(turned.repeat(4, axis=0).repeat(4, axis=1), (0.7,) * 3)])
     assert np.linalg.norm(found - expected) < CELLS * np.linalg.norm(expected)

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from made_surfels import LIGHTS, PANORAMA, RANK, SIDE, irradiance_of, made_asset, recolored, residual, table_of, weights_of
 from made_tables import made
-from passes import Passes, doublings
+from passes import Passes, doublings, face_axes, frame_of, square
 from test_unreal_tables import component_compiles
-from unreal_passes import Unreal, face_axes, frame_of, node_of, square
+from unreal_passes import Unreal, node_of
 from unreal_stand_in import StandIn
 
 from srbf.asset import Asset
@@ -26,7 +26,7 @@ from srbf.export import spirv, surfel_textures, unreal
 from srbf.export.engine_folder import engine_root
 from srbf.export.surfel_textures import MOST_TERMS
 from srbf.export.unreal_surfels import NUMBERS
-from srbf.lights import DirectionalLight, EnvironmentLight, NamedLight, PointLight
+from srbf.lights import EnvironmentLight, NamedLight, PointLight
 from srbf.methods import in_asset_frame
 from srbf.methods.kept_visibility import add_visibility, by_depths, kept_visibility
 from srbf.methods.surface_changes import Surfaces, with_albedo
@@ -100,13 +100,13 @@ def test_an_environment_and_changed_surfaces_add_what_numpy_says(
     nothing = passes.texture(np.zeros((*drawn.made.places.shape[:2], 4)))
     axes = MOVED[:3, :3] / 1.25
     at = [(*axes @ [1, 0, 0], SIDE), (*axes @ [0, 1, 0], 0), (*axes @ [0, 0, 1], 0.7)]
-    found = drawn.weights(nothing, drawn.lit_by(PANORAMA, at, drawn.column(np.zeros((RANK, 3)))))
+    found = drawn.weights(nothing, drawn.lit_by(PANORAMA, at, passes.column(np.zeros((RANK, 3)))))
     fine = EnvironmentLight(PANORAMA.repeat(4, axis=0).repeat(4, axis=1), (0.7,) * 3)
     expected = weights_of(asset, list(in_asset_frame(asset, [fine])))
     assert np.linalg.norm(found - expected) < CELLS * np.linalg.norm(expected)
     surfaces = Surfaces.of(asset)
     light, painted = NamedLight("Screen", (0.5, 2.0, 1.0)), {"Walls": (0.1, 0.6, 0.9)}
-    first = drawn.column(surfaces.emission[:, 1] * light.color)
+    first = passes.column(surfaces.emission[:, 1] * light.color)
     exchange, series, table = drawn.repainted(recolored(asset, painted))
     assert np.abs(residual(passes.read(exchange), passes.read(series))).max() < SOLVED
     images = {"First": series, "Second": first, "Addend": first}
@@ -187,7 +187,7 @@ def test_c_plus_plus_takes_lights_into_the_assets_frame(assets: dict[str, Asset]
     world = np.linalg.inv(MOVED) @ [*made_.middle, 1]
     np.testing.assert_allclose(said["middle"][0], world[:3] * [100, -100, 100])
     np.testing.assert_array_equal(said["face"].reshape(6, 3, 3), [face_axes(face) for face in range(6)])
-    across, up, toward = frame_of(DirectionalLight((0.48, -0.6, 0.64)))
+    across, up, toward = frame_of(np.array([0.48, -0.6, 0.64]))
     np.testing.assert_allclose(said["frame"], [across, up, -toward], atol=1e-12)
     assert said["square"].tolist() == [list(square(90))]
     np.testing.assert_allclose(said["versine"], [[1 - math.cos(0.3)]])

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from passes import Passes, summed
+from passes import PART, Look, Passes, face_axes, frame_of, square, summed
 
 from srbf.asset import Asset
-from srbf.gl.uniforms import NO_CONE, versine
 from srbf.io.image import read_image
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
+from srbf.lights import DirectionalLight, Light
 
 SHADOWS = 256  # texels of a face
 
@@ -39,11 +37,8 @@ class Unity:
         files_of = {name: read_image(folder / told[name]) for name in ("places", "normals", "ranges", "corners")}
         self.images = {f"_Srbf{name.capitalize()}": passes.texture(pixels) for name, pixels in files_of.items()}
 
-    def target(self, height: int, width: int, channels: int = 4) -> Any:
-        return self.passes.texture(np.zeros((height, width, channels)))
-
     def irradiance(self, lights: list[Light]) -> Any:
-        sum_ = self.target(*read_image(self.folder / self.told["places"]).shape[:2])
+        sum_ = self.passes.target(*self.images["_SrbfPlaces"].size)
         for light in lights:
             distant = isinstance(light, DirectionalLight)
             size = 4 * SHADOWS if distant else SHADOWS
@@ -52,7 +47,7 @@ class Unity:
             for face in range(1 if distant else 6):
                 axes = frame_of(np.array(light.direction)) if isinstance(light, DirectionalLight) else face_axes(face)
                 values |= {f"_Srbf{name}": (*axis, 0) for name, axis in zip(("Across", "Up", "Ahead"), axes, strict=True)}
-                slices.append(self.target(size, size, 1))
+                slices.append(self.passes.target(size, size, 1))
                 program = self.programs["onMap" if distant else "onCube"]
                 self.passes.draw(program, slices[-1], self.images, values, 3 * self.told["triangles"], "max")
             nearness = self.passes.texture(np.stack([self.passes.read(face) for face in slices]))
@@ -62,49 +57,41 @@ class Unity:
         return sum_
 
     def values(self, light: Light) -> dict[str, Any]:
-        common = {"_SrbfReach": [self.told["reach"]], "_SrbfLift": [self.told["lift"]], "_SrbfLightColor": (*light.color, 0)}  # type: ignore[union-attr]
-        if isinstance(light, DirectionalLight):
-            return common | {"_SrbfLightPlace": (*light.direction, 0), "_SrbfLightAxis": (0, 0, 1, 1), "_SrbfLightShape": (1, 1, 3, 4)}
-        assert isinstance(light, PointLight)
-        spot = isinstance(light, SpotLight)
-        cone = (versine(light.inner), versine(light.outer)) if isinstance(light, SpotLight) else NO_CONE
-        place = np.array(light.position) - self.told["middle"]
-        axis = light.direction if isinstance(light, SpotLight) else (0, 0, 1)
-        assert spot or cone == NO_CONE
-        return common | {
-            "_SrbfLightPlace": (*place, 0),
-            "_SrbfLightAxis": (*axis, float(light.falloff == "inverse-square")),
-            "_SrbfLightShape": (light.a0, light.radius, *cone),
+        look = Look.of(light, np.array(self.told["middle"]))
+        return {
+            "_SrbfReach": [self.told["reach"]],
+            "_SrbfLift": [self.told["lift"]],
+            "_SrbfLightPlace": (*look.place, 0),
+            "_SrbfLightColor": (*look.color, 0),
+            "_SrbfLightAxis": (*look.axis, float(look.squared)),
+            "_SrbfLightShape": look.shape,
         }
 
     def weights(self, irradiance: Any, added: Any = None, repainted: Any = None) -> np.ndarray:
         """`added`: a texture of a row per row of the first table; `repainted`: that table with other albedo."""
-        numbers = self.target(*read_image(self.folder / self.told["ranges"]).shape[:2])
+        numbers = self.passes.target(*self.images["_SrbfRanges"].size)
         self.passes.draw(self.programs["means"], numbers, self.images | {"_SrbfIrradiance": irradiance}, {})
         for i, table in enumerate(self.told["tables"]):
             rows, columns = table["rows"], table["columns"]
-            blocks = -(-columns // 64)
+            blocks = -(-columns // PART)
             last = i == len(self.told["tables"]) - 1
-            side = math.ceil(math.sqrt(rows))
-            shape = (self.asset.clusters, self.asset.components + 1) if last else (-(-rows // side), side)
-            width = math.ceil(math.sqrt(rows * blocks))
-            parts, target = self.target(-(-rows * blocks // width), width), self.target(*shape)
+            shape = (self.asset.components + 1, self.asset.clusters) if last else square(rows)
+            parts, target = self.passes.target(*square(rows * blocks)), self.passes.target(*shape)
             values = {"_SrbfTable": (rows, columns, blocks, table["channels"] == 1), "_SrbfScale": [table["scale"]]}
             entries = self.passes.texture(read_image(self.folder / table["file"]))
             if repainted is not None and i == 0:
                 entries, values["_SrbfScale"] = repainted, [1]
             self.passes.draw(
-                self.programs["parts"], parts, {"_SrbfEntries": entries, "_SrbfNumbers": numbers}, values | {"_SrbfTargetWidth": [width]}
+                self.programs["parts"],
+                parts,
+                {"_SrbfEntries": entries, "_SrbfNumbers": numbers},
+                values | {"_SrbfTargetWidth": [parts.size[0]]},
             )
-            more = added if added is not None and i == 0 else self.target(1, 1)
+            more = added if added is not None and i == 0 else self.passes.target(1, 1)
             images = {"_SrbfParts": parts, "_SrbfAdded": more}
-            self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[1]]})
+            self.passes.draw(self.programs["sums"], target, images, values | {"_SrbfTargetWidth": [shape[0]]})
             numbers = target
         return self.passes.read(numbers)[..., :3]
-
-    def column(self, weights: np.ndarray) -> Any:
-        """One texel in each row."""
-        return self.passes.texture(np.pad(weights[:, None], ((0, 0), (0, 0), (0, 1))))
 
     def multiplied(
         self,
@@ -118,7 +105,7 @@ class Unity:
         images: dict[str, Any] | None = None,
     ) -> Any:
         """`addend`: a texture and its scale."""
-        made = self.target(*shape)
+        made = self.passes.target(*shape[::-1])
         images = {"_SrbfLeft": left, "_SrbfRight": right, "_SrbfAddend": addend[0], **(images or {})}
         self.passes.draw(self.programs[name], made, images, {"_SrbfMatrix": (count, scale, addend[1], 1)})
         return made
@@ -128,7 +115,7 @@ class Unity:
         told = self.told["environment"]
         images = {"_SrbfCells": read_image(self.folder / self.told["cells"]), "_SrbfEnvironment": panorama}
         values = {"_SrbfAtMiddle": (*axes[0], told["side"]), "_SrbfAtLeft": (*axes[1], 0), "_SrbfAtRowZero": (*axes[2], energy)}
-        radiances = self.target(told["columns"], 1)
+        radiances = self.passes.target(1, told["columns"])
         self.passes.draw(self.programs["cells"], radiances, {name: self.passes.texture(pixels) for name, pixels in images.items()}, values)
         rows = self.told["tables"][0]["rows"]
         table = self.passes.texture(read_image(self.folder / told["file"]))
@@ -142,7 +129,7 @@ class Unity:
         images = {"_SrbfAlbedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1)))), "_SrbfEntries": matrix["gather"]}
         addend, scale = (matrix["feedback"], told["feedback"]["scale"]), told["gather"]["scale"] * told["sent"]["scale"]
         exchange = self.multiplied("exchange", (rank, rank), matrix["gather"], matrix["sent"], count, scale, addend, images)
-        one = self.passes.texture(np.repeat(np.eye(rank)[..., None], 4, axis=2))
+        one = self.passes.identity(rank)
 
         def product(left: Any, right: Any, addend: Any) -> Any:
             return self.multiplied("product", (rank, rank), left, right, rank, 1, (one, 0) if addend is None else (addend, 1))
@@ -154,15 +141,3 @@ class Unity:
         )
         changed = self.multiplied("repainted", (rank, count), before, series, rank, told["gather"]["scale"], (own, table["scale"]), images)
         return exchange, series, changed
-
-
-def face_axes(face: int) -> list[np.ndarray]:
-    """Columns, rows and the way that a face of a cube looks."""
-    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
-    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
-
-
-def frame_of(toward: np.ndarray) -> list[np.ndarray]:
-    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
-    across /= np.linalg.norm(across)
-    return [across, np.cross(toward, across), toward]

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 from made_surfels import RANK
-from passes import Passes, summed
+from passes import PART, Look, Passes, face_axes, frame_of, square, summed
 
 from srbf.asset import Asset
 from srbf.export import surfel_textures
-from srbf.gl.uniforms import NO_CONE, versine
 from srbf.io.image import read_image
-from srbf.lights import DirectionalLight, Light, PointLight, SpotLight
+from srbf.lights import DirectionalLight, Light, PointLight
 from srbf.methods.kept_visibility import kept_visibility
 from srbf.methods.surface_changes import Surfaces
 from srbf.visibility.cloud_lights import CloudLights
@@ -41,7 +40,7 @@ float4 main(float4 at : SV_Position) : SV_Target {
 
 
 def node_of(folder: Path) -> dict[str, Any]:
-    return json.loads((folder / "node.json").read_text())["surfels"]  # type: ignore[no-any-return]
+    return dict(json.loads((folder / "node.json").read_text())["surfels"])
 
 
 def shader_of(folder: Path, told: dict[str, Any], include: str) -> str:
@@ -80,16 +79,16 @@ class Unreal:
         self.passes.draw(self.programs[name], target, given, numbers)
 
     def irradiance(self, lights: list[Light], faces: bool) -> Any:
-        shape = self.made.places.shape[:2]
-        target = self.passes.texture(np.zeros((*shape, 4)))
+        height, width = self.made.places.shape[:2]
+        target = self.passes.target(width, height)
         for light in lights:
-            former, target = target, self.passes.texture(np.zeros((*shape, 4)))
+            former, target = target, self.passes.target(width, height)
             images = {"Former": former}
             values = self.values(light)
             if faces:
                 space = (self.made.lift, self.made.reach, 0.01 * 1.25, 0)
                 images |= {f"Face{i}": self.passes.texture(depths) for i, depths in enumerate(self.captured(light))}
-                across, up, _ = frame_of(light) if isinstance(light, DirectionalLight) else np.eye(3)
+                across, up, _ = frame_of(np.array(light.direction)) if isinstance(light, DirectionalLight) else np.eye(3)
                 values |= {"Across": (*across, 0), "Up": (*up, 0)}
             else:
                 kept = kept_visibility(self.asset, "surfel_visibility", Cells.of_image(self.asset.tables["cells"]).normals)
@@ -98,19 +97,14 @@ class Unreal:
         return target
 
     def values(self, light: Light) -> dict[str, Any]:
-        if isinstance(light, DirectionalLight):
-            return {"Light": (*light.direction, 1), "Color": (*light.color, 0), "Axis": (0, 0, 1, 0), "Shape": (1, 1e-4, *NO_CONE)}
-        assert isinstance(light, PointLight)
-        cone = (versine(light.inner), versine(light.outer)) if isinstance(light, SpotLight) else NO_CONE
-        axis = light.direction if isinstance(light, SpotLight) else (0, 0, 1)
-        place = np.array(light.position) - self.made.middle
-        return {"Light": (*place, 0), "Color": (*light.color, 0), "Axis": (*axis, 0), "Shape": (light.a0, light.radius, *cone)}
+        look = Look.of(light, self.made.middle)
+        return {"Light": (*look.place, float(look.distant)), "Color": (*look.color, 0), "Axis": (*look.axis, 0), "Shape": look.shape}
 
     def captured(self, light: Light) -> list[np.ndarray]:
         """Depths of captures, in Unreal's units, by rays: a camera's columns run to its right, its rows downwards."""
         occluders = CloudLights.of_asset(self.asset).occluders
         if isinstance(light, DirectionalLight):
-            _, rows, toward = frame_of(light)
+            _, rows, toward = frame_of(np.array(light.direction))
             views = [(self.made.middle + 2 * self.made.reach * toward, rows, -toward)]
         else:
             assert isinstance(light, PointLight)
@@ -130,29 +124,26 @@ class Unreal:
 
     def weights(self, irradiance: Any, added: Any = None, repainted: Any = None) -> np.ndarray:
         """`added`: a row per row of the first table; `repainted`: that table with other albedo."""
-        added = self.column(np.zeros((RANK, 3))) if added is None else added
-        numbers = self.passes.texture(np.zeros((*self.made.ranges.shape[:2], 4)))
+        added = self.passes.target(1, RANK) if added is None else added
+        numbers = self.passes.target(*self.made.ranges.shape[1::-1])
         self.draw("SurfelMeans", numbers, {"Irradiance": irradiance}, {})
         tables = [self.asset.manifest[name]["scale"] for name in ("surfel_transfer", "light_values")]
         for i, name in enumerate(("surfel_transfer", "light_values")):
             rows, columns = self.asset.tables[name].shape[:2]
-            blocks = max(1, -(-columns // 64))
+            blocks = -(-columns // PART)
             values = {"Entries": (rows, columns, blocks, tables[i])}
-            parts, sums = square(rows * blocks), square(rows) if i == 0 else (self.asset.components + 1, self.asset.clusters)
-            target = self.passes.texture(np.zeros((*parts[::-1], 4)))
+            sums = square(rows) if i == 0 else (self.asset.components + 1, self.asset.clusters)
+            target = self.passes.target(*square(rows * blocks))
             if repainted is not None and i == 0:
                 self.draw("SurfelParts0", target, {"Numbers": numbers, "Table": repainted}, {"Entries": (rows, columns, blocks, 1)})
             else:
                 self.draw(f"SurfelParts{i}", target, {"Numbers": numbers}, values)
-            numbers = self.passes.texture(np.zeros((*sums[::-1], 4)))
+            numbers = self.passes.target(*sums)
             self.draw(f"SurfelSums{i}", numbers, {"Parts": target, **({"Added": added} if i == 0 else {})}, values)
         return self.passes.read(numbers)[..., :3]
 
-    def column(self, weights: np.ndarray) -> Any:
-        return self.passes.texture(np.pad(weights[:, None], ((0, 0), (0, 0), (0, 1))))
-
     def made_by(self, name: str, width: int, height: int, images: dict[str, Any], **values: Any) -> Any:
-        target = self.passes.texture(np.zeros((height, width, 4)))
+        target = self.passes.target(width, height)
         self.draw(name, target, images, values)
         return target
 
@@ -169,7 +160,7 @@ class Unreal:
         images = {"Albedo": self.passes.texture(np.pad(albedo, ((0, 0), (0, 0), (0, 1))))}
         scale, feedback = scales["surface_gather"] * scales["surface_sent"], scales["surface_feedback"]
         exchange = self.made_by("SurfelExchange", RANK, RANK, images, Matrix=(count, scale, feedback, 0))
-        one = self.passes.texture(np.repeat(np.eye(RANK)[..., None], 4, axis=2))
+        one = self.passes.identity(RANK)
 
         def product(left: Any, right: Any, addend: Any) -> Any:
             own = {"First": left, "Second": right, "Addend": one if addend is None else addend}
@@ -178,23 +169,6 @@ class Unreal:
         series = summed(product, exchange, one, surfel_textures.terms_of(Surfaces.of(self.asset)))
         matrix = (RANK, scales["surface_gather"], self.asset.manifest["surfel_transfer"]["scale"], 0)
         return exchange, series, self.made_by("SurfelRepainted", count, RANK, images | {"Series": series}, Matrix=matrix)
-
-
-def square(count: int) -> tuple[int, int]:
-    width = math.ceil(math.sqrt(count))
-    return width, -(-count // width)
-
-
-def face_axes(face: int) -> list[np.ndarray]:
-    axes = np.roll(np.eye(3), -(face // 2) - 1, axis=0)
-    return [axes[0], axes[1], axes[2] * (1 - 2 * (face % 2))]
-
-
-def frame_of(light: DirectionalLight) -> list[np.ndarray]:
-    toward = np.array(light.direction)
-    across = np.cross([0, 0, 1] if abs(toward[2]) < 0.9 else [1, 0, 0], toward)
-    across /= np.linalg.norm(across)
-    return [across, np.cross(toward, across), toward]
 
 
 def depth_along(occluders: EmbreeTriangles, start: np.ndarray, ray: np.ndarray) -> np.ndarray:
