@@ -18,6 +18,7 @@ import type { N } from "./nodes";
 import { OccluderNodes } from "./occluder_nodes";
 import { disposeOf, type Pass, pass, render } from "./passes";
 import { type Stage, TableCompute } from "./table_compute";
+import { entryProduct, folded } from "./table_nodes";
 import { type CellTextures, irradianceNode, lookUniforms, seenFromFar, seenFromPlace, type Visibility } from "./surfel_irradiance";
 
 const { float, Fn, int, ivec2, min, screenCoordinate, textureLoad, vec3, vec4 } = tsl as Record<string, N>;
@@ -178,7 +179,6 @@ function tablePasses(stages: readonly Stage[], received: RenderTarget): Pass[] {
 }
 
 const here = (): N => ivec2(screenCoordinate);
-const folded = (index: N, width: number): N => ivec2(index.mod(width), index.div(width));
 
 /** `surfel_means.glsl`. */
 function meanNode(irradiance: Texture, normals: Texture, ranges: Texture, width: number): N {
@@ -195,7 +195,8 @@ function meanNode(irradiance: Texture, normals: Texture, ranges: Texture, width:
 }
 
 /** `table_sums.glsl`. */
-function partNode({ functions, count, gray }: LightValues, table: DataTexture, scale: number, numbers: RenderTarget, blocks: number, width: number): N {
+function partNode(values: LightValues, table: DataTexture, scale: number, numbers: RenderTarget, blocks: number, width: number): N {
+  const { functions, count } = values;
   return Fn(() => {
     const at = here().toVar();
     const index = at.y.mul(width).add(at.x).toVar();
@@ -206,8 +207,7 @@ function partNode({ functions, count, gray }: LightValues, table: DataTexture, s
     const total = vec3(0).toVar();
     each(most.toVar(), "i", (i) => {
       const column = first.add(i).toVar();
-      const entry = textureLoad(table, folded(row.mul(count).add(column), (table.image as { width: number }).width));
-      total.addAssign((gray ? vec3(entry.r) : entry.rgb).mul(textureLoad(numbers.texture, folded(column, numbers.width)).rgb));
+      total.addAssign(entryProduct(values, table, numbers, row, column));
     });
     return vec4(total.mul(float(scale)), 1);
   })();

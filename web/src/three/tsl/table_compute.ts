@@ -6,8 +6,9 @@ import { SrbfError } from "../../errors";
 import type { LightValues } from "../../light_values";
 import { each } from "./inputs";
 import type { N } from "./nodes";
+import { entryProduct, folded, type Numbers } from "./table_nodes";
 
-const { Fn, If, int, invocationLocalIndex, ivec2, textureLoad, textureStore, uvec2, vec3, vec4, workgroupArray, workgroupBarrier, workgroupId } = tsl as Record<string, N>;
+const { Fn, If, int, invocationLocalIndex, textureLoad, textureStore, uvec2, vec3, vec4, workgroupArray, workgroupBarrier, workgroupId } = tsl as Record<string, N>;
 
 const THREADS = 64; // of a workgroup, which share a row
 
@@ -32,7 +33,7 @@ export class TableCompute {
 
   /** `received`: the mean irradiance on patches, row by row. */
   constructor(stages: readonly Stage[], received: RenderTarget) {
-    let numbers: { texture: Texture; width: number } = received;
+    let numbers: Numbers = received;
     for (const stage of stages) {
       const made = storage(stage.width, stage.height);
       this.kernels.push({ node: rowsNode(stage, numbers, made).computeKernel([THREADS]), rows: stage.values.functions, made });
@@ -60,9 +61,8 @@ export class TableCompute {
 }
 
 /** Every thread adds up each 64th entry of its row; then halves of the threads' sums are added to the others, again and again. */
-function rowsNode({ values, texture, scale, added, width }: Stage, numbers: { texture: Texture; width: number }, made: StorageTexture): N {
-  const { count, gray } = values;
-  const tableWidth = (texture.image as { width: number }).width;
+function rowsNode({ values, texture, scale, added, width }: Stage, numbers: Numbers, made: StorageTexture): N {
+  const { count } = values;
   return Fn(() => {
     const sums = workgroupArray("vec3", THREADS);
     const row = int(workgroupId.x).toVar();
@@ -70,8 +70,7 @@ function rowsNode({ values, texture, scale, added, width }: Stage, numbers: { te
     const total = vec3(0).toVar();
     each(int(count + THREADS - 1).sub(thread).div(THREADS).toVar(), "i", (i) => {
       const column = i.mul(THREADS).add(thread).toVar();
-      const entry = textureLoad(texture, folded(row.mul(count).add(column), tableWidth));
-      total.addAssign((gray ? vec3(entry.r) : entry.rgb).mul(textureLoad(numbers.texture, folded(column, numbers.width)).rgb));
+      total.addAssign(entryProduct(values, texture, numbers, row, column));
     });
     sums.element(thread).assign(total);
     workgroupBarrier();
@@ -85,8 +84,6 @@ function rowsNode({ values, texture, scale, added, width }: Stage, numbers: { te
     });
   })();
 }
-
-const folded = (index: N, width: number): N => ivec2(index.mod(width), index.div(width));
 
 function storage(width: number, height: number): StorageTexture {
   const made = new StorageTexture(width, height);
