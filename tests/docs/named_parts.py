@@ -9,6 +9,7 @@ import runpy
 import shutil
 import sys
 import tomllib
+from pathlib import Path
 
 import pytest
 from classes import variants
@@ -84,6 +85,9 @@ def _python(words: list[str], command: Command) -> str | None:
         patch.setattr(argparse.ArgumentParser, "parse_args", parse_alone)
         patch.setattr(sys, "argv", [str(script), *words[1:]])
         patch.setattr(sys, "path", [str(script.parent), *sys.path])
+        for name, module in list(sys.modules.items()):  # the script's neighbors, loaded by another script, as in a new process
+            if Path(getattr(module, "__file__", None) or "").parent == script.parent:
+                patch.delitem(sys.modules, name)
         try:
             runpy.run_path(str(script), run_name="__main__")
         except Accepted:
