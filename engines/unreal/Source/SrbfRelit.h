@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A component that makes the weights of named lights, or of a light cloud, once a frame, and hands them to an actor's materials.
+// A component that computes the weights of named lights, or of a light cloud, once per frame, and sets them in an actor's materials.
 #pragma once
 
 #include "CoreMinimal.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A component that lights surfels by the level's lights, in materials drawn into render targets, and hands the weights to an actor's materials.
+// A component that lights surfels by the level's lights, in materials drawn into render targets, and sets the weights in an actor's materials.
 #pragma once
 
 #include "CoreMinimal.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What enters without light on surfels: environments, objects that emit, objects that are repainted. Products of small matrices, in materials drawn into render targets.
+// Environments, emissive objects and changed albedo: products of small matrices, in materials drawn into render targets.
 #include "SrbfSurfelLights.h"
 
 #include "Engine/Texture2D.h"

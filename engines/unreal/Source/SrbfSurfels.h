@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What the passes that light surfels need to know: sizes of their targets, and lights in the asset's frame. Standard C++ alone, no types of Unreal; it
-// reads the SrbfSurfels.bin of an export.
+// Data of the passes that light surfels: sizes of their targets, and lights in the asset's frame. Standard C++ only, without Unreal's types; it reads the
+// SrbfSurfels.bin of an export.
 #pragma once
 
 #include <algorithm>

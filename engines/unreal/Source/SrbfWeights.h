@@ -13,7 +13,7 @@
 class SrbfWeights
 {
 public:
-    int Rows = 0, Columns = 0;       // of the texture of weights: a row a cluster, the mean's weight first; of maps one row
+    int Rows = 0, Columns = 0;       // of the texture of weights: a row per cluster, the mean's weight first; of maps one row
     bool Cloud = false;              // lights by place, or else by name
     std::vector<std::string> Names;  // of named lights, UTF-8
 

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: MIT
 class_name SrbfShapeWeights
 extends Node
-## What lights add to the weights of a transfer asset's shapes without light on its surfels, objects that emit and an environment; and the asset's table where
-## objects have other albedo. Products of small matrices, in small viewports, each drawn when its numbers have changed.
+## Computes on the GPU the weights that emissive objects and an environment add to the shapes of a transfer asset, and the asset's table for changed albedo.
+## Each is a chain of products of small matrices, in small viewports that are drawn when their input has changed.
 
 const SMALLEST := Vector2i(2, 2)  # pixels of a viewport
 
-## Column 0: what is added to the weight of every shape.
+## Column 0: the weight to be added for every shape.
 var added: Texture2D
-## The table from irradiance on surfels to weights of the shapes, over its scale, with other albedo; null with that of the bake.
+## The table from irradiance on surfels to weights of the shapes, divided by its scale, for changed albedo; null with the albedo of the bake.
 var table: Texture2D
-## That of the bake, which SrbfSurfelWeights has as a texture.
+## The table of the bake, a texture of SrbfSurfelWeights.
 var own_table: Texture2D
 
 var _surfels: SrbfSurfels
@@ -54,7 +54,7 @@ func set_environment(cells: PackedVector3Array, energy: float) -> void:
 	_fill("cells", seen)
 
 
-## Colors of objects with other albedo, by name.
+## Colors of the objects whose albedo has changed, by name.
 func set_albedo(painted: Dictionary) -> void:
 	var surfaces := _surfels.surfaces
 	var is_painted := not painted.is_empty() and surfaces.terms > 0
@@ -70,7 +70,7 @@ func set_albedo(painted: Dictionary) -> void:
 	_emitting[1].set_shader_parameter("srbf_scale", 1.0 if is_painted else surfaces.scales.feedback)
 
 
-## In the next frame, what has changed.
+## Redraw in the next frame what has changed.
 func draw() -> void:
 	if _has_new_albedo:
 		_redraw(_repainting)
@@ -157,8 +157,8 @@ func _repainting_product(rank: int, values: Dictionary) -> Texture2D:
 	return _repainting_pass(preload("shaders/matrix_product.gdshader"), Vector2i(rank, rank), values)
 
 
-## A pass that has its size and its uniforms, of which images become textures, from the first repainted object on. It is in the tree before, since Godot
-## draws viewports in the order in which they entered it.
+## A pass that gets its size, its uniforms and its textures when the first object is repainted. It enters the tree now, because Godot draws viewports in the
+## order in which they entered it.
 func _repainting_pass(shader: Shader, size: Vector2i, values: Dictionary) -> Texture2D:
 	var viewport := SrbfSurfelWeights.pass_by(shader, SMALLEST, {})
 	add_child(viewport)

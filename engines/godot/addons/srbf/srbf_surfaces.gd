@@ -2,22 +2,22 @@
 @tool
 class_name SrbfSurfaces
 extends Resource
-## What an asset that was fitted with --editable knows of its objects: albedo that changes, and emission. Matrices are half floats over their `scales`.
+## The tables of an asset fitted with --editable for changes of its objects: albedo and emission. Matrices are half floats, divided by their `scales`.
 
 const MOST_REFLECTED := 0.99  # share of light that a bounce keeps at most
 const GRAY := ["gather", "sent"]
 
 @export var names: PackedStringArray
-## From radiosity of the surfels to weights of the shapes; what the shapes lay on the surfels: a row per shape, a column per surfel.
+## From radiosity of the surfels to weights of the shapes, and the irradiance of the shapes on the surfels: a row per shape, a column per surfel.
 @export var gather: Image
 @export var sent: Image
-## One exchange of light, gather albedo sent, and the sum of all its powers: a row and a column per shape.
+## One bounce of light between shapes, gather · albedo · sent, and the sum of all its powers: a row and a column per shape.
 @export var feedback: Image
 @export var series: Image
 ## Weights under objects that emit a mean radiance of 1, without bounces: a row per shape, a column per object.
 @export var emission: Image
 @export var scales := {}
-## Powers of the exchange that are summed after a change.
+## How many powers are summed after a change.
 @export var terms: int
 ## Of object o and surfel s at o S + s: the object's part of the surfel's area.
 @export var shares: PackedFloat32Array
@@ -50,7 +50,7 @@ static func read(folder: String, manifest: Dictionary) -> SrbfSurfaces:
 	return surfaces
 
 
-## The albedo of every surfel where objects have others, colors by name.
+## The albedo of every surfel with changed colors of objects, by name.
 func repainted(painted: Dictionary) -> PackedVector3Array:
 	var now := albedo.duplicate()
 	for o in names.size():

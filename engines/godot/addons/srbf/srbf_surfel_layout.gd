@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 class_name SrbfSurfelLayout
 extends RefCounted
-## Where each cell of the surfaces is drawn in a small target: within the tile of 32 x 32 pixels in which a camera far away sees it.
+## The pixels of each surface cell in a small render target: in the tile of 32 x 32 pixels where an orthographic camera of the whole scene sees the cell.
 ##
-## Forward+ keeps a list of lights for every such tile of the screen, so a cell has to be in its own.
+## Forward+ culls lights per tile, so a cell must lie in its own tile.
 
 const TILE := 32  # pixels
 const MOST_TILES := 64  # along a side

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 class_name SrbfSurfelWeights
 extends Node
-## Weights of lights inside a scene, computed by the GPU: Godot's own lights and shadow maps on cells of the surfaces, in a small viewport of their own, and
-## the asset's tables as small viewports after it. Nothing is read back.
+## Computes the weights of lights inside a scene on the GPU, without readback: a small viewport draws the cells of the surfaces, lit and shadowed by Godot's own
+## lights, and further viewports multiply their irradiance by the asset's tables.
 
 const LAYER := 1 << 20  # the first that no inspector shows: cameras of a scene leave it out
 const SCENE_LAYERS := (1 << 20) - 1  # whose objects cast shadows
@@ -12,7 +12,7 @@ const UP := Transform3D(Basis(Vector3(1, 0, 0), Vector3(0, 0, -1), Vector3(0, 1,
 ## The weights, as the shaders of the asset take them.
 var weights: Texture2D
 var viewports: Array[SubViewport] = []
-## What else enters, where the asset takes environments or its surfaces change.
+## The weights of environments and of emissive objects, and changed albedo; null for an asset without.
 var shapes: SrbfShapeWeights
 
 var _layout: SrbfSurfelLayout

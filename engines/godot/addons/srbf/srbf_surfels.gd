@@ -2,7 +2,7 @@
 @tool
 class_name SrbfSurfels
 extends Resource
-## Small parts of the scene's surfaces that lights are measured by, and the tables from the irradiance on them to the weights of an asset.
+## Surfels, small parts of the scene's surfaces on which irradiance is measured, and the tables from that irradiance to the weights of an asset.
 
 const TABLE_WIDTH := 4096  # texels
 
@@ -17,8 +17,8 @@ const TABLE_WIDTH := 4096  # texels
 @export var rows: PackedInt32Array
 @export var columns: PackedInt32Array
 @export var scales: PackedFloat32Array
-## From the radiance in cells of the octahedral map of directions, `environment_side` squared, to what is added to the first table's rows: a column for each of
-## `environment_cells`. Null where no surfel sees the environment.
+## From the radiance in cells of an octahedral map of directions, `environment_side` squared, to weights that are added to the sums of the first table: a column
+## per number in `environment_cells`. Null if no surfel sees the environment.
 @export var environment: Image
 @export var environment_cells: PackedInt32Array
 @export var environment_side: int

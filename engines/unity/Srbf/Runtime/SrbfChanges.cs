@@ -5,7 +5,7 @@ using System.Collections.Generic;
 
 namespace Srbf
 {
-    /// <summary>A matrix of an asset, a row to a row of texels, over its scale.</summary>
+    /// <summary>A matrix of an asset, divided by its scale: row i is row i of the texture.</summary>
     [Serializable]
     public sealed class SrbfMatrix
     {

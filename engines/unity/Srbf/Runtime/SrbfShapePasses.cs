@@ -22,8 +22,8 @@ namespace Srbf
     }
 
     /// <summary>
-    /// What objects that emit and an environment add to the first table's sums, and that table where objects have other albedo: products of
-    /// small matrices on the GPU, drawn when something has changed.
+    /// Adds the light of emissive objects and of an environment to the sums of the first table, and computes that table for changed albedo:
+    /// products of small matrices on the GPU, drawn when their input has changed.
     /// </summary>
     public sealed class SrbfShapePasses : IDisposable
     {
@@ -53,10 +53,10 @@ namespace Srbf
             Added = emitted;
         }
 
-        /// <summary>A row for every row of the first table.</summary>
+        /// <summary>To be added to the sums of the first table: a texel per row.</summary>
         public Texture Added { get; private set; }
 
-        /// <summary>The first table with other albedo; null with that of the bake.</summary>
+        /// <summary>The first table for changed albedo; null while all objects have the albedo of the bake.</summary>
         public Texture Table { get; private set; }
 
         /// <summary>Add the passes for what has changed to a buffer.</summary>

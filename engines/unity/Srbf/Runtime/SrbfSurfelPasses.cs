@@ -66,7 +66,7 @@ namespace Srbf
         /// <summary>Irradiance of cells, to be drawn by another, such as a render pipeline's own lights, before Finish.</summary>
         public RenderTexture Irradiance { get { return irradiance; } }
 
-        /// <summary>Draw the weights, where a light or what shines besides is not as before.</summary>
+        /// <summary>Draw the weights if a light or the surroundings have changed.</summary>
         public void Draw(List<SrbfLook> looks, SrbfSurroundings now)
         {
             if (drawn && Same(looks, known) && surroundings.Equals(now)) return;

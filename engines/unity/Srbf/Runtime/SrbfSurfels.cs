@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What passes need to light surfels, and how they look at a light. Without Unity types.
+// Data of the passes that light surfels, and a light as they read it. Without Unity types.
 using System;
 using System.Collections.Generic;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The passes that make weights of lights inside a scene: what the asset's triangles hide from a light, its irradiance on cells of the surfaces, the
-// means of patches, the asset's tables. SrbfSurfelPasses draws them; all places are in the asset's frame, less the middle of the cells.
+// The passes that compute the weights of lights inside a scene: shadow maps of the asset's triangles, irradiance on cells of the surfaces, means of patches, products
+// with the asset's tables. SrbfSurfelPasses draws them; all places are in the asset's frame, minus the middle of the cells.
 #ifndef SRBF_SURFELS
 #define SRBF_SURFELS
 #include "SrbfSurfelPack.hlsl"
@@ -14,7 +14,7 @@ Texture2D _SrbfIrradiance;  // of cells
 Texture2D _SrbfEntries;     // of a table
 Texture2D _SrbfNumbers;     // that it is multiplied by
 Texture2D _SrbfParts;       // of its sums
-Texture2D _SrbfAdded;       // a row for every row of the table
+Texture2D _SrbfAdded;       // to the sums: a texel per row of the table
 Texture2D _SrbfLeft;        // of a product of matrices
 Texture2D _SrbfRight;
 Texture2D _SrbfAddend;
@@ -100,7 +100,7 @@ float4 SrbfFullscreen(uint id : SV_VertexID) : SV_Position
     return float4(id == 1 ? 3.0 : -1.0, id == 2 ? 3.0 : -1.0, 0.5, 1.0);
 }
 
-// What a point or spot light lays on a cell, added to the rest.
+// The irradiance of a point or spot light on a cell, added to that of other lights.
 float4 SrbfIrradianceByCube(float4 at : SV_Position) : SV_Target
 {
     int3 texel = int3(int2(at.xy), 0);
