@@ -29,6 +29,7 @@ MODEL = "model.glb"  # shown by the example instead of the asset's texels
 SERIES = "surface_series.exr"
 SHADERS = Path("addons/srbf/shaders")
 PROBES = "probes/probe_irradiance.glsl"
+SURFELS = tuple(f"surfels/{name}.glsl" for name in ("table_part", "block_sum", "matrix_product", "changed_exchange", "repainted_entry"))
 WRITERS: dict[str, Target] = {"half": exr.write, "float": exr.write, "uint8": png.write, "bc7": dds.write, "bc1": dds.write}
 
 _PRECISION_STATEMENT = re.compile(r"^\s*precision\s+(?:high|medium|low)p\s+\w+\s*;.*\n?", re.MULTILINE)
@@ -50,6 +51,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
         files.write_text(folder / SHADERS / f"{name}.gdshaderinc", method_include(name))
         files.write_text(folder / SHADERS / f"{name}_weighted.gdshaderinc", weighted_include(name))
     files.write_text(folder / SHADERS / f"{Path(PROBES).stem}.gdshaderinc", _include(Path(PROBES).stem, PROBES, ()))
+    files.write_text(folder / SHADERS / "surfels.gdshaderinc", _include("surfels", SURFELS[0], SURFELS[1:]))
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held
     writer = WRITERS[encoding] if settings.levels in ("auto", 0, 1) else dds.write

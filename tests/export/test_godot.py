@@ -153,10 +153,16 @@ def checked(defines: str, stage: str, project: Path, tmp_path: Path) -> None:
     assert result.returncode == 0, result.stdout
 
 
-def as_glsl(text: str, folder: Path) -> str:
-    """A fragment shader of Godot's as desktop GLSL: includes in place, hints off, built-ins declared."""
+def with_includes(text: str, folder: Path) -> str:
+    """Text of Godot's with the files of a project in place."""
     while match := re.search(r'#include "res://([^"]+)"', text):
         text = text.replace(match[0], (folder / match[1]).read_text(), 1)
+    return text
+
+
+def as_glsl(text: str, folder: Path) -> str:
+    """A fragment shader of Godot's as desktop GLSL: includes in place, hints off, built-ins declared."""
+    text = with_includes(text, folder)
     text = re.sub(r"^render_mode .*$", "", text, flags=re.M)
     text = re.sub(r"^(uniform [\w ]+(?:\[[^\]]+\])?) : [\w, ]+(;| =)", r"\1\2", text, flags=re.M)
     text = re.sub(r"^varying ", "in ", text, flags=re.M)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from made_surfels import RANK, made_asset, residual
 from made_tables import INSIDE, made
-from test_godot import checked
+from test_godot import checked, with_includes
 
 from srbf.asset import Asset
 from srbf.export import export
@@ -92,6 +92,13 @@ def test_as_few_exchanges_of_light_as_the_bake_has_go_along(tmp_path: Path) -> N
     np.testing.assert_allclose(series, expected, rtol=HALF_STEP, atol=1e-6)
 
 
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("project")
+    write(made_asset(), folder)
+    return folder
+
+
 def uniforms_of(shader: str) -> set[str]:
     return set(re.findall(r"^uniform \w+ (srbf_\w+)", (ADDON / "shaders" / shader).read_text(), re.M))
 
@@ -125,8 +132,8 @@ def test_shaders_of_probes_are_sound(stage: str, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not installed (Debian: glslang-tools)")
 @pytest.mark.parametrize("shader", sorted(SHADERS))
-def test_passes_are_sound(shader: str, tmp_path: Path) -> None:
-    text = (ADDON / "shaders" / f"{shader}.gdshader").read_text()
+def test_passes_are_sound(shader: str, project: Path, tmp_path: Path) -> None:
+    text = with_includes((ADDON / "shaders" / f"{shader}.gdshader").read_text(), project)
     kind = re.search(r"^shader_type (\w+);$", text, re.M)
     assert kind is not None
     text = re.sub(r"^(shader_type|render_mode) .*$", "", text, flags=re.M)

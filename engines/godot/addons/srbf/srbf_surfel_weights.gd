@@ -112,7 +112,7 @@ func _add_passes(asset: SrbfAsset, parts: int) -> void:
 			_first = viewports[-1].get_child(0).material
 		var is_last := i == surfels.tables.size() - 1
 		var size := Vector2i(rows / asset.clusters, asset.clusters) if is_last else _square(rows)
-		var values := {"srbf_numbers": numbers, "srbf_rows": rows, "srbf_blocks": blocks}
+		var values := {"srbf_numbers": numbers, "srbf_blocks": blocks}
 		if i == 0 and shapes:
 			values["srbf_added"] = shapes.added
 		numbers = _pass(preload("shaders/block_sums.gdshader"), size, values)
