@@ -7,23 +7,23 @@ import { floatTarget, floatTexture, grayTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
 
 export class Repainting {
-  private readonly numbers: DataTexture; // of every surfel
-  private readonly own: DataTexture;
-  private readonly textures: DataTexture[];
+  private readonly albedo: DataTexture; // of every surfel: now, and of the bake
   private readonly one: DataTexture;
-  /** feedback + gather `numbers` sent; added + left right, and left right; x gather `numbers`; the table. */
-  private readonly feedback: FullscreenPass;
+  private readonly feedback: DataTexture; // of the bake
+  private readonly textures: DataTexture[];
+  private readonly exchange: FullscreenPass;
   private readonly added: FullscreenPass;
   private readonly plain: FullscreenPass;
-  private readonly reflected: FullscreenPass;
-  private readonly sum: FullscreenPass;
-  private readonly changed: WebGLRenderTarget;
+  private readonly repainted: FullscreenPass;
+  private readonly passes: FullscreenPass[];
+  private readonly changed: WebGLRenderTarget; // the exchange
   /** Drawn in turn. */
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
   private readonly powers: [WebGLRenderTarget, WebGLRenderTarget];
-  private readonly before: WebGLRenderTarget;
-  private readonly after: WebGLRenderTarget;
+  private readonly series: { before: WebGLRenderTarget; after: WebGLRenderTarget };
   private readonly table: WebGLRenderTarget;
+  private readonly targets: WebGLRenderTarget[];
+  private readonly terms: number;
   private hasBefore = false;
 
   /** `table` and `scale`: of the asset's own table, row after row. */
@@ -34,74 +34,71 @@ export class Repainting {
   ) {
     const { transfer, gather, sent, feedback } = surfaces.known;
     const { functions: rank, count } = transfer;
-    const transposed = Float32Array.from({ length: sent.length }, (_, i) => sent[(i % rank) * count + Math.floor(i / rank)]);
-    const gathered = grayTexture(Float32Array.from(gather), count, rank);
-    const back = grayTexture(transposed, rank, count);
+    this.terms = surfaces.bounces ?? MOST_TERMS;
+    const [left, right] = [gather, sent].map((matrix) => grayTexture(Float32Array.from(matrix), count, rank));
+    this.albedo = floatTexture(new Float32Array(8 * count), 2, count);
     this.one = floatTexture(fours(Float32Array.from({ length: 3 * rank * rank }, (_, i) => (Math.floor(i / 3) % (rank + 1) === 0 ? 1 : 0))), rank, rank);
-    this.own = floatTexture(fours(feedback.data), rank, rank);
-    this.numbers = floatTexture(new Float32Array(4 * count), count, 1);
-    this.textures = [gathered, back, this.one, this.own, this.numbers];
-    this.changed = floatTarget(rank, rank);
-    this.sums = [floatTarget(rank, rank), floatTarget(rank, rank)];
-    this.powers = [floatTarget(rank, rank), floatTarget(rank, rank)];
-    this.before = floatTarget(count, rank);
-    this.after = floatTarget(count, rank);
+    this.feedback = floatTexture(fours(feedback.data), rank, rank);
+    this.textures = [left, right, this.albedo, this.one, this.feedback];
+    const square = () => floatTarget(rank, rank);
+    this.changed = square();
+    this.sums = [square(), square()];
+    this.powers = [square(), square()];
+    this.series = { before: square(), after: square() };
     this.table = floatTarget(count, rank);
-    const product = (values: Record<string, unknown>, defines: Record<string, number> = {}) => new FullscreenPass(matrixProduct, uniforms({ added: null, numbers: this.numbers, ...values }), defines);
-    this.feedback = product({ added: this.own, left: gathered, right: back, count }, { SRBF_BETWEEN: 1 });
-    this.added = product({ left: null, right: null, count: rank });
-    this.plain = product({ left: null, right: null, count: rank }, { SRBF_PLAIN: 1 });
-    this.reflected = product({ left: null, right: gathered, count: rank }, { SRBF_COLUMNS: 1 });
-    this.sum = new FullscreenPass(repaintedTable, uniforms({ table, scale, before: this.before.texture, after: this.after.texture }));
+    this.targets = [this.changed, ...this.sums, ...this.powers, ...Object.values(this.series), this.table];
+    const product = (values: Record<string, unknown>, defines: Record<string, number>) => new FullscreenPass(matrixProduct, uniforms({ left: null, right: null, added: null, albedo: null, ...values }), defines);
+    this.exchange = product({ left, right, albedo: this.albedo, added: this.feedback, count }, { SRBF_EXCHANGE: 1 });
+    this.added = product({ count: rank }, {});
+    this.plain = product({ count: rank }, { SRBF_PLAIN: 1 });
+    const known = { table, scale, gather: left, albedo: this.albedo, before: null, after: null, rank: this.terms === 0 ? 0 : rank };
+    this.repainted = new FullscreenPass(repaintedTable, uniforms(known));
+    this.passes = [this.exchange, this.added, this.plain, this.repainted];
   }
 
   /** The table as it is now, a row of the matrix to a row of texels. */
   draw(renderer: WebGLRenderer, change: Float64Array): Texture {
-    const { albedo } = this.surfaces.known;
-    if (!this.hasBefore) this.drawReflected(renderer, this.own, albedo, this.before);
+    this.setAlbedo(change);
+    this.exchange.draw(renderer, this.changed);
+    if (!this.hasBefore) this.repainted.uniforms.before.value = this.drawSum(renderer, this.feedback, this.series.before);
     this.hasBefore = true;
-    this.setNumbers(change);
-    this.feedback.draw(renderer, this.changed);
-    this.drawReflected(
-      renderer,
-      this.changed.texture,
-      albedo.map((x, i) => x + change[i]),
-      this.after,
-    );
-    this.sum.draw(renderer, this.table);
+    this.repainted.uniforms.after.value = this.drawSum(renderer, this.changed.texture, this.series.after);
+    this.repainted.draw(renderer, this.table);
     return this.table.texture;
   }
 
   dispose(): void {
-    for (const one of [...this.textures, ...this.sums, ...this.powers, this.changed, this.before, this.after, this.table, this.feedback, this.added, this.plain, this.reflected, this.sum]) one.dispose();
+    for (const one of [...this.textures, ...this.targets, ...this.passes]) one.dispose();
   }
 
-  /** sum over k of feedback^k gather rho. */
-  private drawReflected(renderer: WebGLRenderer, feedback: Texture, albedo: Float64Array, target: WebGLRenderTarget): void {
-    const terms = this.surfaces.bounces ?? MOST_TERMS;
-    const series = this.drawSum(renderer, feedback, terms);
-    this.setNumbers(albedo);
-    Object.assign(this.reflected.uniforms, uniforms({ left: series, count: terms === 0 ? 0 : this.changed.width }));
-    this.reflected.draw(renderer, target);
-  }
-
-  /** Powers of `feedback`: of n terms 2n by sum + power sum, or n + 1 by one + feedback sum. Hundreds of terms take few passes. */
-  private drawSum(renderer: WebGLRenderer, feedback: Texture, terms: number): Texture {
+  /** The sum of powers of `feedback`, in `target`: of n terms 2n by sum + power sum, or n + 1 by one + feedback sum. Hundreds of terms take few passes. */
+  private drawSum(renderer: WebGLRenderer, feedback: Texture, target: WebGLRenderTarget): Texture {
+    const steps = doublings(this.terms);
     let [sum, power]: Texture[] = [this.one, feedback];
-    doublings(terms).forEach((doubling, step) => {
+    steps.forEach((doubling, step) => {
       const left = doubling ? power : feedback;
+      const isLast = step === steps.length - 1;
+      const next = isLast ? target : this.sums[step % 2];
       Object.assign(this.added.uniforms, uniforms({ left, right: sum, added: doubling ? sum : this.one }));
-      this.added.draw(renderer, this.sums[step % 2]);
+      this.added.draw(renderer, next);
+      sum = next.texture;
+      if (isLast) return;
       Object.assign(this.plain.uniforms, uniforms({ left, right: power }));
       this.plain.draw(renderer, this.powers[step % 2]);
-      [sum, power] = [this.sums[step % 2].texture, this.powers[step % 2].texture];
+      power = this.powers[step % 2].texture;
     });
     return sum;
   }
 
-  private setNumbers(rgb: Float64Array): void {
-    (this.numbers.image.data as Float32Array).set(fours(rgb));
-    this.numbers.needsUpdate = true;
+  private setAlbedo(change: Float64Array): void {
+    const { albedo } = this.surfaces.known;
+    const numbers = this.albedo.image.data as Float32Array;
+    for (let i = 0; i < albedo.length; ++i) {
+      const at = 8 * Math.floor(i / 3) + (i % 3);
+      numbers[at] = albedo[i] + change[i];
+      numbers[at + 4] = albedo[i];
+    }
+    this.albedo.needsUpdate = true;
   }
 }
 
