@@ -15,6 +15,7 @@ from srbf.io import files
 from srbf.io.containers import read_texture_array
 from srbf.io.containers.texture_array import TextureArray
 from srbf.io.image import read_image, require_finite
+from srbf.io.packed_table import unpack
 
 ASSET_MANIFEST = "asset.json"
 
@@ -53,6 +54,21 @@ class AssetReader:
             found = f"{pixels.shape[1]}x{pixels.shape[0]}"
             raise ImageError(f"expected {shape[1]}x{shape[0]} texels in {self.folder / file}, found {found}")
         return pixels
+
+    def half_table(self, name: str, shape: tuple[int, int], channels: int) -> np.ndarray:
+        """A table of half floats, (rows, columns, channels), packed or not: see `srbf.io.packed_table`."""
+        packed = self.manifest[name].get("packed")
+        if packed is None:
+            return self.table(name, shape, channels).astype(np.float16)
+        file = self.manifest[name]["file"]
+        pixels = self.pixels(file, channels)
+        rows, columns = shape if packed == "rows" else shape[::-1]
+        if pixels.shape[1] != columns + 1 or pixels.shape[0] not in (rows, 2 * rows):
+            found = f"{pixels.shape[1]}x{pixels.shape[0]}"
+            raise ImageError(f"expected {columns + 1}x{rows} or {columns + 1}x{2 * rows} bytes in {self.folder / file}, found {found}")
+        table: np.ndarray = unpack(np.round(pixels * 255).astype(np.uint8), rows, packed)
+        require_finite(table, self.folder / file)
+        return table
 
     def rows(self, name: str, rows: int, channels: int) -> np.ndarray:
         """A table of the manifest's key `name` with `rows` rows of any length, (rows, n, channels) float32."""

@@ -15,8 +15,8 @@ from srbf.encode.table_steps import steps_by_cluster
 MOST_NODES = 2048
 LEAST_SPACING = 0.2  # m
 FINE = 4  # places per cell and axis at which it is known which corners are seen
-MOST_RANK = 128
-NODE_STEP = 2.0**-8  # of the rms of an axis
+MOST_RANK = 96
+NODE_STEP = 2.0**-7  # of the rms of an axis
 RANK_ERROR = 0.01  # of the nodes' values, rms
 SEEN = 1e-4  # sum of weights below which a light sees no node
 CORNERS = np.array([[c & 1, c >> 1 & 1, c >> 2 & 1] for c in range(8)])

@@ -10,6 +10,7 @@ from srbf.errors import ShaderError
 from srbf.export import exr
 from srbf.export.settings import Settings, Target
 from srbf.io import files
+from srbf.methods import method_of
 from srbf.registry import method_named
 
 
@@ -26,7 +27,7 @@ def engine_root(name: str) -> Path:
 def write_asset(asset: Asset, folder: Path, data: str, settings: Settings, container: Target = exr.write) -> Asset:
     """Write the asset by a `container` below `folder`/`data`, and its asset.json in `folder`; returns the asset as written."""
     files.make_folder(folder / data)
-    container(asset, folder / data, settings)
+    container(method_of(asset).with_plain_tables(asset), folder / data, settings)
     written = Asset.open(folder / data)
     files.write_json(folder / MANIFEST, below(data, files.read_json(folder / data / MANIFEST)))
     (folder / data / MANIFEST).unlink()

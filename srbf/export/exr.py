@@ -9,6 +9,7 @@ from srbf.errors import InputError
 from srbf.export.layers import in_encoding
 from srbf.export.manifest import stem, with_layers
 from srbf.export.settings import PLAIN, Settings, Written, no_levels
+from srbf.methods import method_of
 
 
 def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
@@ -18,5 +19,6 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
         raise InputError(f"expected `encoding` half or float for EXR files, found {encoding}")
     no_levels(settings, "EXR files")
     stored, scale, bias = in_encoding(asset, encoding)
+    asset = method_of(asset).with_plain_tables(asset)
     with_layers(asset, "exr", stored, scale, bias, layer_entries(stem(asset), encoding, scale, bias)).write(folder)
     return Written()

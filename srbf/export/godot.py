@@ -55,6 +55,7 @@ def write(asset: Asset, folder: Path, settings: Settings = PLAIN) -> Written:
     files.make_folder(folder / DATA)
     encoding = settings.encoding or asset.held
     writer = WRITERS[encoding] if settings.levels in ("auto", 0, 1) else dds.write
+    asset = method_of(asset).with_plain_tables(asset)
     notes = writer(asset, folder / DATA, Settings(encoding, settings.levels)).notes
     manifest = below(DATA, files.read_json(folder / DATA / MANIFEST)) | _series(asset, folder)
     (folder / DATA / MANIFEST).unlink()

@@ -39,7 +39,8 @@ def with_layers(
         manifest["receiver"] = {**manifest["receiver"], "places": PLACES_FILE, "nearness": NEARNESS_FILE}
     for name, table in asset.tables.items():
         told = {"size": table.size} if name == "r_table" else {"mapping": "octahedral"} if name == "w_table" else {}
-        manifest[name] = {**told, **manifest.get(name, {}), "file": method_of(asset).tables[name]}
+        known = {**told, **manifest.get(name, {})}
+        manifest[name] = {**known, "file": f"{name}.png" if "packed" in known else method_of(asset).tables[name]}
     manifest[asset.layers_key] = entries
     manifest["source"] = {**manifest.get("source", {}), "export": {"target": target}}
     return replace(asset, manifest=manifest, stored=stored, scale=scale, bias=bias)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     import moderngl
 
 ON_HOST = {  # tables that no shader reads
-    *("light_coefficients", "light_values", "cells", "surfel_transfer", "environment_transfer"),
+    *("light_coefficients", "light_values", "cells", "environment_transfer"),
+    *("surfel_transfer", "surfel_gather", "surfel_albedo", "surfel_series"),
     *("surface_gather", "surface_sent", "surface_feedback", "surface_objects", "surface_albedo"),
     *("pool", "view_rows", "exchange_rows"),  # shaders read them folded
 }

@@ -18,6 +18,7 @@ from srbf.io.float16 import all_finite, finite_to_float32
 
 Encoding = Literal["half", "float", "uint8"]
 HALF_MAX = 65504.0
+PNG_NO_FILTER = 8  # of libpng
 NO_DATE = "1970:01:01 00:00:00"  # OpenImageIO would write the time, and equal pixels would give different files
 
 
@@ -199,7 +200,7 @@ def require_finite(pixels: Float[ndarray, "H W C"], path: Path) -> None:
         raise ImageError(f"expected finite values in {path}, found NaN or Inf in {int(bad.sum())} texels, first at row {r}, column {c}")
 
 
-def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
+def write_image(path: Path, pixels: ndarray, encoding: Encoding, noisy: bool = False) -> None:
     """Write an image, atomically.
 
     Parameters
@@ -210,6 +211,8 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
         (H, W) or (H, W, C), row 0 at the top; uint8 for `uint8`.
     encoding
         `half` or `float`: an EXR, ZIP-compressed. `uint8`: a PNG of the bytes as given, without a color transform.
+    noisy
+        Bytes that their neighbors tell nothing of: they are smaller without PNG's filters.
 
     Raises
     ------
@@ -245,6 +248,9 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding) -> None:
         spec.attribute("DateTime", NO_DATE)
     else:
         spec.attribute("oiio:UnassociatedAlpha", 1)  # a fourth channel is data, not alpha
+        if noisy:
+            spec.attribute("png:filter", PNG_NO_FILTER)
+            spec.attribute("compression", "rle")
     with atomic_path(path) as temporary:
         target = oiio.ImageOutput.create(str(path))
         if target is None or not target.open(str(temporary), spec):

@@ -18,7 +18,7 @@ from srbf.arrays import Float16, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import COVERED, Capture
-from srbf.compute.full_precision import by_channel
+from srbf.compute.full_precision import by_channel, times_columns
 from srbf.encode.clustered_components import Zones, clustered_components
 from srbf.encode.component_filter import without_noise
 from srbf.encode.dilation import nearest_covered
@@ -27,6 +27,7 @@ from srbf.encode.mixed_rows import MixedSpace
 from srbf.encode.model_selection import sampled_texels
 from srbf.errors import InputError
 from srbf.io.image import Encoding
+from srbf.io.packed_table import Packed, fits
 from srbf.light_domain import domain_of_capture
 from srbf.lights import Light, PointLight
 from srbf.methods.carried import carried_images, carried_scene, common_manifest
@@ -68,7 +69,7 @@ class LightTableMaps(ComponentMaps):
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         shape = (check_layers(reader), int(reader.manifest["light_values"]["lights"]))
         channels = int(reader.manifest["light_values"].get("channels", 3))
-        tables = {"light_values": reader.table("light_values", shape, channels).astype(np.float16)}
+        tables = {"light_values": reader.half_table("light_values", shape, channels)}
         return {**tables, "cluster_index": read_cluster_index(reader)} if "cluster_index" in reader.manifest else tables
 
     @classmethod
@@ -83,7 +84,7 @@ class LightTableMaps(ComponentMaps):
         values = by_channel(asset.tables["light_values"])
         columns = cls.column_weights(asset, lights) * asset.manifest["light_values"]["scale"]
         if len(values) == 1:
-            return (values[0] @ columns.astype(np.float32)).astype(np.float64)
+            return times_columns(values[0], columns.astype(np.float32)).astype(np.float64)
         return np.stack([values[c] @ columns[:, c].astype(np.float32) for c in range(3)], axis=1).astype(np.float64)
 
     @classmethod
@@ -206,6 +207,12 @@ def check_table_settings(components: int, clusters: int, encoding: str) -> None:
         raise InputError(f"expected 1 to {MOST_CLUSTERS} clusters, found {clusters}")
     if encoding not in get_args(Encoding):
         raise InputError(f"expected an encoding of half, float, uint8, found {encoding!r}")
+
+
+def pack_table(asset: Asset, name: str, by: Packed) -> None:
+    """Let a table of half floats be saved as bytes, where its rows or columns are multiples of a step: see `srbf.io.packed_table`."""
+    if fits(asset.tables[name], by):
+        asset.manifest[name] = {**asset.manifest[name], "file": f"{name}.png", "packed": by}
 
 
 def stored_values(values: Float32[ndarray, "F N c"]) -> tuple[Float16[ndarray, "F N c"], dict[str, Any]]:

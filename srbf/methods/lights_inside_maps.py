@@ -41,7 +41,7 @@ class LightsInsideMaps(LightTableMaps):
         functions = len(tables["light_values"])
         fine = told["fine"]
         tables["position_nodes"] = reader.table("position_nodes", (nx * ny * nz, told["rank"]), 1)[:, :, 0]
-        tables["position_basis"] = reader.table("position_basis", (told["rank"], functions), 3).astype(np.float16)
+        tables["position_basis"] = reader.half_table("position_basis", (told["rank"], functions), 3)
         shape = (fine * (nz - 1) * fine * (ny - 1), 8 * fine * (nx - 1))
         seen = np.round(reader.table("position_visibility", shape, 1)[:, :, 0] * 255)
         return {**tables, "position_visibility": seen.astype(np.uint8), **kept_visibility.read_visibility(reader)}

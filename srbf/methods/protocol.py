@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -140,6 +140,16 @@ class Method(ABC):
     @abstractmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         """Its tables from the files of an asset; ManifestError or ImageError, in one line, where they do not fit the manifest."""
+
+    @classmethod
+    def with_plain_tables(cls, asset: Asset) -> Asset:
+        """The asset for code that reads plain images and knows no other form of its tables, as engines' code does."""
+        plain = {
+            key: {**{name: value for name, value in told.items() if name != "packed"}, "file": cls.tables[key]}
+            for key, told in asset.manifest.items()
+            if key in asset.tables and "packed" in told
+        }
+        return replace(asset, manifest={**asset.manifest, **plain})
 
     @classmethod
     @abstractmethod

@@ -1,7 +1,7 @@
 """Surfaces that change after the bake: other albedo, and emission, of a transfer asset's objects.
 
 With gather M (r, S), from radiosity of surfels to weights of shapes, and sent A (S, r), what the shapes lay on the surfels, light that is
-exchanged k times has the weights (M rho A)^k M b. So other albedo is another product of small matrices.
+exchanged k times has the weights (M rho A)^k M b. So other albedo is another product of small matrices. See `surfel_tables`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from srbf.asset_reader import AssetReader
 from srbf.encode.table_steps import steps_by_column
 from srbf.errors import InputError
 from srbf.methods.environment_table import without_environment_table
-from srbf.solve.radiosity import MOST_REFLECTED, SERIES
+from srbf.methods.surfel_tables import albedo_of, gather_of, has_series, set_albedo, set_series
+from srbf.solve.radiosity import MOST_REFLECTED, summed_series
 from srbf.visibility.transfer_basis import Emitted, TransferBasis, grouped
 from srbf.visibility.transfer_operator import TransferOperator
 
@@ -31,7 +32,9 @@ FILES = {
     "surface_objects": "surface_objects.exr",
     "surface_albedo": "surface_albedo.exr",
 }
+OF_SURFELS = ("surface_gather", "surface_albedo")  # of assets without matrices of their own for these
 EMISSION = "surface_emission"  # which older assets lack
+FEEDBACK_ERROR = 0.0025  # of what a shape's light is after one reflection, rms: all reflections are summed by it
 SHINING, MAY_SHINE = 16.0, 4.0  # lights that an object counts as among those that shapes are made for
 EMISSION_FILE = {EMISSION: "surface_emission.exr"}
 
@@ -73,7 +76,7 @@ class Surfaces:
         return Surfaces(
             steps_by_column(gather[:, :, None], basis.sizes)[:, :, 0],
             steps_by_column(sent[:, :, None], np.ones(len(sent), np.float32))[:, :, 0],  # weights have an rms of 1
-            steps_by_column(feedback, basis.sizes),
+            steps_by_column(feedback, basis.sizes, FEEDBACK_ERROR),
             shares,
             np.ascontiguousarray(albedo.T),
             tuple(names[i] for i in having),
@@ -86,24 +89,31 @@ class Surfaces:
         """InputError where the asset has none."""
         if KEY not in asset.manifest:
             raise InputError(f"expected an asset whose surfaces can change, found a {asset.method} one without; fit with `editable`")
-        return Surfaces.of_tables(asset.manifest, asset.tables)
+        return Surfaces.of_tables(asset.manifest, asset.tables, *((gather_of(asset), albedo_of(asset)) if has_series(asset) else ()))
 
     @staticmethod
-    def of_tables(manifest: dict[str, Any], tables: Mapping[str, ndarray]) -> Surfaces:
-        """From the manifest and the tables of an asset that has them."""
+    def of_tables(
+        manifest: dict[str, Any],
+        tables: Mapping[str, ndarray],
+        gather: Float32[ndarray, "r S"] | None = None,
+        albedo: Float32[ndarray, "S 3"] | None = None,
+    ) -> Surfaces:
+        """From the manifest and the tables of an asset that has them, `gather` and `albedo` among them where they are not given."""
         told = manifest[KEY]
-        has_emission = EMISSION in told["scales"]
-        kept = (*FILES, EMISSION) if has_emission else FILES
-        gather, sent, feedback, shares, albedo, *more = (
-            tables[name].astype(np.float32) * np.float32(told["scales"][name]) for name in kept
-        )
-        gather, sent, shares = gather[..., 0], sent[..., 0], shares[..., 0]
-        emission = more[0] if has_emission else np.repeat((np.float32(np.pi) * gather @ shares.T)[:, :, None], 3, axis=2)
-        return Surfaces(gather, sent, feedback, shares, albedo[0], tuple(told["objects"]), told.get("bounces"), emission)
+        found = {name: tables[name].astype(np.float32) * np.float32(scale) for name, scale in told["scales"].items()}
+        gather = found["surface_gather"][..., 0] if gather is None else gather
+        albedo = found["surface_albedo"][0] if albedo is None else albedo
+        shares = found["surface_objects"][..., 0]
+        even = np.float32(np.pi) * gather @ shares.T
+        emission = found[EMISSION] if EMISSION in found else np.repeat(even[:, :, None], 3, axis=2)
+        sent, feedback = found["surface_sent"][..., 0], found["surface_feedback"]
+        return Surfaces(gather, sent, feedback, shares, albedo, tuple(told["objects"]), told.get("bounces"), emission)
 
     def add_to(self, asset: Asset) -> None:
-        """Its tables and keys."""
+        """Its tables and keys: what the asset has in `surfel_tables` is not repeated."""
         tables, keys = self.stored()
+        for name in OF_SURFELS if has_series(asset) else ():
+            del tables[name], keys[name], keys[KEY]["scales"][name]
         asset.tables |= tables
         asset.manifest |= keys
 
@@ -126,7 +136,8 @@ class Surfaces:
         told = reader.manifest["surfel_transfer"]
         rank, count, objects = int(told["rank"]), int(told["surfels"]), len(reader.manifest[KEY]["objects"])
         shapes = ((rank, count, 1), (rank, count, 1), (rank, rank, 3), (objects, count, 1), (1, count, 3))
-        found = {name: reader.table(name, shape[:2], shape[2]).astype(np.float16) for name, shape in zip(FILES, shapes, strict=True)}
+        files = {name: shape for name, shape in zip(FILES, shapes, strict=True) if name in reader.manifest}
+        found = {name: reader.table(name, shape[:2], shape[2]).astype(np.float16) for name, shape in files.items()}
         return found | {
             name: reader.table(name, (rank, objects), 3).astype(np.float16) for name in EMISSION_FILE if name in reader.manifest
         }
@@ -139,27 +150,34 @@ class Surfaces:
         self._share_of(name)
         first = self.emission[:, self.names.index(name)] * radiance.astype(np.float32)  # (r, 3)
         more = None if self.bounces is None else self.bounces + 1
-        return np.stack([_series(self.feedback[:, :, c], first[:, c : c + 1], more)[:, 0] for c in range(3)], axis=1).astype(np.float64)
+        return np.stack([summed_series(self.feedback[:, :, c], first[:, c : c + 1], more)[:, 0] for c in range(3)], axis=1).astype(
+            np.float64
+        )
 
-    def repainted(self, albedo: Mapping[str, tuple[float, float, float]]) -> tuple[Surfaces, Float32[ndarray, "r S 3"]]:
-        """(the same with objects of another albedo, what that adds to the weights of shapes from irradiance on surfels)."""
+    def painted(self, albedo: Mapping[str, tuple[float, float, float]]) -> Surfaces:
+        """The same with objects of another albedo."""
         change = np.zeros_like(self.albedo)
         for name, color in albedo.items():
             share = self._share_of(name)[:, None]
             change += share * (np.clip(np.array(color, np.float32), 0, MOST_REFLECTED) - self.albedo)
         painted = np.clip(self.albedo + change, 0, MOST_REFLECTED)
-        feedback = np.empty_like(self.feedback)
-        added = np.empty((*self.gather.shape, 3), np.float32)
-        for c in range(3):
-            feedback[:, :, c] = self.feedback[:, :, c] + (self.gather * (painted - self.albedo)[:, c]) @ self.sent.T
-            after = _series(feedback[:, :, c], self.gather * painted[:, c], self.bounces)
-            added[:, :, c] = after - _series(self.feedback[:, :, c], self.gather * self.albedo[:, c], self.bounces)
-        return replace(self, albedo=painted, feedback=feedback), added
+        added = [(self.gather * (painted - self.albedo)[:, c]) @ self.sent.T for c in range(3)]
+        return replace(self, albedo=painted, feedback=self.feedback + np.stack(added, axis=2))
+
+    def transfer(self) -> Float32[ndarray, "r S 3"]:
+        """From irradiance on the surfels to weights of the shapes."""
+        columns = [summed_series(self.feedback[:, :, c], self.gather * self.albedo[:, c], self.bounces) for c in range(3)]
+        return np.stack(columns, axis=2)
+
+    def repainted(self, albedo: Mapping[str, tuple[float, float, float]]) -> tuple[Surfaces, Float32[ndarray, "r S 3"]]:
+        """(the same with objects of another albedo, what that adds to the weights of shapes from irradiance on surfels)."""
+        painted = self.painted(albedo)
+        return painted, painted.transfer() - self.transfer()
 
     def series(self) -> Float32[ndarray, "r r 3"]:
         """Sum over k of feedback^k, all exchanges of light: what a change of albedo replaces."""
         one = np.eye(len(self.feedback), dtype=np.float32)
-        return np.stack([_series(self.feedback[:, :, c], one, self.bounces) for c in range(3)], axis=2)
+        return np.stack([summed_series(self.feedback[:, :, c], one, self.bounces) for c in range(3)], axis=2)
 
     def _share_of(self, name: str) -> Float32[ndarray, " S"]:
         if name not in self.names:
@@ -199,6 +217,13 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
         raise InputError(
             "expected an asset of irradiance to change the albedo of, found radiance, which has the albedo in it; bake irradiance"
         )
+    if has_series(asset):
+        painted = surfaces.painted(albedo)
+        changed = replace(asset, manifest=dict(asset.manifest), tables=dict(asset.tables))
+        set_albedo(changed, painted.albedo)
+        set_series(changed, painted.series())
+        painted.add_to(changed)
+        return without_environment_table(changed)
     painted, added = surfaces.repainted(albedo)
     scale = float(asset.manifest["surfel_transfer"]["scale"])
     table = asset.tables["surfel_transfer"].astype(np.float32) * np.float32(scale) + added
@@ -230,14 +255,3 @@ def emitted_by_objects(operator: TransferOperator) -> Emitted:
         pattern = np.where(lit, operator.emission[:, c] / np.maximum(mean[owner], 1e-30), shines)
         result[np.arange(len(owner)), owner, c] = np.pi * pattern
     return Emitted(result, np.where(some, SHINING, MAY_SHINE))
-
-
-def _series(feedback: Float32[ndarray, "r r"], first: Float32[ndarray, "r n"], terms: int | None) -> Float32[ndarray, "r n"]:
-    """sum over k < `terms` of feedback^k first; None: of all k."""
-    if terms is None or terms >= SERIES:
-        return np.linalg.solve(np.eye(len(feedback), dtype=np.float32) - feedback, first)
-    total = last = first if terms else np.zeros_like(first)
-    for _ in range(1, terms):
-        last = feedback @ last
-        total = total + last
-    return total

@@ -9,15 +9,15 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float64, Int
+from srbf.arrays import Bool, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture, InMemoryCapture
 from srbf.captured_light import NOWHERE, CapturedLight
-from srbf.compute.full_precision import by_channel
 from srbf.encode.table_steps import steps_by_cluster, steps_by_column
 from srbf.errors import InputError
 from srbf.io.image import Encoding
+from srbf.io.packed_table import Packed
 from srbf.lights import EnvironmentLight, Light, NamedLight
 from srbf.methods import kept_visibility
 from srbf.methods.environment_table import FILES as TABLE_FILES
@@ -29,10 +29,13 @@ from srbf.methods.environment_table import (
     read_environment_table,
 )
 from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
-from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
+from srbf.methods.light_table_maps import check_table_settings, encode_table, pack_table
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, check_error, setting
 from srbf.methods.surface_changes import EMISSION_FILE, FILES, Surfaces, emitted_by_objects
+from srbf.methods.surface_changes import KEY as SURFACES
+from srbf.methods.surfel_tables import FILES as SURFEL_FILES
+from srbf.methods.surfel_tables import add_surfel_tables, read_surfel_tables, sizes_of, weights_of_shapes, with_transfer
 from srbf.methods.transfer_choice import Judges, Sizes, fit_for_error, truncated
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.patches import surfel_groups
@@ -41,7 +44,7 @@ from srbf.visibility.surface_cells import DARK, Cells
 from srbf.visibility.transfer_basis import MOST_RANK, RANK_ERROR, TransferBasis, exchange_of, grouped, training_light, transfer_basis
 from srbf.visibility.transfer_operator import TransferOperator
 
-TRANSFER_FILE = "transfer.exr"
+PACKED: dict[str, Packed] = {"light_values": "rows", "position_basis": "columns"}
 MOST_SURFELS = 8000
 SHAPES_LEFT_OUT = 0.25  # of an error that is asked for, on the lights that shapes are made for
 MOST_TRIED = 64  # components of a candidate
@@ -65,7 +68,7 @@ class Transfer(LightsInsideMaps):
     surfels
         How many parts of the surfaces a light is measured by; `auto`: the capture's surfels, at most 8000.
     rank
-        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 768.
+        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 512.
     clusters
         1 to 256: the index per texel is one byte.
     components
@@ -103,7 +106,7 @@ class Transfer(LightsInsideMaps):
     takes_objects: ClassVar[bool] = True
     tables: ClassVar[dict[str, str]] = {
         **LightsInsideMaps.tables,
-        "surfel_transfer": TRANSFER_FILE,
+        **SURFEL_FILES,
         **FILES,
         **EMISSION_FILE,
         **TABLE_FILES,
@@ -183,7 +186,7 @@ class Transfer(LightsInsideMaps):
         silent = replace(run, on_image=QUIET.on_image)
 
         def encode(basis: TransferBasis, cells: Cells, components: int) -> Asset:
-            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured)
+            return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured, told.get("bounces"))
 
         if self.error is None:
             cells = cells_of(MOST_SURFELS if self.surfels == "auto" else int(self.surfels))
@@ -204,6 +207,8 @@ class Transfer(LightsInsideMaps):
         asset.manifest["interpolation"] = {"kind": "surfels"}
         asset.manifest["source"]["fit"]["train_lights"] = lit.shape[1]
         self.add_places(asset, inside)
+        for name, by in PACKED.items():
+            pack_table(asset, name, by)
         self.add_visibility(asset, inside)
         return asset
 
@@ -211,7 +216,9 @@ class Transfer(LightsInsideMaps):
         """Where light is measured, the surfel of each as its patch: several points of a surfel, or one where compressed depths are kept."""
         return inside.cells if self.visibility == kept_visibility.NONE else operator.cells
 
-    def _of_basis(self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"]) -> Asset:
+    def _of_basis(
+        self, capture: Capture, run: FitRun, basis: TransferBasis, cells: Cells, measured: Bool[ndarray, " S"], bounces: int | None
+    ) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
         rank = basis.shapes.shape[1]
         asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed)
@@ -219,10 +226,8 @@ class Transfer(LightsInsideMaps):
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
         asset.tables["light_values"] = steps_by_cluster(asset.tables["light_values"], asset.clusters)
-        count = cells.patch_count
-        own = np.stack([grouped(basis.transfer[:, measured, c], cells.patches, count) for c in range(3)], axis=2)
-        asset.tables["surfel_transfer"], entry = stored_values(steps_by_column(own, basis.sizes))
-        asset.manifest["surfel_transfer"] = {"file": TRANSFER_FILE, "rank": rank, "surfels": count, "scale": entry["light_values"]["scale"]}
+        gather, albedo = _gathered(basis.gather[:, measured], cells)
+        add_surfel_tables(asset, gather, albedo, basis.series(bounces), basis.sizes)
         return asset
 
     @classmethod
@@ -234,14 +239,20 @@ class Transfer(LightsInsideMaps):
 
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
-        told = reader.manifest["surfel_transfer"]
-        table = reader.table("surfel_transfer", (told["rank"], told["surfels"]), 3)
         return {
             **super().read_tables(reader),
-            "surfel_transfer": table.astype(np.float16),
+            **read_surfel_tables(reader),
             **Surfaces.read(reader),
             **read_environment_table(reader),
         }
+
+    @classmethod
+    def with_plain_tables(cls, asset: Asset) -> Asset:
+        """With one matrix from irradiance on surfels to weights of shapes."""
+        plain = with_transfer(super().with_plain_tables(asset))
+        if SURFACES in asset.manifest:
+            Surfaces.of(asset).add_to(plain)
+        return plain
 
     @classmethod
     def needs_rays(cls, asset: Asset, light: Light) -> bool:
@@ -251,8 +262,8 @@ class Transfer(LightsInsideMaps):
     @classmethod
     def column_weights(cls, asset: Asset, lights: Sequence[Light]) -> Float64[ndarray, "N 3"]:
         """A named light is an object whose surfaces emit radiance of its color."""
-        received = np.zeros((asset.manifest["surfel_transfer"]["surfels"], 3))
-        emitted = np.zeros((asset.manifest["surfel_transfer"]["rank"], 3))
+        rank, surfels = sizes_of(asset)
+        received, emitted = np.zeros((surfels, 3)), np.zeros((rank, 3))
         for light in lights:
             if isinstance(light, NamedLight):
                 emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
@@ -260,14 +271,12 @@ class Transfer(LightsInsideMaps):
                 emitted += environment_weights(asset, light)
             else:
                 received += light_on_patches(asset)(light)
-        table = by_channel(asset.tables["surfel_transfer"])
-        columns = np.stack([table[c] @ received[:, c].astype(np.float32) for c in range(3)], axis=1)
-        return columns.astype(np.float64) * asset.manifest["surfel_transfer"]["scale"] + emitted
+        return weights_of_shapes(asset, received) + emitted
 
     @classmethod
     def summary(cls, asset: Asset) -> str:
-        told = asset.manifest["surfel_transfer"]
-        return f"{told['surfels']} surfels, rank {told['rank']}, {asset.clusters} clusters of {asset.components} components"
+        rank, surfels = sizes_of(asset)
+        return f"{surfels} surfels, rank {rank}, {asset.clusters} clusters of {asset.components} components"
 
 
 def _of_groups(parts: Cells, measured: Bool[ndarray, " S"], groups: Int[ndarray, " M"]) -> Cells:
@@ -275,6 +284,16 @@ def _of_groups(parts: Cells, measured: Bool[ndarray, " S"], groups: Int[ndarray,
     group = np.full(len(measured), -1, np.int64)
     group[measured] = groups
     return parts.with_patches(group[parts.patches]).at(measured[parts.patches])
+
+
+def _gathered(gather: Float32[ndarray, "r S"], cells: Cells) -> tuple[Float32[ndarray, "r M"], Float32[ndarray, "M 3"]]:
+    """(`gather`, the albedo) of the patches of `cells`: light is even over a patch, and each of its surfels reflects by its own albedo."""
+    count, areas = cells.patch_count, cells.areas.astype(np.float64)
+    whole = np.maximum(np.bincount(cells.patches, areas, count), 1e-30)
+    albedo = np.stack([np.bincount(cells.patches, areas * cells.albedo[:, c], count) / whole for c in range(3)], axis=1)
+    own, mean = cells.albedo.mean(axis=1), albedo.mean(axis=1)[cells.patches]
+    share = np.divide(own, mean, out=np.ones_like(mean), where=mean > 0)
+    return grouped(gather * share.astype(np.float32), cells.patches, count), albedo.astype(np.float32)
 
 
 def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:

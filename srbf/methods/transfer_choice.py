@@ -15,6 +15,7 @@ from srbf.compute.full_precision import by_channel
 from srbf.encode.model_selection import sampled_texels
 from srbf.lights import PointLight
 from srbf.methods.component_maps import ComponentMaps
+from srbf.methods.surfel_tables import weights_of_shapes
 from srbf.solve.radiosity import Bounces
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.surface_cells import Cells
@@ -94,9 +95,9 @@ class Judges:
     def of_asset(self, method: type[ComponentMaps], asset: Asset, cells: Cells, measured: Bool[ndarray, " S"]) -> list[ndarray]:
         """Pictures (n, N, 3) by an asset with fewer and fewer components: all, then four fewer, and so on."""
         light = patch_light(cells, self.irradiance[measured])
-        scale = np.float32(asset.manifest["surfel_transfer"]["scale"] * asset.manifest["light_values"]["scale"])
-        table, values = by_channel(asset.tables["surfel_transfer"]), by_channel(asset.tables["light_values"])
-        weights = np.stack([values[c % len(values)] @ (table[c] @ light) for c in range(3)], axis=2) * scale  # (F, N, 3)
+        scale, values = np.float32(asset.manifest["light_values"]["scale"]), by_channel(asset.tables["light_values"])
+        shapes = weights_of_shapes(asset, np.repeat(light[:, :, None], 3, axis=2).astype(np.float64)).astype(np.float32)
+        weights = np.stack([values[c % len(values)] @ shapes[..., c] for c in range(3)], axis=2) * scale  # (F, N, 3)
         component = np.arange(len(weights)) % (asset.components + 1)
         found = []
         for count in range(asset.components, 0, -4):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Float, Float32, Float64
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -60,6 +60,17 @@ class Bounces:
         from scipy.linalg import lu_solve
 
         return np.asarray(lu_solve(self._factors, right, trans=transposed, check_finite=False), np.float32)
+
+
+def summed_series(feedback: Float[ndarray, "r r"], first: Float[ndarray, "r n"], terms: int | None) -> Float[ndarray, "r n"]:
+    """sum over k < `terms` of feedback^k first; None: of all k."""
+    if terms is None or terms >= SERIES:
+        return np.linalg.solve(np.eye(len(feedback), dtype=feedback.dtype) - feedback, first)
+    total = last = first if terms else np.zeros_like(first)
+    for _ in range(1, terms):
+        last = feedback @ last
+        total = total + last
+    return total
 
 
 def reciprocal(form_factors: ndarray | csr_array, areas: Float32[ndarray, " S"]) -> Any:

@@ -16,7 +16,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.errors import InputError
 from srbf.lights import PointLight, SpotLight
-from srbf.solve.radiosity import Bounces, reciprocal
+from srbf.solve.radiosity import Bounces, reciprocal, summed_series
 from srbf.solve.sparse_rows import product, transposed_product
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
@@ -29,10 +29,10 @@ SURFELS_PER_PLACE, MOST_PLACED = 2, 4000  # many surfels need more: shapes of fe
 IN_EVERY_COLOR = 1800  # lights: of more, each is in red, green or blue, in turn
 NEAR_RANGE = (0.03, 0.12)  # m from a surface
 CONE = (0.25, 0.7)  # rad, half-angles
-OVERSAMPLED = 16
+OVERSAMPLED = 0.5  # more mixtures than shapes, of these: faint rooms are in the last axes, which few mixtures find badly
 POWER_STEPS = 1
 RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
-MOST_RANK = 768
+MOST_RANK = 512
 NORM_TEXELS = 2048
 SAMPLE_TEXELS = 1 << 15  # whose pictures the shapes are made for
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
@@ -56,6 +56,12 @@ class TransferBasis:
     def sizes(self) -> Float32[ndarray, " r"]:
         """The rms of each shape."""
         return np.sqrt(np.mean(self.shapes**2, axis=0))
+
+    def series(self, most_bounces: int | None) -> Float32[ndarray, "r r 3"]:
+        """The sum over k of feedback^k: from weights of light that was reflected once to those of all, at most so often reflected."""
+        one = np.eye(len(self.feedback), dtype=np.float64)
+        summed = [summed_series(self.feedback[:, :, c], one, most_bounces) for c in range(self.feedback.shape[2])]
+        return np.stack(summed, axis=2).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +147,8 @@ def transfer_basis(
             "diffuse bounces; choose other receivers or `light_bounds`, or raise the bounces"
         )
     most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, len(lit)))
-    mixed = lights @ rng.normal(size=(lights.shape[1], most + OVERSAMPLED)).astype(np.float32)
+    sketched = min(most + max(16, int(OVERSAMPLED * most)), len(lit))
+    mixed = lights @ rng.normal(size=(lights.shape[1], sketched)).astype(np.float32)
     found = np.linalg.qr(product(form_factors, mixed))[0]
     for _ in range(POWER_STEPS):
         found = np.linalg.qr(product(form_factors, lights @ (lights.T @ transposed_product(form_factors, found))))[0]

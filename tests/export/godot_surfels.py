@@ -65,11 +65,16 @@ def assets(folder: Path) -> Iterator[tuple[str, Asset, dict[str, Shown]]]:
     below = ROOM.corners[:, :, 2].min(axis=1) < 1.9
     yield "transfer, no ceiling", replace(transfer, scene=glb(ROOM.corners[below])), {"sun": Shown([sun(np.array([0.4, 0.3, 0.8]))])}
     open_room = room_of_surfels(folder / "window", with_window(ROOM), 1200, tested=1)
-    changing = Transfer(clusters=8, components=12, rank=96, surfels=600, editable=True).encode(open_room)
+    editable = Transfer(clusters=8, components=12, rank=96, surfels=600, editable=True)
+    changing = editable.encode(open_room)
     yield "window", changing, changes(inside["point"])
     yield "window, turned", moved(changing), {"environment": Shown(has_panorama=True)}
-    counted = replace(changing, manifest={**changing.manifest, "surfaces": {**changing.manifest["surfaces"], "bounces": 5}})
-    yield "window, few bounces", counted, {name: shown for name, shown in changes(inside["point"]).items() if name.startswith("paint")}
+    counted = replace(open_room, manifest={**open_room.manifest, "surfels": {**open_room.manifest["surfels"], "bounces": 5}})
+    yield (
+        "window, few bounces",
+        editable.encode(counted),
+        {name: shown for name, shown in changes(inside["point"]).items() if name.startswith("paint")},
+    )
     patches = room_of_patches(folder / "patches", HALL, 24, tested=1)
     of_hall = lights(np.array([0.8, 0.7, 0.9]), np.array([1.7, 1.4, 0.6]))
     yield "light-cloud", LightCloud(clusters=4, components=8).encode(patches), {name: Shown(own) for name, own in of_hall.items()}

@@ -24,10 +24,9 @@ CHANGES: list[list[tuple[str, str, tuple[float, ...] | None]]] = [
 
 
 def expected_of(made: Room, surfaces: Any, lights: list[dict[str, Any]], changes: list[tuple]) -> np.ndarray:
-    table = 2 * made.files["transfer.exr"][0]
     albedo = {name: color for kind, name, color in changes if kind == "albedo" and color}
-    surfaces, added = surfaces.repainted(albedo) if albedo else (surfaces, 0)
-    shapes = np.einsum("rkc,kc->rc", table + added, np.sum([received(made, light) for light in lights], axis=0))
+    surfaces = surfaces.painted(albedo)
+    shapes = np.einsum("rkc,kc->rc", surfaces.transfer(), np.sum([received(made, light) for light in lights], axis=0))
     shapes += sum(surfaces.emitted(name, np.array(color)) for kind, name, color in changes if kind == "emission")
     weights = np.einsum("fr,rc->fc", made.files["light_values.exr"][0][..., 0], shapes)
     return np.maximum(made.response(weights), 0)

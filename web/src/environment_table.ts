@@ -2,7 +2,7 @@
 import { environmentTexels } from "./environment";
 import { SrbfError } from "./errors";
 import type { AssetFiles } from "./files";
-import { type LightValues, readRgbTable, summed, type TableEntry } from "./light_values";
+import { type LightValues, readTable, summed, type TableEntry } from "./light_values";
 import type { EnvironmentLight } from "./lights";
 import type { Manifest } from "./manifest";
 import type { Matrix4, Triple } from "./matrix";
@@ -28,7 +28,7 @@ export class EnvironmentTable {
     if (!told) return undefined;
     const { side, cells, rank } = told;
     if (!(side >= 1) || cells.some((cell) => !(cell >= 0 && cell < side ** 2))) throw new SrbfError(`expected cells below ${side ** 2} in environment_transfer of asset.json, found others; fit the asset again`);
-    return new EnvironmentTable(side, cells, await readRgbTable(files, told, rank, cells.length));
+    return new EnvironmentTable(side, cells, await readTable(files, told, rank, cells.length));
   }
 
   /** Weights of the shapes, (r, 3), under a map; those of a light that is the same object are not computed again. */

@@ -2,6 +2,7 @@
 import { SrbfError } from "./errors";
 import { decodeFloat } from "./exr";
 import type { AssetFiles } from "./files";
+import { type TableEntry, tableImage } from "./light_values";
 import type { Manifest } from "./manifest";
 import type { Triple } from "./matrix";
 import type { Fail } from "./methods/method";
@@ -14,7 +15,7 @@ export interface PositionManifest extends Manifest {
   /** `nodes` along x, y, z from `origin`, `spacing` apart (m); `fine` places per cell and axis have their visibility; `rank` of the factors. */
   position_table?: { origin: Triple; spacing: number; nodes: Triple; fine: number; rank: number };
   position_nodes?: { file: string };
-  position_basis?: { file: string };
+  position_basis?: TableEntry;
   position_visibility?: { file: string };
 }
 
@@ -44,7 +45,7 @@ export class PositionTable {
     const [places, basis, seen] = (["position_nodes", "position_basis", "position_visibility"] as const).map((key) => (manifest[key] as { file: string }).file);
     const [a, b, v] = await Promise.all([
       files.bytes(places).then((buffer) => decodeFloat(buffer, places)),
-      files.bytes(basis).then((buffer) => decodeFloat(buffer, basis)),
+      tableImage(files, manifest.position_basis as TableEntry, rank, functions),
       files.bytes(seen).then((buffer) => decodePng(buffer, seen)),
     ]);
     const cells = nodes.map((n) => fine * (n - 1));

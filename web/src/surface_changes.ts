@@ -1,12 +1,12 @@
 /** Surfaces that change after the bake: other albedo, and emission, of a transfer asset's objects: `srbf/methods/surface_changes.py`. */
 import { SrbfError } from "./errors";
 import type { AssetFiles } from "./files";
-import { type LightValues, readRgbTable, rgb, summed } from "./light_values";
+import { type LightValues, readTable, rgb, summed } from "./light_values";
 import type { NamedLight } from "./lights";
 import type { Manifest } from "./manifest";
 import type { Triple } from "./matrix";
 
-const FILES = ["surface_gather", "surface_sent", "surface_feedback", "surface_objects", "surface_albedo"] as const;
+const FILES = ["surface_sent", "surface_feedback", "surface_objects"] as const;
 const MOST_REFLECTED = 0.99; // share of light that a bounce keeps at most
 const SERIES = 24; // reflections from which on all are summed
 export const MOST_TERMS = 512; // of a series without end, as exports have it
@@ -18,19 +18,23 @@ export interface SurfacesManifest extends Manifest, Partial<Record<(typeof FILES
   surfaces?: { objects: string[]; scales: Record<string, number>; bounces?: number };
 }
 
+/** How surfels reflect: their albedo, (S, 3), and the unit of each one's column of `surfel_gather`, (S,). */
+export interface SurfelReflection {
+  albedo: Float64Array;
+  units: Float64Array;
+}
+
 /** What the asset knows of O objects, r shapes and S surfels. */
-interface Known {
-  /** From irradiance on surfels to weights of the shapes, (r, S, 3), all bounces included. */
-  transfer: LightValues;
+interface Known extends SurfelReflection {
+  rank: number;
+  count: number;
   /** From radiosity of surfels to weights, and what the shapes lay on the surfels, (r, S). */
-  gather: Float64Array;
-  sent: Float64Array;
+  gather: Float32Array;
+  sent: Float32Array;
   /** gather rho sent, (r, r, 3). */
   feedback: LightValues;
   /** What part of a surfel's area each object has, (O, S). */
-  shares: Float64Array;
-  /** (S, 3). */
-  albedo: Float64Array;
+  shares: Float32Array;
   /** Weights of objects that emit a mean radiance of 1 in their own pattern, without bounces, (r, O, 3); undefined: evenly, by `shares`. */
   emission?: LightValues;
 }
@@ -51,47 +55,53 @@ export class Surfaces {
     private readonly manifest: SurfacesManifest,
     readonly known: Known,
   ) {
-    const { shares, transfer } = known;
-    const seen = (i: number) => shares.subarray(i * transfer.count, (i + 1) * transfer.count).some((share) => share > 0);
+    const { shares, count } = known;
+    const seen = (i: number) => shares.subarray(i * count, (i + 1) * count).some((share) => share > 0);
     this.names = (manifest.surfaces?.objects ?? []).filter((_, i) => seen(i));
     const bounces = manifest.surfaces?.bounces;
     this.bounces = bounces === undefined || bounces >= SERIES ? undefined : bounces;
   }
 
-  /** Undefined where the asset was not fitted with `--editable`. @throws SrbfError on tables of other sizes. */
-  static async read(files: AssetFiles, manifest: SurfacesManifest, transfer: LightValues): Promise<Surfaces | undefined> {
+  /**
+   * Undefined where the asset was not fitted with `--editable`. `gather`: with columns in `units`; undefined of assets that have another table.
+   *
+   * @throws SrbfError on tables of other sizes, and on an asset that was fitted before there was `surfel_gather`.
+   */
+  static async read(files: AssetFiles, manifest: SurfacesManifest, gather: LightValues | undefined, reflection: SurfelReflection | undefined): Promise<Surfaces | undefined> {
     const told = manifest.surfaces;
     if (!told) return undefined;
-    const { functions: rank, count } = transfer;
-    const rows = [rank, rank, rank, told.objects.length, 1];
-    const columns = [count, count, rank, count, count];
-    const [gather, sent, feedback, shares, albedo] = await Promise.all(
+    if (!gather || !reflection) throw new SrbfError("expected surfel_gather in asset.json of an asset whose surfaces can change, found none; fit the asset again");
+    const { functions: rank, count } = gather;
+    const rows = [rank, rank, told.objects.length];
+    const columns = [count, rank, count];
+    const [sent, feedback, shares] = await Promise.all(
       FILES.map((name, i) => {
         const file = manifest[name]?.file;
         if (file === undefined) throw new SrbfError(`expected ${name} in asset.json, found none; fit the asset again`);
-        return readRgbTable(files, { file, scale: told.scales[name] }, rows[i], columns[i]);
+        return readTable(files, { file, scale: told.scales[name] }, rows[i], columns[i]);
       }),
     );
     const own = manifest.surface_emission && { file: manifest.surface_emission.file, scale: told.scales.surface_emission };
-    const emission = own && (await readRgbTable(files, own, rank, told.objects.length));
-    const gray = ({ data }: LightValues) => Float64Array.from({ length: data.length / 3 }, (_, i) => data[3 * i]);
-    return new Surfaces(manifest, { transfer, gather: gray(gather), sent: gray(sent), feedback, shares: gray(shares), albedo: Float64Array.from(albedo.data), emission });
+    const emission = own && (await readTable(files, own, rank, told.objects.length));
+    const whole = gather.data.map((x, i) => x * reflection.units[i % count]);
+    return new Surfaces(manifest, { ...reflection, rank, count, gather: whole, sent: sent.data, feedback, shares: shares.data, emission });
   }
 
-  /** Weights of the shapes, (r, 3), from irradiance on the surfels, (S, 3). */
+  /** Weights of the shapes, (r, 3), from irradiance on the surfels, (S, 3), with the albedo that they have now. */
   received(irradiance: Float64Array): Float64Array {
-    const { transfer, gather, albedo } = this.known;
-    const weights = summed(transfer, irradiance);
+    const { gather, albedo } = this.known;
     const { change } = this;
-    if (!change) return weights;
-    const before = this.series(product(gather, irradiance.map((e, i) => albedo[i] * e)), this.bounces);
-    const after = this.series(product(gather, irradiance.map((e, i) => (albedo[i] + change[i]) * e)), this.bounces, change);
-    return weights.map((weight, i) => weight + after[i] - before[i]);
+    return this.series(product(gather, irradiance.map((e, i) => (albedo[i] + (change?.[i] ?? 0)) * e)), this.bounces, change);
+  }
+
+  /** What the columns of `surfel_gather` take irradiance by, (S, 3), with the albedo that surfels have now. */
+  get reflectance(): Float64Array {
+    return reflectanceOf(this.known, this.change);
   }
 
   /** Weights of the shapes, (r, 3), under objects that emit diffusely: `color` of a named light is the radiance. @throws SrbfError on an unknown object. */
   emission(lights: readonly NamedLight[]): Float64Array {
-    const out = new Float64Array(3 * this.known.transfer.functions);
+    const out = new Float64Array(3 * this.known.rank);
     for (const { name, color } of lights) this.white(name).forEach((weight, i) => (out[i] += weight * color[i % 3]));
     return out;
   }
@@ -108,11 +118,11 @@ export class Surfaces {
     if (String(color) === String(this.painted.get(name))) return;
     if (color) this.painted.set(name, color);
     else this.painted.delete(name);
-    const { albedo, transfer } = this.known;
+    const { albedo, count } = this.known;
     const now = albedo.slice();
     for (const [object, paint] of this.painted) {
       const share = this.share(object);
-      for (let i = 0; i < 3 * transfer.count; ++i) now[i] += share[Math.floor(i / 3)] * (Math.min(paint[i % 3], MOST_REFLECTED) - albedo[i]);
+      for (let i = 0; i < 3 * count; ++i) now[i] += share[Math.floor(i / 3)] * (Math.min(paint[i % 3], MOST_REFLECTED) - albedo[i]);
     }
     this.change = this.painted.size ? now.map((x, i) => Math.min(MOST_REFLECTED, Math.max(0, x)) - albedo[i]) : undefined;
     this.emitted.clear();
@@ -129,9 +139,9 @@ export class Surfaces {
     const known = this.emitted.get(name);
     if (known) return known;
     const share = this.share(name);
-    const { emission, gather, transfer } = this.known;
+    const { emission, gather, count } = this.known;
     const at = this.manifest.surfaces?.objects.indexOf(name) ?? -1;
-    const first = emission ? column(emission, at) : product(gather, rgb(share.map((x) => Math.PI * x), transfer.count));
+    const first = emission ? column(emission, at) : product(gather, rgb(Float64Array.from(share, (x) => Math.PI * x), count));
     const out = this.series(first, this.bounces === undefined ? undefined : this.bounces + 1, this.change);
     this.emitted.set(name, out);
     return out;
@@ -154,13 +164,18 @@ export class Surfaces {
     return total;
   }
 
-  private share(name: string): Float64Array {
+  private share(name: string): Float32Array {
     const { names } = this;
     const at = this.manifest.surfaces?.objects.indexOf(name) ?? -1;
     if (!names.includes(name)) throw new SrbfError(`expected an object of ${names.slice(0, TOLD).join(", ")}${names.length > TOLD ? ", …" : ""}, found ${JSON.stringify(name)}`);
-    const { count } = this.known.transfer;
+    const { count } = this.known;
     return this.known.shares.subarray(at * count, (at + 1) * count);
   }
+}
+
+/** What the columns of `surfel_gather` take irradiance by, (S, 3): the albedo, with a `change` or not, times the units. */
+export function reflectanceOf({ albedo, units }: SurfelReflection, change?: Float64Array): Float64Array {
+  return albedo.map((x, i) => (x + (change?.[i] ?? 0)) * units[Math.floor(i / 3)]);
 }
 
 /** @throws SrbfError on an asset whose surfaces cannot change. */
@@ -170,7 +185,7 @@ export function changeable(surfaces: Surfaces | undefined): Surfaces {
 }
 
 /** matrix (n, m) times RGB numbers (m, 3). */
-function product(matrix: Float64Array, numbers: Float64Array): Float64Array {
+function product(matrix: Float32Array, numbers: Float64Array): Float64Array {
   const columns = numbers.length / 3;
   const out = new Float64Array((3 * matrix.length) / columns);
   for (let i = 0, at = 0; i < out.length; i += 3) {
@@ -193,7 +208,7 @@ function column(table: LightValues, at: number): Float64Array {
 }
 
 /** The transposed of matrix (n, m) times RGB numbers (n, 3). */
-function productTransposed(matrix: Float64Array, numbers: Float64Array): Float64Array {
+function productTransposed(matrix: Float32Array, numbers: Float64Array): Float64Array {
   const columns = (3 * matrix.length) / numbers.length;
   const out = new Float64Array(3 * columns);
   for (let i = 0, at = 0; i < numbers.length; i += 3) {

@@ -9,9 +9,14 @@ export interface Surfels {
   readonly cells: Cells;
   /** Corners of the triangles that cast shadows, nine numbers each, meters. */
   readonly corners: Float32Array;
-  /** Tables from the mean irradiance on the cells' patches to the weights of the light functions, one after the other. */
+  /** What the mean irradiance on the cells' patches is multiplied by, (patches, 3), before the tables; undefined: by nothing. */
+  readonly reflectance?: Float64Array;
+  /** Tables from there to the weights of the light functions, one after the other; of a transfer asset the last one takes weights of shapes. */
   readonly tables: readonly LightValues[];
 }
+
+/** The number of the table whose sums are weights of shapes: what objects emit and environments are added there. */
+export const shapesTable = ({ tables }: Surfels): number => Math.max(0, tables.length - 2);
 
 /** Cells in the order of their patches, as textures with `width` texels in each row hold them. */
 export interface PackedCells {
@@ -49,6 +54,13 @@ export function packedCells({ cells, corners }: Surfels): PackedCells {
     if (out.ranges[4 * patch + 1]++ === 0) out.ranges[4 * patch] = i;
   });
   return { ...out, width, height, rangesWidth, rangesHeight, middle, reach: Math.max(farthest(places, middle), farthest(corners, middle)) };
+}
+
+/** The reflectance of patches as `PackedCells` has its ranges, RGBA: 1 where there is none. */
+export function packedReflectance(reflectance: Float64Array | undefined, { rangesWidth, rangesHeight }: PackedCells): Float32Array {
+  const out = new Float32Array(4 * rangesWidth * rangesHeight);
+  for (let i = 0; i < out.length; ++i) out[i] = i % 4 < 3 ? (reflectance?.[3 * Math.floor(i / 4) + (i % 4)] ?? 1) : 1;
+  return out;
 }
 
 /** Sides of a texture of `count` texels that is about as high as wide. */

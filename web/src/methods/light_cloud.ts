@@ -3,13 +3,13 @@ import { type EnvironmentManifest, EnvironmentTable } from "../environment_table
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { type LightValues, readLightValues, readRgbTable, rgb, summed, type TableEntry } from "../light_values";
+import { type LightValues, readLightValues, readTable, rgb, summed, type TableEntry } from "../light_values";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
 import { Cells } from "../received_light";
 import { shapeWeights } from "../shape_weights";
-import { Surfaces, type SurfacesManifest } from "../surface_changes";
+import { reflectanceOf, Surfaces, type SurfacesManifest, type SurfelReflection } from "../surface_changes";
 import { type Placed, placed, type Surfels } from "../surfels";
 import { readOccluders } from "../triangles";
 import { checkWeightedComponents, type ComponentsManifest, functionsOf, readWeightedComponents, WEIGHTED_COMPONENTS } from "../weighted_components";
@@ -20,8 +20,12 @@ interface LightCloudManifest extends ComponentsManifest, PositionManifest, Surfa
   cells?: { file: string };
   interpolation?: { kind: string };
   free_places?: Triple[];
-  /** Of direct-to-indirect transfer: weights of the columns of `light_values` from the irradiance on the patches. */
-  surfel_transfer?: TableEntry & { rank: number; surfels: number };
+  /** Of direct-to-indirect transfer: numbers of shapes and surfels; with a file, weights of shapes from the irradiance on the surfels. */
+  surfel_transfer?: Partial<TableEntry> & { rank: number; surfels: number };
+  /** Without: the same from what surfels reflect, of light that was reflected once, and what later reflections add to them. */
+  surfel_gather?: TableEntry;
+  surfel_albedo?: TableEntry;
+  surfel_series?: TableEntry;
 }
 
 const FAR = 1e4; // meters: how far a distant light's shadow rays go
@@ -104,25 +108,44 @@ class Rays {
   static async read(files: AssetFiles, manifest: LightCloudManifest, functions: number): Promise<Rays> {
     const { file } = manifest.cells as { file: string };
     const scene = manifest.scene as string;
-    const told = manifest.surfel_transfer;
     const [cells, corners, values, transfer] = await Promise.all([
       files.bytes(file).then((buffer) => new Cells(decodeFloat(buffer, file), file)),
       files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
       readLightValues(files, manifest, functions),
-      told && readRgbTable(files, told, told.rank, told.surfels),
+      readTransfer(files, manifest),
     ]);
-    const patches = (transfer ?? values).count;
+    const patches = (transfer.tables[0] ?? values).count;
     if (cells.patches > patches) throw new SrbfError(`expected cells of ${patches} patches in ${file}, found ${cells.patches}`);
-    const surfaces = transfer && (await Surfaces.read(files, manifest, transfer));
-    return new Rays({ cells, corners, tables: transfer ? [transfer, values] : [values] }, surfaces);
+    const { tables, reflection } = transfer;
+    const surfaces = tables.length ? await Surfaces.read(files, manifest, reflection && tables[0], reflection) : undefined;
+    return new Rays({ cells, corners, reflectance: reflection && reflectanceOf(reflection), tables: [...tables, values] }, surfaces);
   }
 
   /** Of a white light, (F, 3). */
   weights(light: Placed): Float64Array {
     const { occluders, surfaces } = this;
-    const { cells, tables } = this.surfels;
+    const { cells, reflectance, tables } = this.surfels;
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    if (surfaces) return summed(valuesOf(this.surfels), surfaces.received(rgb(received, tables[0].count)));
-    return tables.reduce((weights, table) => summed(table, weights), received);
+    if (surfaces?.change) return summed(valuesOf(this.surfels), surfaces.received(rgb(received, tables[0].count)));
+    const reflected = reflectance ? rgb(received, tables[0].count).map((e, i) => e * reflectance[i]) : received;
+    return tables.reduce((weights, table) => summed(table, weights), reflected);
   }
+}
+
+/** The tables from the irradiance on surfels, or from what they reflect, to weights of shapes: none, one of them, or two. @throws SrbfError on damaged files. */
+async function readTransfer(files: AssetFiles, manifest: LightCloudManifest): Promise<{ tables: LightValues[]; reflection?: SurfelReflection }> {
+  const { surfel_transfer: told, surfel_gather, surfel_albedo, surfel_series } = manifest;
+  if (!told) return { tables: [] };
+  const { rank, surfels } = told;
+  if (!surfel_gather || !surfel_albedo || !surfel_series) {
+    if (told.file === undefined) throw new SrbfError("expected a file of surfel_transfer, or surfel_gather, surfel_albedo and surfel_series in asset.json, found neither; fit the asset again");
+    return { tables: [await readTable(files, told as TableEntry, rank, surfels)] };
+  }
+  const [gather, later, image] = await Promise.all([readTable(files, surfel_gather, rank, surfels), readTable(files, surfel_series, rank, rank), files.bytes(surfel_albedo.file)]);
+  const { data, width, channels } = decodeFloat(image, surfel_albedo.file);
+  if (width !== surfels || channels !== 4) throw new SrbfError(`expected ${surfels} RGBA numbers in ${surfel_albedo.file}, found ${width} x ${channels}`);
+  for (let i = 0; i < rank; ++i) for (let c = 0; c < 3; ++c) later.data[3 * (rank + 1) * i + c] += 1;
+  const albedo = Float64Array.from({ length: 3 * surfels }, (_, i) => data[4 * Math.floor(i / 3) + (i % 3)]);
+  const units = Float64Array.from({ length: surfels }, (_, i) => (surfel_albedo.scale ?? 1) * data[4 * i + 3]);
+  return { tables: [gather, later], reflection: { albedo, units } };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The mean irradiance of every patch, by area, over its cells, which follow each other.
+// What every patch reflects: its mean irradiance, by area, over its cells, which follow each other, times its reflectance.
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -9,9 +9,11 @@ precision highp sampler2D;
 uniform sampler2D irradiance;
 uniform sampler2D normals;  // share of the patch's area in the last channel
 uniform sampler2D ranges;   // first cell, how many
+uniform sampler2D reflectance;
 
 out vec4 mean;
 
 void main() {
-    mean = vec4(srbfPatchMean(irradiance, normals, ranges, ivec2(gl_FragCoord.xy)), 1.0);
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    mean = vec4(srbfPatchMean(irradiance, normals, ranges, at) * texelFetch(reflectance, at, 0).rgb, 1.0);
 }

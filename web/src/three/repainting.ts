@@ -1,7 +1,6 @@
-/** The table of a transfer asset whose objects have other albedo, computed by the GPU when they are repainted: products of small matrices. */
+/** All reflections between the shapes of a transfer asset whose objects have other albedo, computed by the GPU when they are repainted: products of small matrices. */
 import type { DataTexture, IUniform, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
 import matrixProduct from "../shaders/matrix_product.glsl";
-import repaintedTable from "../shaders/repainted_table.glsl";
 import { MOST_TERMS, type Surfaces } from "../surface_changes";
 import { floatTarget, floatTexture, grayTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
@@ -9,83 +8,62 @@ import { FullscreenPass } from "./fullscreen";
 export class Repainting {
   private readonly albedo: DataTexture; // of every surfel: now, and of the bake
   private readonly one: DataTexture;
-  private readonly feedback: DataTexture; // of the bake
   private readonly textures: DataTexture[];
   private readonly exchange: FullscreenPass;
   private readonly added: FullscreenPass;
   private readonly plain: FullscreenPass;
-  private readonly repainted: FullscreenPass;
   private readonly passes: FullscreenPass[];
   private readonly changed: WebGLRenderTarget; // the exchange
   /** Drawn in turn. */
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
   private readonly powers: [WebGLRenderTarget, WebGLRenderTarget];
-  private readonly series: { before: WebGLRenderTarget; after: WebGLRenderTarget };
-  private readonly table: WebGLRenderTarget;
+  private readonly none: WebGLRenderTarget; // of no bounces
   private readonly targets: WebGLRenderTarget[];
   private readonly terms: number;
-  private hasBefore = false;
 
-  /** `table` and `scale`: of the asset's own table, row after row. */
-  constructor(
-    private readonly surfaces: Surfaces,
-    table: Texture,
-    scale: number,
-  ) {
-    const { transfer, gather, sent, feedback } = surfaces.known;
-    const { functions: rank, count } = transfer;
+  constructor(private readonly surfaces: Surfaces) {
+    const { rank, count, gather, sent, feedback } = surfaces.known;
     this.terms = surfaces.bounces ?? MOST_TERMS;
-    const [left, right] = [gather, sent].map((matrix) => grayTexture(Float32Array.from(matrix), count, rank));
+    const [left, right] = [gather, sent].map((matrix) => grayTexture(matrix, count, rank));
     this.albedo = floatTexture(new Float32Array(8 * count), 2, count);
     this.one = floatTexture(fours(Float32Array.from({ length: 3 * rank * rank }, (_, i) => (Math.floor(i / 3) % (rank + 1) === 0 ? 1 : 0))), rank, rank);
-    this.feedback = floatTexture(fours(feedback.data), rank, rank);
-    this.textures = [left, right, this.albedo, this.one, this.feedback];
+    const own = floatTexture(fours(feedback.data), rank, rank);
+    this.textures = [left, right, this.albedo, this.one, own];
     const square = () => floatTarget(rank, rank);
     this.changed = square();
     this.sums = [square(), square()];
     this.powers = [square(), square()];
-    this.series = { before: square(), after: square() };
-    this.table = floatTarget(count, rank);
-    this.targets = [this.changed, ...this.sums, ...this.powers, ...Object.values(this.series), this.table];
+    this.none = square();
+    this.targets = [this.changed, ...this.sums, ...this.powers, this.none];
     const product = (values: Record<string, unknown>, defines: Record<string, number>) => new FullscreenPass(matrixProduct, uniforms({ left: null, right: null, added: null, albedo: null, ...values }), defines);
-    this.exchange = product({ left, right, albedo: this.albedo, added: this.feedback, count }, { SRBF_EXCHANGE: 1 });
+    this.exchange = product({ left, right, albedo: this.albedo, added: own, count }, { SRBF_EXCHANGE: 1 });
     this.added = product({ count: rank }, {});
     this.plain = product({ count: rank }, { SRBF_PLAIN: 1 });
-    const known = { table, scale, gather: left, albedo: this.albedo, before: null, after: null, rank: this.terms === 0 ? 0 : rank };
-    this.repainted = new FullscreenPass(repaintedTable, uniforms(known));
-    this.passes = [this.exchange, this.added, this.plain, this.repainted];
+    this.passes = [this.exchange, this.added, this.plain];
   }
 
-  /** The table as it is now, a row of the matrix to a row of texels. */
+  /** The sum of the powers of the exchange with albedo that differs by `change`: a row of the matrix to a row of texels. */
   draw(renderer: WebGLRenderer, change: Float64Array): Texture {
+    if (this.terms === 0) return this.none.texture;
     this.setAlbedo(change);
     this.exchange.draw(renderer, this.changed);
-    if (!this.hasBefore) this.repainted.uniforms.before.value = this.drawSum(renderer, this.feedback, this.series.before);
-    this.hasBefore = true;
-    this.repainted.uniforms.after.value = this.drawSum(renderer, this.changed.texture, this.series.after);
-    this.repainted.draw(renderer, this.table);
-    return this.table.texture;
+    return this.drawSum(renderer, this.changed.texture);
   }
 
   dispose(): void {
     for (const one of [...this.textures, ...this.targets, ...this.passes]) one.dispose();
   }
 
-  /** The sum of powers of `feedback`, in `target`: of n terms 2n by sum + power sum, or n + 1 by one + feedback sum. Hundreds of terms take few passes. */
-  private drawSum(renderer: WebGLRenderer, feedback: Texture, target: WebGLRenderTarget): Texture {
-    const steps = doublings(this.terms);
+  /** Powers of `feedback`: of n terms 2n by sum + power sum, or n + 1 by one + feedback sum. Hundreds of terms take few passes. */
+  private drawSum(renderer: WebGLRenderer, feedback: Texture): Texture {
     let [sum, power]: Texture[] = [this.one, feedback];
-    steps.forEach((doubling, step) => {
+    doublings(this.terms).forEach((doubling, step) => {
       const left = doubling ? power : feedback;
-      const isLast = step === steps.length - 1;
-      const next = isLast ? target : this.sums[step % 2];
       Object.assign(this.added.uniforms, uniforms({ left, right: sum, added: doubling ? sum : this.one }));
-      this.added.draw(renderer, next);
-      sum = next.texture;
-      if (isLast) return;
+      this.added.draw(renderer, this.sums[step % 2]);
       Object.assign(this.plain.uniforms, uniforms({ left, right: power }));
       this.plain.draw(renderer, this.powers[step % 2]);
-      power = this.powers[step % 2].texture;
+      [sum, power] = [this.sums[step % 2].texture, this.powers[step % 2].texture];
     });
     return sum;
   }

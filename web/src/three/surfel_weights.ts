@@ -11,7 +11,7 @@ import blockSums from "../shaders/block_sums.glsl";
 import surfelMeans from "../shaders/surfel_means.glsl";
 import tableSums from "../shaders/table_sums.glsl";
 import { type ShapeLights, shapeState, shapeWeights } from "../shape_weights";
-import { packedCells, square, type Surfels } from "../surfels";
+import { packedCells, packedReflectance, shapesTable, square, type Surfels } from "../surfels";
 import type { ShadowedLook } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
@@ -40,9 +40,11 @@ export class SurfelWeights {
   private readonly ranges: DataTexture;
   private readonly direct: SurfelIrradiance;
   private readonly received: WebGLRenderTarget;
+  private readonly reflectance: DataTexture;
   private readonly means: FullscreenPass;
   private readonly tables: Table[];
   private readonly ranks: number;
+  private readonly ofShapes: Table; // whose sums are weights of shapes
   private shapes = "";
   private version = 0;
   private repainting?: Repainting;
@@ -59,8 +61,9 @@ export class SurfelWeights {
     this.direct = new SurfelIrradiance(surfels, cells, shadowSize);
     this.ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
     this.received = floatTarget(cells.rangesWidth, cells.rangesHeight);
-    this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.direct.normals }, ranges: { value: this.ranges } });
-    this.ranks = surfels.tables[0].functions;
+    this.reflectance = floatTexture(packedReflectance(surfels.reflectance, cells), cells.rangesWidth, cells.rangesHeight);
+    this.means = new FullscreenPass(surfelMeans, { irradiance: { value: null }, normals: { value: this.direct.normals }, ranges: { value: this.ranges }, reflectance: { value: this.reflectance } });
+    this.ranks = surfels.tables[shapesTable(surfels)].functions;
     let numbers = this.received.texture;
     this.tables = surfels.tables.map((values, i) => {
       const [width, height] = i === surfels.tables.length - 1 ? [weights.width, weights.height] : square(values.functions);
@@ -68,6 +71,7 @@ export class SurfelWeights {
       numbers = table.target.texture;
       return table;
     });
+    this.ofShapes = this.tables[shapesTable(surfels)];
   }
 
   /** The weights, as the shaders of the asset take them. */
@@ -92,23 +96,26 @@ export class SurfelWeights {
     const state = `${shapeState(lights)} ${tables.surfaces?.version}`;
     if (state === this.shapes) return;
     this.shapes = state;
-    const { added } = this.tables[0];
+    const { added } = this.ofShapes;
     addedNumbers(added, shapeWeights(tables, lights) ?? new Float64Array(3 * this.ranks));
   }
 
-  /** The first table with the albedo that its objects have now. */
+  /** The tables with the albedo that objects have now. */
   private repaint(renderer: WebGLRenderer): void {
     const { surfaces } = this.asset.tables;
     if (!surfaces || surfaces.version === this.version) return;
     this.version = surfaces.version;
-    const { parts, texture, scale } = this.tables[0];
-    if (surfaces.change) this.repainting ??= new Repainting(surfaces, texture, scale);
+    const { parts, texture, scale } = this.ofShapes;
+    if (surfaces.change) this.repainting ??= new Repainting(surfaces);
     parts.uniforms.table.value = surfaces.change && this.repainting ? this.repainting.draw(renderer, surfaces.change) : texture;
     parts.uniforms.scale.value = surfaces.change ? 1 : scale;
+    const texels = this.reflectance.image.data as Float32Array;
+    surfaces.reflectance.forEach((value, i) => (texels[4 * Math.floor(i / 3) + (i % 3)] = value));
+    this.reflectance.needsUpdate = true;
   }
 
   dispose(): void {
-    for (const one of [this.direct, this.ranges, this.received, this.means]) one.dispose();
+    for (const one of [this.direct, this.ranges, this.reflectance, this.received, this.means]) one.dispose();
     for (const { parts, partial, whole, target, texture, added } of this.tables) for (const one of [parts, partial, whole, target, texture, added]) one.dispose();
     this.repainting?.dispose();
   }

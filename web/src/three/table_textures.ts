@@ -17,8 +17,8 @@ export function tableTexture({ data, gray, functions, count }: LightValues): { t
     const spread = (x / scale) * digits;
     return DataUtils.toHalfFloat(spread - (spread - x / scale));
   };
-  const step = gray ? 1 : 4;
-  for (let i = 0; i < data.length / 3; ++i) for (let c = 0; c < Math.min(step, 3); ++c) halves[step * i + c] = half(data[3 * i + c]);
+  const [step, channels] = gray ? [1, 1] : [4, 3];
+  for (let i = 0; i < texels; ++i) for (let c = 0; c < channels; ++c) halves[step * i + c] = half(data[channels * i + c]);
   const texture = new DataTexture(halves, width, height, gray ? RedFormat : RGBAFormat, HalfFloatType);
   texture.needsUpdate = true;
   return { texture, scale };

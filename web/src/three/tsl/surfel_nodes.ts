@@ -7,7 +7,7 @@ import type { LightValues } from "../../light_values";
 import type { Triple } from "../../matrix";
 import { versine as versineOf } from "../../point_light";
 import { type ShapeLights, shapeState, shapeWeights } from "../../shape_weights";
-import { packedCells, square } from "../../surfels";
+import { packedCells, packedReflectance, shapesTable, square } from "../../surfels";
 import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
 import { surfelsOf } from "../surfel_weights";
@@ -44,6 +44,7 @@ export class SurfelNodes {
   private readonly textures: DataTexture[];
   private readonly added: DataTexture[] = [];
   private readonly ranks: number;
+  private readonly ofShapes: number; // the table whose sums are weights of shapes
   private shapes = "";
 
   /** `computed`: the tables by compute shaders, on WebGPU alone. @throws SrbfError on an asset without cells. */
@@ -59,17 +60,19 @@ export class SurfelNodes {
     const places = floatTexture(cells.places, cells.width, cells.height);
     const normals = floatTexture(cells.normals, cells.width, cells.height);
     const ranges = floatTexture(cells.ranges, cells.rangesWidth, cells.rangesHeight);
-    this.textures = [places, normals, ranges];
+    const reflectance = floatTexture(packedReflectance(surfels.reflectance, cells), cells.rangesWidth, cells.rangesHeight);
+    this.textures = [places, normals, ranges, reflectance];
     this.sums = [target(cells.width, cells.height), target(cells.width, cells.height)];
     this.cells = { places, normals, lift: surfels.cells.lift };
     const near = seenFromPlace(this.uniforms, { maps: this.maps.faces.map(({ texture }) => texture), size: shadowSize });
     const far = seenFromFar(this.uniforms, { maps: [this.maps.far.texture], size: 4 * shadowSize });
     this.looks = { near: this.passesOf(false, near), far: this.passesOf(true, far) };
     const received = target(cells.rangesWidth, cells.rangesHeight);
-    const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, normals, ranges, cells.width), received);
+    const mean = (from: 0 | 1) => pass(meanNode(this.sums[from].texture, { normals, ranges, reflectance }, cells.width), received);
     this.means = [mean(0), mean(1)];
-    this.ranks = surfels.tables[0].functions;
     const stages = this.stagesOf(surfels.tables);
+    this.ofShapes = shapesTable(surfels);
+    this.ranks = surfels.tables[this.ofShapes].functions;
     this.tables = computed ? [] : tablePasses(stages, received);
     if (computed) this.compute = new TableCompute(stages, received);
   }
@@ -84,7 +87,7 @@ export class SurfelNodes {
     const state = shapeState(lights);
     if (state === this.shapes) return;
     this.shapes = state;
-    addedNumbers(this.added[0], shapeWeights(this.asset.tables, lights) ?? new Float64Array(3 * this.ranks));
+    addedNumbers(this.added[this.ofShapes], shapeWeights(this.asset.tables, lights) ?? new Float64Array(3 * this.ranks));
   }
 
   draw(renderer: Renderer, looks: readonly ShadowedLook[]): void {
@@ -181,7 +184,7 @@ function tablePasses(stages: readonly Stage[], received: RenderTarget): Pass[] {
 const here = (): N => ivec2(screenCoordinate);
 
 /** `surfel_means.glsl`. */
-function meanNode(irradiance: Texture, normals: Texture, ranges: Texture, width: number): N {
+function meanNode(irradiance: Texture, { normals, ranges, reflectance }: Record<"normals" | "ranges" | "reflectance", Texture>, width: number): N {
   return Fn(() => {
     const range = textureLoad(ranges, here()).toVar();
     const first = int(range.x.add(0.5)).toVar();
@@ -190,7 +193,7 @@ function meanNode(irradiance: Texture, normals: Texture, ranges: Texture, width:
       const at = folded(first.add(i), width).toVar();
       total.addAssign(textureLoad(normals, at).w.mul(textureLoad(irradiance, at).rgb));
     });
-    return vec4(total, 1);
+    return vec4(total.mul(textureLoad(reflectance, here()).rgb), 1);
   })();
 }
 
