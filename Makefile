@@ -3,7 +3,7 @@ PYTHON ?= python3.11
 NAME := $(notdir $(PYTHON))
 VENV ?= $(if $(filter python3.11,$(NAME)),.venv,.venv-$(NAME))
 BIN := $(VENV)/bin
-SCENE ?= caustics
+SCENE ?= loft
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
@@ -26,7 +26,7 @@ $(VENV)/.tested-by: $(VENV)/.installed
 	$(BIN)/pip install --quiet --editable blender_bake --editable '.[blender,gl,ray,report,export,test,dev,docs]'
 	touch $@
 
-# SCENE: caustics and house under directional lights, loft with lights inside.
+# SCENE: loft with lights inside, caustics and house under directional lights.
 demo: setup $(PAGE)
 	$(BIN)/srbf demo --scene $(SCENE) -o $(OUT)
 

@@ -19,7 +19,7 @@ from web_assets import complete
 
 from srbf.asset import Asset
 from srbf.export import export
-from srbf.io.image import write_image
+from srbf.io.image import read_image, write_image
 from srbf.lights import DirectionalLight, PointLight, SpotLight
 from srbf.methods import relight
 from srbf.relighting.direct_light import Added
@@ -127,3 +127,23 @@ def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[
     chromium("open", url=serve_static(tmp_path / "site") + where, width=WIDTH, height=HEIGHT)
     apart = np.abs(chromium.texels(SIDE, SIDE, ZOOM) - shown_as(expected))
     assert (apart.max(), apart.mean()) <= (MOST_APART, MEAN_APART)
+
+
+def test_shadows_on_a_mesh_are_finer_than_the_lightmap(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
+    """A texel has 8 cm: across the edge of a shadow light falls within a third of that, where texels of the lightmap take all of one."""
+    source = {**split.manifest.get("source", {}), "receiver": {"kind": "lightmap", "object": "Ground"}}
+    replace(split, manifest={**split.manifest, "source": source}).save(tmp_path / "asset")
+    light = {"kind": "point", "on": True, "color": "#ffffff", "intensity": 1.0, "position": [-0.4, 0.1, 2.5], "a0": 2.5}
+    state = {
+        **{"terms": "direct", "exposure": 0, "selected": -1, "view": "mesh", "eye": [[0.0, -0.01, 2.2], [0.0, 0.0, 0.0]]},
+        "lights": [{**light, "falloff": "inverse-square", "radius": 0.001}],
+    }
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(json.dumps(state))}", width=WIDTH, height=HEIGHT)
+    (tmp_path / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
+    shown = read_image(tmp_path / "saved.png", 3)[..., 1]
+    row = shown[np.argmax((shown < 0.02).sum(axis=1))]  # through the shadow of the ball
+    last = int(np.flatnonzero(row < 0.02).max())
+    texel = 2 / SIDE * len(shown) / (2 * 2.2 * np.tan(np.radians(38 / 2)))  # pixels
+    edge = row[last - 2 : last + int(2 * texel)]
+    assert edge[-1] > 0.1, "light, beside the shadow"
+    assert ((edge > 0.1 * edge[-1]) & (edge < 0.9 * edge[-1])).sum() < 0.4 * texel

@@ -1,7 +1,7 @@
 /** Direct light on an indirect asset by shadow maps, with the shader pack's stages; environments and named lights add none. */
 import { Color, type DataTexture, FloatType, type Object3D, RGBAFormat, SphereGeometry, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import { type Asset, type FloatImage, type Light, moved, SrbfError, type Triple } from "../src";
-import { type DirectReceivers, directReceivers } from "./direct_points";
+import { type DirectReceivers, directReceivers, fineReceivers } from "./direct_points";
 import { PointShadows } from "./point_shadows";
 import { shadowCasters } from "./shadow_casters";
 import { clear, floatTexture, type LitTexels, renderTarget } from "./shadow_maps";
@@ -34,11 +34,13 @@ export class DirectLight {
   private drawn = "";
   private cast = "";
 
-  /** Of an asset's texels. @throws SrbfError where the GPU cannot blend floats. */
-  static ofAsset(asset: Asset, inputs: DirectInputs, renderer: WebGLRenderer): DirectLight {
+  /** Of an asset's texels, or of `factor`² parts of each as texels of their own. @throws SrbfError where the GPU cannot blend floats. */
+  static ofAsset(asset: Asset, inputs: DirectInputs, renderer: WebGLRenderer, factor = 1): DirectLight {
     const { width, height, direct } = asset.manifest;
-    const receivers = directReceivers(asset, asset.position as FloatImage, inputs.normal, inputs.coverage, direct?.footprint ?? 1);
-    return new DirectLight(asset, receivers, { width, height, reflectance: reflectance(asset, inputs.albedo) }, inputs.scene, renderer);
+    const { normal, coverage, scene } = inputs;
+    const position = asset.position as FloatImage;
+    const receivers = factor > 1 ? fineReceivers(asset, position, normal, coverage, factor) : directReceivers(asset, position, normal, coverage, direct?.footprint ?? 1);
+    return new DirectLight(asset, receivers, { width: factor * width, height: factor * height, reflectance: reflectance(asset, inputs.albedo, factor) }, scene, renderer);
   }
 
   /** Of `width` x `height` white points that move, in the frame of `asset`: put them somewhere first. @throws as `ofAsset`. */
@@ -122,12 +124,18 @@ export class DirectLight {
   }
 }
 
-/** 1, or albedo / pi, RGBA. */
-function reflectance(asset: Asset, albedo: FloatImage | undefined): Float32Array {
+/** 1, or albedo / pi, RGBA, of `factor`² parts of each texel. */
+function reflectance(asset: Asset, albedo: FloatImage | undefined, factor: number): Float32Array {
   const { width, height, quantity } = asset.manifest;
-  const out = new Float32Array(4 * width * height).fill(1);
+  const [across, down] = [factor * width, factor * height];
+  const out = new Float32Array(4 * across * down).fill(1);
   if (quantity === "irradiance" || !albedo) return out;
-  for (let i = 0; i < width * height; ++i) for (let c = 0; c < 3; ++c) out[4 * i + c] = albedo.data[albedo.channels * i + c] / Math.PI;
+  for (let row = 0, at = 0; row < down; ++row) {
+    for (let column = 0; column < across; ++column, at += 4) {
+      const i = Math.floor(row / factor) * width + Math.floor(column / factor);
+      for (let c = 0; c < 3; ++c) out[at + c] = albedo.data[albedo.channels * i + c] / Math.PI;
+    }
+  }
   return out;
 }
 

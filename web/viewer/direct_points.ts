@@ -27,6 +27,31 @@ export interface DirectReceivers {
   bounds: Float32Array;
 }
 
+/** The same box, and one point for each of `factor`² parts of a texel, as texels of their own: shadows are as crisp as those are small. */
+export function fineReceivers(asset: Asset, position: FloatImage, normal: FloatImage, coverage: FloatImage | undefined, factor: number): DirectReceivers {
+  const { center, bounds } = directReceivers(asset, position, normal, coverage, 1);
+  const { width, height } = asset.manifest;
+  const real = (i: number) => coverage === undefined || coverage.data[coverage.channels * i] > 0;
+  const along = gradients(width, height, position, normal, real);
+  const points = new Float32Array(4 * factor ** 2 * width * height);
+  const normals = new Float32Array(points.length);
+  const turned = [0, 0, 0];
+  for (let row = 0, at = 0; row < factor * height; ++row) {
+    const y = ((row % factor) + 0.5) / factor - 0.5;
+    for (let column = 0; column < factor * width; ++column, at += 4) {
+      const x = ((column % factor) + 0.5) / factor - 0.5;
+      const i = Math.floor(row / factor) * width + Math.floor(column / factor);
+      for (let c = 0; c < 3; ++c) {
+        points[at + c] = position.data[position.channels * i + c] - center[c] + x * along.position[0][3 * i + c] + y * along.position[1][3 * i + c];
+        turned[c] = normal.data[normal.channels * i + c] + x * along.normal[0][3 * i + c] + y * along.normal[1][3 * i + c];
+      }
+      const length = Math.max(Math.hypot(turned[0], turned[1], turned[2]), 1e-20);
+      for (let c = 0; c < 3; ++c) normals[at + c] = turned[c] / length;
+    }
+  }
+  return { center, corners: [{ points, normals }], bounds };
+}
+
 /** The points at which `asset` is lit; `footprint` is the fraction of a texel's side that they span. */
 export function directReceivers(asset: Asset, position: FloatImage, normal: FloatImage, coverage: FloatImage | undefined, footprint: number): DirectReceivers {
   const { width, height } = asset.manifest;

@@ -6,6 +6,7 @@ import { alphaTexture } from "../src/three/textures";
 import type { BallState } from "./ball_state";
 import { DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
+import { FineLightmap, finenessOf } from "./fine_lightmap";
 import { lineOf, say } from "./messages";
 import { ViewerRelighting } from "./relighting";
 import type { State } from "./state";
@@ -19,6 +20,8 @@ export class Subject {
   readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
   private readonly direct?: DirectLight;
+  private readonly fine?: { direct: DirectLight; lightmap: FineLightmap };
+  private isFine = false;
 
   constructor(loaded: LoadedAsset, renderer: WebGLRenderer) {
     this.facts = loaded.facts;
@@ -30,6 +33,9 @@ export class Subject {
     if (!loaded.direct) return;
     try {
       this.direct = DirectLight.ofAsset(loaded.asset, loaded.direct, renderer);
+      const factor = finenessOf(loaded.asset);
+      const { width, height } = loaded.asset.manifest;
+      if (factor > 1) this.fine = { direct: DirectLight.ofAsset(loaded.asset, loaded.direct, renderer, factor), lightmap: new FineLightmap(factor * width, factor * height, floats) };
     } catch (error) {
       say(lineOf(error), "hint");
     }
@@ -44,6 +50,11 @@ export class Subject {
     return this.relighting.lightmap as Texture;
   }
 
+  /** What a mesh shows: the lightmap, or one with finer direct light. */
+  get shown(): Texture {
+    return this.isFine && this.fine ? this.fine.lightmap.texture : this.lightmap;
+  }
+
   /** How many coefficient maps there are to look at. */
   get maps(): number {
     return this.asset.tables.maps;
@@ -55,13 +66,19 @@ export class Subject {
     return tables.centers.filter((direction) => manifest.domain === "sphere" || direction[2] > 0); // some light functions lie past the horizon
   }
 
-  /** Draw the lightmap under `lights`, with the direct shadow of a sphere. */
-  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState): void {
+  /** Draw the lightmap under `lights`, with the direct shadow of a sphere; `onMesh`: with finer direct light, in `shown`. */
+  relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState, onMesh = false): void {
     this.relighting.set(lights);
-    this.direct?.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
-    const wanted = this.direct && terms !== "indirect" ? this.direct.draw(lights) : undefined;
-    this.relighting.add(wanted, terms === "direct" && wanted !== undefined);
+    const wanted = this.direct !== undefined && terms !== "indirect";
+    this.isFine = onMesh && wanted && this.fine !== undefined;
+    const source = this.isFine ? this.fine?.direct : this.direct;
+    source?.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
+    const direct = wanted ? source?.draw(lights) : undefined;
+    const alone = terms === "direct" && direct !== undefined;
+    if (this.isFine) this.relighting.add();
+    else this.relighting.add(direct, alone);
     this.relighting.update(renderer);
+    if (this.isFine && this.fine && direct) this.fine.lightmap.draw(renderer, this.lightmap, direct, alone);
   }
 }
 

@@ -54,6 +54,7 @@ export class Viewer {
   private readonly comparison: Comparison;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
+  private fine = false;
   private outside = "";
   private shining: Light[] = [];
   private readonly environments = new Map<string, Environment>();
@@ -264,7 +265,7 @@ export class Viewer {
     if (this.paces.length > PACES) this.paces.shift();
     this.drawNeeded = false;
     try {
-      if (this.lightsChanged) this.relight();
+      if (this.lightsChanged || this.fine !== this.showsFine()) this.relight();
       this.lightsChanged = false;
       this.present();
       this.error = "";
@@ -308,7 +309,9 @@ export class Viewer {
     }
     const { ball } = this.state;
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
-    this.subject.relight(this.shining, terms, this.renderer, shown);
+    this.fine = this.showsFine();
+    this.subject.relight(this.shining, terms, this.renderer, shown, this.fine);
+    this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
     const light = this.comparable();
@@ -320,6 +323,11 @@ export class Viewer {
     const line = outsideLine(this.subject.asset, this.state.lights);
     if (line && !this.outside) say(line, "hint");
     this.outside = line;
+  }
+
+  /** Whether a mesh is shown, whose direct light may be finer than its lightmap. */
+  private showsFine(): boolean {
+    return this.stage.hasMesh && this.state.show === "picture" && !this.comparing();
   }
 
   private comparing(): boolean {
