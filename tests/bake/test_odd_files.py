@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -40,10 +39,9 @@ def bake(scene: Path, folder: Path, receiver: str, width: int = 16, height: int 
 
 
 def run(*words: object) -> tuple[int, str]:
-    """Exit status and what was said of `srbf bake`."""
-    line = [sys.executable, "-m", "srbf", "bake", *map(str, words)]
-    done = subprocess.run(line, capture_output=True, text=True, timeout=120)
-    return done.returncode, done.stderr
+    """Exit status and what was said of `srbf bake`, in this process."""
+    done = CliRunner().invoke(app, ["bake", *map(str, words)])
+    return done.exit_code, done.stderr
 
 
 @pytest.mark.parametrize(
