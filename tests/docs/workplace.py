@@ -35,9 +35,9 @@ from srbf.viewer.server import ViewerServer
 BLENDS = {"scene": "Table", "room": "Room"}  # NAME.blend -> its receiver's name in the documentation
 SAME = {
     "scene.blend": ["SCENE.blend", "their.blend"],
-    "capture": ["CAPTURE", "out/caustics/capture"],
-    "asset": ["ASSET", "OTHER", "out/caustics/asset"],
-    "model.glb": ["SCENE.glb", "ROOM.glb"],
+    "capture": ["CAPTURE", "out/caustics/capture", "out/loft/capture"],
+    "asset": ["ASSET", "OTHER", "out/caustics/asset", "out/caustics/maps", "out/loft/asset"],
+    "model.glb": ["SCENE.glb", "ROOM.glb", "out/caustics/scene.glb", "out/loft/scene.glb"],
 }
 FEWER = """
 import bpy, sys
