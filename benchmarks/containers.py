@@ -20,7 +20,7 @@ import numpy as np
 from numpy import ndarray
 from scipy import ndimage
 
-from srbf.asset import Asset
+from srbf.asset import Asset, LayerEncoding
 from srbf.capture import Capture
 from srbf.encode.quantization import quantize, round_together
 from srbf.encode.uv_seams import Stitch

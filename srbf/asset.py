@@ -20,8 +20,8 @@ from srbf.channels import GLOSS, THROUGH
 from srbf.errors import InputError, ManifestError
 from srbf.io import files
 from srbf.io.containers.texture_array import level_bytes, level_size
-from srbf.io.image import Encoding, write_image, write_images
-from srbf.io.packed_table import Packed, pack
+from srbf.io.image import Encoding, write_images
+from srbf.io.packed_table import pack
 from srbf.probe_grid import ProbeGrid, probes_of
 from srbf.receiver_images import Quantity
 from srbf.registry import method_named
@@ -399,20 +399,14 @@ class Asset:
 
     def write(self, folder: Path, layers: bool = True) -> None:
         """Fill an existing folder; fills in `sha256` of all that lies there. Without `layers`, they lie there already."""
-        images: list[tuple[Path, ndarray, Encoding]] = []
+        images: list[tuple[Path, ndarray, Encoding, bool]] = []
         if layers:
-            images += [(folder / entry["file"], stored, self.held) for entry, stored in zip(self.layers, self.stored, strict=True)]
-        packed: list[tuple[Path, ndarray, Packed]] = []
+            images += [(folder / entry["file"], stored, self.held, False) for entry, stored in zip(self.layers, self.stored, strict=True)]
         for name, table in self.tables.items():
-            entry, pixels = self.manifest[name], table[None] if table.ndim == 1 else table
-            if "packed" in entry:
-                packed.append((folder / entry["file"], table, entry["packed"]))
-            else:
-                images.append((folder / entry["file"], np.atleast_3d(pixels), _ENCODING[table.dtype.name]))
-        images += [(folder / self.manifest[name], image, "float") for name, image in self.images.items()]
-        write_images(images)
-        for path, table, by in packed:
-            write_image(path, pack(table, by), "uint8", noisy=True)
+            entry = self.manifest[name]
+            pixels = pack(table, entry["packed"]) if "packed" in entry else np.atleast_3d(table[None] if table.ndim == 1 else table)
+            images.append((folder / entry["file"], pixels, _ENCODING[pixels.dtype.name], "packed" in entry))
+        write_images([*images, *((folder / self.manifest[name], image, "float", False) for name, image in self.images.items())])
         if self.scene is not None:
             (folder / self.manifest["scene"]).write_bytes(self.scene)
         if self.probes is not None:

@@ -10,10 +10,11 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Int
-from srbf.capture import STREAM_BYTES, Capture, OnImage
+from srbf.capture import Capture
 from srbf.captured_light import ROLES, CapturedLight, Role
 from srbf.cubemap import Cubemap
 from srbf.cubemap_transport import CubemapTransport, read_transport
+from srbf.light_images import OnImage
 from srbf.receiver_images import Rows
 
 BLOCK = 64  # images made at a time
@@ -34,11 +35,8 @@ class CubemapCapture(Capture):
     def partial_image(self, index: int) -> tuple[Float32[ndarray, "H W 3"], Bool[ndarray, "H W"]]:
         return self.image(index), np.ones((self.height, self.width), bool)
 
-    def stream(
-        self, indices: Sequence[int], on_image: OnImage = lambda row, image: None, rows: Rows = None
-    ) -> Iterator[tuple[int, Float[ndarray, "b P 3"]]]:
-        size = max(1, STREAM_BYTES // (self.width * self.height * 12))
-        return self._blocks(indices, size, np.dtype(np.float32), 2, on_image, rows)
+    def _stored_type(self, indices: Sequence[int]) -> np.dtype:
+        return np.dtype(np.float32)
 
     def sample(self, indices: Sequence[int], texels: Int[ndarray, " n"]) -> Float32[ndarray, "n L 3"]:
         columns = np.array([-1 if self.lights[i].column is None else self.lights[i].column for i in indices], np.int64)

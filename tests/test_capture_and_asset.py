@@ -10,11 +10,12 @@ import OpenImageIO as oiio
 import pytest
 
 from srbf.asset import Asset
-from srbf.capture import BLOCK_BYTES, Capture
+from srbf.capture import Capture
 from srbf.channels import CHANNELS, TOP_LEVEL, Channel, manifest_keys
 from srbf.errors import ImageError, InputError, ManifestError, SrbfError
 from srbf.info import describe
 from srbf.io.image import write_image
+from srbf.light_images import BLOCK_BYTES
 from srbf.methods.relighting_map import RelightingMap
 from srbf.schemas import load_schema
 
@@ -39,7 +40,7 @@ def test_a_minimal_manifest_with_unknown_keys_is_read(capture: Capture) -> None:
 
 
 def test_blocks_are_the_images_in_order(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.capture.BLOCK_BYTES", 3 * 6 * 8 * 12)
+    monkeypatch.setattr("srbf.light_images.BLOCK_BYTES", 3 * 6 * 8 * 12)
     indices = capture.indices("train")
     seen = [(first, block.copy()) for first, block in capture.blocks(indices)]
     assert [first for first, _ in seen] == list(range(0, 20, 3))
@@ -52,7 +53,7 @@ def test_the_stream_is_the_images_as_stored(make_capture, encoding: str, monkeyp
     rng = np.random.default_rng(3)
     capture = make_capture(lambda d: rng.normal(size=(6, 8, 3)), lights=20, encoding=encoding)
     stored = np.float16 if encoding == "half" else np.float32
-    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 3 * 6 * 8 * 3 * np.dtype(stored).itemsize)
+    monkeypatch.setattr("srbf.light_images.STREAM_BYTES", 3 * 6 * 8 * 3 * np.dtype(stored).itemsize)
     indices = capture.indices("train")[::-1]
     looked: dict[int, np.ndarray] = {}
     seen = [(first, block.copy()) for first, block in capture.stream(indices, lambda row, image: looked.update({row: image}))]
@@ -79,7 +80,7 @@ def test_a_sample_is_rows_of_the_transport_matrix(capture: Capture) -> None:
 
 
 def test_a_stream_left_early_or_broken_ends(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 1)
+    monkeypatch.setattr("srbf.light_images.STREAM_BYTES", 1)
     stream = capture.stream(capture.indices("train"))
     next(stream)
     stream.close()
@@ -190,7 +191,7 @@ def test_kept_captures_and_other_roles_are_the_images_on_disk(make_capture, monk
     np.testing.assert_array_equal(some.coverage()[0], coverage.ravel()[texels])
     np.testing.assert_array_equal(whole.coverage(), coverage)
     indices = [12, 0, 14]
-    monkeypatch.setattr("srbf.capture.STREAM_BYTES", 4 * 6 * 8 * 12)
+    monkeypatch.setattr("srbf.light_images.STREAM_BYTES", 4 * 6 * 8 * 12)
     for again in (whole, capture.with_roles(roles), whole.with_roles(roles), some.with_roles(roles)):
         kept = [i for i, role in enumerate(roles) if role] if len(again.lights) < 15 else list(range(15))
         assert [light.direction for light in again.lights] == [capture.lights[i].direction for i in kept]

@@ -10,8 +10,9 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.capture import Capture, OnImage
+from srbf.capture import Capture
 from srbf.encode.uv_seams import Stitch
+from srbf.light_images import OnImage
 from srbf.solve.adaptive_clustered_pca import adaptive_cluster
 from srbf.solve.clustered_pca import Clusters, cluster
 from srbf.solve.grouped_product import GroupedProduct

@@ -10,9 +10,10 @@ from numpy import ndarray
 
 from srbf.arrays import Float32
 from srbf.basis.neural_decoder import NeuralDecoder
-from srbf.capture import Capture, OnImage
+from srbf.capture import Capture
 from srbf.encode.model_selection import TexelSample
 from srbf.encode.weighted_rows import LightSpace
+from srbf.light_images import OnImage
 from srbf.solve.autoencoder import train
 from srbf.solve.pca import principal_axes
 from srbf.solve.streamed_product import StreamedProduct

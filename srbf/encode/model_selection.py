@@ -10,11 +10,12 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float32, Float64, Int
-from srbf.capture import COVERED, STRIP, Capture
+from srbf.capture import COVERED, Capture
 from srbf.compute.threads import each, one_blas_thread
 from srbf.encode.cross_validation import HeldOut
 from srbf.errors import InputError
 from srbf.light_domain import LightDomain, domain_of_capture
+from srbf.light_images import STRIP
 from srbf.solve.kernel_ridge import KernelPath
 
 Rule = Literal["validation", "leave-one-light-out"]

@@ -11,8 +11,9 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
-from srbf.capture import STRIP, Capture
+from srbf.capture import Capture
 from srbf.errors import SrbfError
+from srbf.light_images import STRIP
 from srbf.solve.least_squares import LeastSquaresReport, StreamedLeastSquares
 from srbf.solve.streamed_product import TASK_COLUMNS
 

@@ -14,11 +14,12 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.asset import Asset
 from srbf.basis.gaussian import GaussianBasis
-from srbf.capture import BLOCK_BYTES, COVERED, Capture
+from srbf.capture import COVERED, Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.image import write_image
 from srbf.light_domain import Directions, domain_of_capture
+from srbf.light_images import BLOCK_BYTES
 from srbf.methods import responses
 from srbf.receiver_images import MANIFEST
 from srbf.solve.least_squares import StreamedLeastSquares

@@ -260,8 +260,8 @@ def write_image(path: Path, pixels: ndarray, encoding: Encoding, noisy: bool = F
             raise ImageError(f"cannot write image {path}: {_first_line(target.geterror())}; is the disk full?")
 
 
-def write_images(images: Sequence[tuple[Path, ndarray, Encoding]]) -> None:
-    """`write_image` of each (path, pixels, encoding), with one thread per core; raises the first error after all have ended."""
+def write_images(images: Sequence[tuple[Path, ndarray, Encoding, bool]]) -> None:
+    """`write_image` of each (path, pixels, encoding, noisy), with one thread per core; raises the first error after all have ended."""
     each(lambda i: write_image(*images[i]), len(images))
 
 

@@ -13,7 +13,7 @@ from srbf.asset_reader import AssetReader
 from srbf.compute.full_precision import by_channel
 from srbf.errors import ManifestError
 from srbf.lights import EnvironmentLight
-from srbf.methods.light_table_maps import stored_values
+from srbf.methods.light_table_maps import scaled_halves
 from srbf.visibility.environment_cells import EnvironmentRows, cell_radiance
 
 KEY = "environment_transfer"
@@ -28,13 +28,13 @@ def environment_columns(transfer: Float32[ndarray, "r S 3"], environment: Enviro
 
 def add_environment_table(asset: Asset, columns: Float32[ndarray, "r K 3"], environment: EnvironmentRows) -> None:
     """The table and its key of the manifest: which cells, of a map of how many per side."""
-    asset.tables[KEY], entry = stored_values(columns)
+    asset.tables[KEY], scale = scaled_halves(columns)
     asset.manifest[KEY] = {
         "file": FILES[KEY],
         "rank": len(columns),
         "side": environment.side,
         "cells": environment.seen.tolist(),
-        "scale": entry["light_values"]["scale"],
+        "scale": scale,
     }
 
 

@@ -216,8 +216,13 @@ def pack_table(asset: Asset, name: str, by: Packed) -> None:
 
 
 def stored_values(values: Float32[ndarray, "F N c"]) -> tuple[Float16[ndarray, "F N c"], dict[str, Any]]:
-    """(the table as halves, the manifest's key `light_values`): value = stored times `scale`, a power of two that keeps halves precise."""
+    """(the table as halves, the manifest's key `light_values`)."""
+    table, scale = scaled_halves(values)
+    return table, {"light_values": {"file": VALUES_FILE, "lights": values.shape[1], "scale": scale}}
+
+
+def scaled_halves(values: Float32[ndarray, "F N c"]) -> tuple[Float16[ndarray, "F N c"], float]:
+    """(a table as halves, scale): value = stored times the scale, a power of two that keeps halves precise."""
     largest = float(np.abs(values).max()) if values.size else 0.0
-    scale = 2.0 ** np.ceil(np.log2(largest / HALF_TOP)) if largest > 0 else 1.0
-    entry = {"light_values": {"file": VALUES_FILE, "lights": values.shape[1], "scale": float(scale)}}
-    return (values / np.float32(scale)).astype(np.float16), entry
+    scale = float(2.0 ** np.ceil(np.log2(largest / HALF_TOP))) if largest > 0 else 1.0
+    return (values / np.float32(scale)).astype(np.float16), scale

@@ -18,12 +18,13 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
-from srbf.capture import Capture, OnImage
+from srbf.capture import Capture
 from srbf.encode.row_blocks import SolveRows
 from srbf.encode.uv_seams import Stitch
 from srbf.errors import InputError
 from srbf.io.image import Encoding
 from srbf.light_domain import domain_of_asset, light_of
+from srbf.light_images import OnImage
 from srbf.lights import Light, PointLight
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from srbf.encode.table_steps import steps_by_column
 from srbf.errors import InputError
 from srbf.methods.environment_table import without_environment_table
 from srbf.methods.surfel_tables import albedo_of, gather_of, has_series, set_albedo, set_series
-from srbf.solve.radiosity import MOST_REFLECTED, summed_series
+from srbf.solve.radiosity import MOST_REFLECTED, series_by_channel, summed_series
 from srbf.visibility.transfer_basis import Emitted, TransferBasis, grouped
 from srbf.visibility.transfer_operator import TransferOperator
 
@@ -150,9 +150,8 @@ class Surfaces:
         self._share_of(name)
         first = self.emission[:, self.names.index(name)] * radiance.astype(np.float32)  # (r, 3)
         more = None if self.bounces is None else self.bounces + 1
-        return np.stack([summed_series(self.feedback[:, :, c], first[:, c : c + 1], more)[:, 0] for c in range(3)], axis=1).astype(
-            np.float64
-        )
+        columns = [summed_series(self.feedback[:, :, c], first[:, c : c + 1], more)[:, 0] for c in range(3)]
+        return np.stack(columns, axis=1).astype(np.float64)
 
     def painted(self, albedo: Mapping[str, tuple[float, float, float]]) -> Surfaces:
         """The same with objects of another albedo."""
@@ -176,8 +175,7 @@ class Surfaces:
 
     def series(self) -> Float32[ndarray, "r r 3"]:
         """Sum over k of feedback^k, all exchanges of light: what a change of albedo replaces."""
-        one = np.eye(len(self.feedback), dtype=np.float32)
-        return np.stack([summed_series(self.feedback[:, :, c], one, self.bounces) for c in range(3)], axis=2)
+        return series_by_channel(self.feedback, self.bounces)
 
     def _share_of(self, name: str) -> Float32[ndarray, " S"]:
         if name not in self.names:

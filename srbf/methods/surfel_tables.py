@@ -17,7 +17,7 @@ from srbf.asset import Asset
 from srbf.asset_reader import AssetReader
 from srbf.compute.full_precision import by_channel, times_columns
 from srbf.encode.table_steps import ROUNDING_NOISE, power_of_two
-from srbf.methods.light_table_maps import pack_table, stored_values
+from srbf.methods.light_table_maps import pack_table, scaled_halves
 
 TRANSFER = "surfel_transfer"  # sizes, and R itself in exports to engines and in older assets
 GATHER, ALBEDO, SERIES = "surfel_gather", "surfel_albedo", "surfel_series"
@@ -61,14 +61,12 @@ def add_surfel_tables(
 def set_series(asset: Asset, series: Float32[ndarray, "r r 3"], shapes: Float32[ndarray, " r"] | None = None) -> None:
     """N of 1 + N, in steps by which pictures of shapes of those rms change by SERIES_ERROR; None: as it is, in a larger file."""
     later = series - np.eye(len(series), dtype=np.float32)[:, :, None]
-    if shapes is None:
-        asset.tables[SERIES], entry = stored_values(later)
-        asset.manifest[SERIES] = {"file": FILES[SERIES], "scale": entry["light_values"]["scale"]}
-        return
-    size = np.maximum(shapes, 1e-30)
-    error = SERIES_ERROR * np.sqrt((size**2).sum()) / len(size)
-    step = power_of_two((error / ROUNDING_NOISE / size).astype(np.float32))[:, None, None]
-    _store(asset, SERIES, np.round(later / step) * step)
+    if shapes is not None:
+        size = np.maximum(shapes, 1e-30)
+        error = SERIES_ERROR * np.sqrt((size**2).sum()) / len(size)
+        step = power_of_two((error / ROUNDING_NOISE / size).astype(np.float32))[:, None, None]
+        later = np.round(later / step) * step
+    _store(asset, SERIES, later)
 
 
 def set_albedo(asset: Asset, albedo: Float32[ndarray, "S 3"]) -> None:
@@ -93,13 +91,13 @@ def weights_of_shapes(asset: Asset, irradiance: Float64[ndarray, "S ... 3"]) -> 
 
 def _reflectance(asset: Asset) -> Float32[ndarray, "S 3"]:
     """By what the columns of `surfel_gather` take irradiance: albedo times the unit of each."""
-    told = asset.tables[ALBEDO][0].astype(np.float32)
-    return told[:, :3] * (told[:, 3:] * np.float32(asset.manifest[ALBEDO]["scale"]))
+    *albedo, units = by_channel(asset.tables[ALBEDO])[:, 0]
+    return np.stack(albedo, axis=1) * (units * np.float32(asset.manifest[ALBEDO]["scale"]))[:, None]
 
 
 def gather_of(asset: Asset) -> Float32[ndarray, "r S"]:
     """M, from radiosity of the surfels to weights of the shapes."""
-    units = asset.tables[ALBEDO][0, :, 3].astype(np.float32)
+    units = by_channel(asset.tables[ALBEDO])[3, 0]
     scale = asset.manifest[GATHER]["scale"] * asset.manifest[ALBEDO]["scale"]
     return by_channel(asset.tables[GATHER])[0] * (units * np.float32(scale))
 
@@ -120,9 +118,9 @@ def with_transfer(asset: Asset) -> Asset:
         return asset
     gather, albedo = gather_of(asset), albedo_of(asset)
     reflected = [gather * albedo[:, c] for c in range(3)]
-    table, entry = stored_values(np.stack([one + later @ one for one, later in zip(reflected, later_of(asset), strict=True)], axis=2))
+    table, scale = scaled_halves(np.stack([one + later @ one for one, later in zip(reflected, later_of(asset), strict=True)], axis=2))
     kept = {key: told for key, told in asset.manifest.items() if key not in (GATHER, ALBEDO, SERIES)}
-    told = {"file": FILES[TRANSFER], **asset.manifest[TRANSFER], "scale": entry["light_values"]["scale"]}
+    told = {"file": FILES[TRANSFER], **asset.manifest[TRANSFER], "scale": scale}
     tables = {name: own for name, own in asset.tables.items() if name not in (GATHER, ALBEDO, SERIES)}
     return replace(asset, manifest={**kept, TRANSFER: told}, tables={**tables, TRANSFER: table})
 
@@ -141,6 +139,6 @@ def read_surfel_tables(reader: AssetReader) -> dict[str, ndarray]:
 
 
 def _store(asset: Asset, name: str, values: Float32[ndarray, "R N c"]) -> None:
-    asset.tables[name], entry = stored_values(values)
-    asset.manifest[name] = {"file": FILES[name], "scale": entry["light_values"]["scale"]}
+    asset.tables[name], scale = scaled_halves(values)
+    asset.manifest[name] = {"file": FILES[name], "scale": scale}
     pack_table(asset, name, "rows")

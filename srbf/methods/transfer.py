@@ -264,9 +264,11 @@ class Transfer(LightsInsideMaps):
         """A named light is an object whose surfaces emit radiance of its color."""
         rank, surfels = sizes_of(asset)
         received, emitted = np.zeros((surfels, 3)), np.zeros((rank, 3))
+        surfaces = Surfaces.of(asset) if any(isinstance(light, NamedLight) for light in lights) else None
         for light in lights:
             if isinstance(light, NamedLight):
-                emitted += Surfaces.of(asset).emitted(light.name, np.array(light.color))
+                assert surfaces is not None
+                emitted += surfaces.emitted(light.name, np.array(light.color))
             elif isinstance(light, EnvironmentLight) and has_environment_table(asset):
                 emitted += environment_weights(asset, light)
             else:

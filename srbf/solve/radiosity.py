@@ -73,6 +73,12 @@ def summed_series(feedback: Float[ndarray, "r r"], first: Float[ndarray, "r n"],
     return total
 
 
+def series_by_channel(feedback: Float[ndarray, "r r 3"], terms: int | None) -> Float[ndarray, "r r 3"]:
+    """The sum over k < `terms` of feedback^k, of each channel; None: of all k."""
+    one = np.eye(len(feedback), dtype=feedback.dtype)
+    return np.stack([summed_series(feedback[:, :, c], one, terms) for c in range(feedback.shape[2])], axis=2)
+
+
 def reciprocal(form_factors: ndarray | csr_array, areas: Float32[ndarray, " S"]) -> Any:
     """Form factors of rays made to agree with reciprocity, A_i F_ij = A_j F_ji: the mean of both estimates, which halves the variance.
 

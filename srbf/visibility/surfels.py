@@ -188,7 +188,7 @@ class _Sides:
         return np.where(own[self.objects], self.objects * (EMISSION_STEPS + 1) + step, -1) * 4 + 2 * self.covered + self.hidden
 
 
-def reached(both: Fragments, seen: Bool[ndarray, T]) -> Bool[ndarray, " T"]:
+def reached(both: Fragments, seen: Bool[ndarray, " T"]) -> Bool[ndarray, " T"]:
     """Sides that the `seen` ones light, and those that these light: what is behind a chair, under a table, and that no free place sees.
 
     `both`: sides of triangles, the backs after the fronts. A side counts from LEAST_VIEW on, the share of its hemisphere that they fill,

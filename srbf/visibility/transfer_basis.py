@@ -16,7 +16,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.errors import InputError
 from srbf.lights import PointLight, SpotLight
-from srbf.solve.radiosity import Bounces, reciprocal, summed_series
+from srbf.solve.radiosity import Bounces, reciprocal, series_by_channel
 from srbf.solve.sparse_rows import product, transposed_product
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
@@ -59,9 +59,7 @@ class TransferBasis:
 
     def series(self, most_bounces: int | None) -> Float32[ndarray, "r r 3"]:
         """The sum over k of feedback^k: from weights of light that was reflected once to those of all, at most so often reflected."""
-        one = np.eye(len(self.feedback), dtype=np.float64)
-        summed = [summed_series(self.feedback[:, :, c], one, most_bounces) for c in range(self.feedback.shape[2])]
-        return np.stack(summed, axis=2).astype(np.float32)
+        return series_by_channel(self.feedback, most_bounces).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from srbf.basis.gaussian import weight
-from srbf.capture import STRIP, Capture
+from srbf.capture import Capture
 from srbf.encode.model_selection import TexelSample, choose
 from srbf.encode.weighted_rows import LightSpace
 from srbf.errors import InputError
 from srbf.light_domain import Directions
+from srbf.light_images import STRIP
 from srbf.sphere import normalize, point_set, random_directions
 
 TRAIN, VALIDATION = 40, 15

@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from srbf.capture import STRIP, Capture
+from srbf.capture import Capture
 from srbf.encode.row_blocks import fit_tiles, tiles_of
 from srbf.errors import ImageError
+from srbf.light_images import STRIP
 from srbf.methods import FitRun
 from srbf.methods.relighting_map import RelightingMap
 from srbf.solve.streamed_product import TASK_COLUMNS

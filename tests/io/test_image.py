@@ -46,7 +46,7 @@ def test_many_written_at_once_are_the_same_files(tmp_path: Path) -> None:
     (tmp_path / "all").mkdir()
     for i, pixels in enumerate(images):
         write_image(tmp_path / f"one/{i}.exr", pixels, "half")
-    write_images([(tmp_path / f"all/{i}.exr", pixels, "half") for i, pixels in enumerate(images)])
+    write_images([(tmp_path / f"all/{i}.exr", pixels, "half", False) for i, pixels in enumerate(images)])
     for i in range(6):
         assert (tmp_path / f"one/{i}.exr").read_bytes() == (tmp_path / f"all/{i}.exr").read_bytes()
     assert len(list((tmp_path / "all").iterdir())) == 6
@@ -55,7 +55,13 @@ def test_many_written_at_once_are_the_same_files(tmp_path: Path) -> None:
 def test_the_first_failure_of_many_is_raised(tmp_path: Path) -> None:
     good = np.ones((2, 2, 3), np.float32)
     with pytest.raises((ImageError, WriteError), match=r"1\.exr"):
-        write_images([(tmp_path / "0.exr", good, "half"), (tmp_path / "1.exr", good * np.inf, "half"), (tmp_path / "2.exr", good, "half")])
+        write_images(
+            [
+                (tmp_path / "0.exr", good, "half", False),
+                (tmp_path / "1.exr", good * np.inf, "half", False),
+                (tmp_path / "2.exr", good, "half", False),
+            ]
+        )
     assert (tmp_path / "0.exr").is_file() and (tmp_path / "2.exr").is_file() and not (tmp_path / "1.exr").exists()
 
 

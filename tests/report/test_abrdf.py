@@ -152,7 +152,7 @@ def test_a_tile_without_receivers_is_nan_before_and_after(lambert: Capture) -> N
 def test_rebinning_does_not_depend_on_the_blocks_it_is_read_in(lambert: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
     tiles = block_means(np.ones((HEIGHT, WIDTH), np.float32), (2, 2))
     whole = rebin(lambert, range(LIGHTS), tiles)
-    monkeypatch.setattr(srbf.capture, "BLOCK_BYTES", 7 * HEIGHT * WIDTH * 12)
+    monkeypatch.setattr(srbf.light_images, "BLOCK_BYTES", 7 * HEIGHT * WIDTH * 12)
     assert np.array_equal(rebin(lambert, range(LIGHTS), tiles), whole)
 
 

@@ -34,7 +34,7 @@ export class DirectLight {
   private drawn = "";
   private cast = "";
 
-  /** Of an asset's texels, or of `factor`² parts of each as texels of their own. @throws SrbfError where the GPU cannot blend floats. */
+  /** On the asset's texels, or on a finer grid with `factor` texels along each side of a texel. @throws SrbfError where the GPU cannot blend floats. */
   static ofAsset(asset: Asset, inputs: DirectInputs, renderer: WebGLRenderer, factor = 1): DirectLight {
     const { width, height, direct } = asset.manifest;
     const { normal, coverage, scene } = inputs;
@@ -57,9 +57,7 @@ export class DirectLight {
     scene: Object3D,
     private readonly renderer: WebGLRenderer,
   ) {
-    if (!renderer.extensions.has("EXT_color_buffer_float") || !renderer.extensions.has("EXT_float_blend")) {
-      throw new SrbfError("expected a GPU that blends floats for direct light, found one without: only the indirect light is shown");
-    }
+    checkBlending(renderer);
     const { width, height } = surface;
     const texture = (data: Float32Array): DataTexture => floatTexture(data, width, height);
     const corners = this.receivers.corners.map(({ points, normals }) => ({ points: texture(points), normals: texture(normals) }));
@@ -124,7 +122,13 @@ export class DirectLight {
   }
 }
 
-/** 1, or albedo / pi, RGBA, of `factor`² parts of each texel. */
+/** @throws SrbfError where the GPU cannot blend floats, which direct light needs. */
+export function checkBlending({ extensions }: WebGLRenderer): void {
+  if (extensions.has("EXT_color_buffer_float") && extensions.has("EXT_float_blend")) return;
+  throw new SrbfError("expected a GPU that blends floats for direct light, found one without: only the indirect light is shown");
+}
+
+/** 1, or albedo / pi, RGBA, on a grid with `factor` texels along each side of a texel. */
 function reflectance(asset: Asset, albedo: FloatImage | undefined, factor: number): Float32Array {
   const { width, height, quantity } = asset.manifest;
   const [across, down] = [factor * width, factor * height];

@@ -11,6 +11,12 @@ export interface DirectionPoint {
   role: "train" | "validation" | "holdout" | "center";
 }
 
+/** The directions of a capture's lights, or of `centers` where it has none. */
+export function directionPoints(lights: readonly { direction?: Triple; role: DirectionPoint["role"] }[] | undefined, centers: readonly Triple[]): readonly DirectionPoint[] {
+  const baked = lights?.filter((light): light is DirectionPoint => light.direction !== undefined);
+  return baked?.length ? baked : centers.map((direction): DirectionPoint => ({ direction, role: "center" }));
+}
+
 export class DirectionWidget {
   /** Index of the baked light that is compared with; -1 without one. */
   marked = -1;

@@ -1,9 +1,9 @@
-/** A lightmap on a mesh with direct light in smaller texels than its own: bounces are smooth, shadows are not. */
+/** A lightmap with direct light at a higher resolution than its own, for meshes: bounces are smooth, shadows are not. */
 import { FloatType, HalfFloatType, LinearFilter, RGBAFormat, type Texture, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { type Asset, receiverKind } from "../src";
 import { FullscreenPass, undisturbed } from "../src/three/fullscreen";
 
-const [LARGEST, MOST] = [1024, 4]; // texels per side; of direct light for each of the lightmap's
+const [LARGEST, MOST] = [1024, 4]; // texels per side; times the lightmap's resolution
 
 const SUM = `precision highp float;
 precision highp sampler2D;
@@ -15,7 +15,7 @@ void main() {
     sum = vec4((alone ? vec3(0.0) : own.rgb) + texelFetch(direct, ivec2(gl_FragCoord.xy), 0).rgb, own.a);
 }`;
 
-/** How many texels of direct light there are along a side of a texel: 1 of receivers that are no lightmap, and of large ones. */
+/** The resolution of direct light over that of the lightmap: 1 for views and vertices, and for large lightmaps. */
 export function finenessOf({ manifest }: Asset): number {
   if (receiverKind(manifest) !== "lightmap") return 1;
   return Math.max(1, Math.min(MOST, Math.floor(LARGEST / Math.max(manifest.width, manifest.height))));
@@ -33,7 +33,7 @@ export class FineLightmap {
     return this.target.texture;
   }
 
-  /** The sum of a lightmap, or with `alone` nothing, and direct light in texels of the target's size. */
+  /** Direct light, of the target's size, added to a lightmap; only direct light with `alone`. */
   draw(renderer: WebGLRenderer, lightmap: Texture, direct: Texture, alone: boolean): void {
     const { uniforms } = this.pass;
     uniforms.lightmap.value = lightmap;

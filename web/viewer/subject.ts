@@ -4,7 +4,7 @@ import type { Asset, FloatImage, Light, Triple } from "../src";
 import { carried } from "../src/matrix";
 import { alphaTexture } from "../src/three/textures";
 import type { BallState } from "./ball_state";
-import { DirectLight } from "./direct_light";
+import { checkBlending, type DirectInputs, DirectLight } from "./direct_light";
 import { type AssetFacts, type Facts, type LoadedAsset, loadOne } from "./loading";
 import { FineLightmap, finenessOf } from "./fine_lightmap";
 import { lineOf, say } from "./messages";
@@ -19,9 +19,13 @@ export class Subject {
   /** The picture's alpha: a view's coverage, 1 everywhere for other assets. */
   readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
-  private readonly direct?: DirectLight;
-  private readonly fine?: { direct: DirectLight; lightmap: FineLightmap };
+  private readonly directInputs?: DirectInputs;
+  private readonly directs = new Map<number, DirectLight>(); // by resolution over the lightmap's, made when first shown
+  private readonly fineness: number;
+  private fine?: FineLightmap;
   private isFine = false;
+  /** Whether it was last relit for a mesh. */
+  onMesh = false;
 
   constructor(loaded: LoadedAsset, renderer: WebGLRenderer) {
     this.facts = loaded.facts;
@@ -30,12 +34,11 @@ export class Subject {
     const floats = drawsFloats(renderer);
     this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear", weights: weightsFor(loaded.asset, renderer) });
     this.alpha = this.relighting.textures.alpha ?? alphaTexture({ kind: "float", width: 1, height: 1, channels: 1, data: new Float32Array([1]) });
+    this.fineness = finenessOf(loaded.asset);
     if (!loaded.direct) return;
     try {
-      this.direct = DirectLight.ofAsset(loaded.asset, loaded.direct, renderer);
-      const factor = finenessOf(loaded.asset);
-      const { width, height } = loaded.asset.manifest;
-      if (factor > 1) this.fine = { direct: DirectLight.ofAsset(loaded.asset, loaded.direct, renderer, factor), lightmap: new FineLightmap(factor * width, factor * height, floats) };
+      checkBlending(renderer);
+      this.directInputs = loaded.direct;
     } catch (error) {
       say(lineOf(error), "hint");
     }
@@ -43,16 +46,16 @@ export class Subject {
 
   /** Whether its direct light can be added. */
   get hasDirect(): boolean {
-    return this.direct !== undefined;
+    return this.directInputs !== undefined;
   }
 
   get lightmap(): Texture {
     return this.relighting.lightmap as Texture;
   }
 
-  /** What a mesh shows: the lightmap, or one with finer direct light. */
+  /** What is shown: the lightmap, or on a mesh one with finer direct light. */
   get shown(): Texture {
-    return this.isFine && this.fine ? this.fine.lightmap.texture : this.lightmap;
+    return this.isFine && this.fine ? this.fine.texture : this.lightmap;
   }
 
   /** How many coefficient maps there are to look at. */
@@ -69,16 +72,29 @@ export class Subject {
   /** Draw the lightmap under `lights`, with the direct shadow of a sphere; `onMesh`: with finer direct light, in `shown`. */
   relight(lights: readonly Light[], terms: State["terms"], renderer: WebGLRenderer, ball?: BallState, onMesh = false): void {
     this.relighting.set(lights);
-    const wanted = this.direct !== undefined && terms !== "indirect";
-    this.isFine = onMesh && wanted && this.fine !== undefined;
-    const source = this.isFine ? this.fine?.direct : this.direct;
+    this.onMesh = onMesh;
+    const source = terms === "indirect" ? undefined : this.directAt(onMesh ? this.fineness : 1, renderer);
     source?.setBall(ball && { position: carried(this.asset.assetFromWorld, ball.position), size: ball.size });
-    const direct = wanted ? source?.draw(lights) : undefined;
+    const direct = source?.draw(lights);
     const alone = terms === "direct" && direct !== undefined;
-    if (this.isFine) this.relighting.add();
-    else this.relighting.add(direct, alone);
+    this.isFine = onMesh && direct !== undefined && this.fineness > 1;
+    this.relighting.add(this.isFine ? undefined : direct, alone && !this.isFine);
     this.relighting.update(renderer);
-    if (this.isFine && this.fine && direct) this.fine.lightmap.draw(renderer, this.lightmap, direct, alone);
+    if (this.isFine && direct) this.drawFine(renderer, direct, alone);
+  }
+
+  /** Direct light at so many times the lightmap's resolution; undefined where there is none. */
+  private directAt(factor: number, renderer: WebGLRenderer): DirectLight | undefined {
+    if (!this.directInputs) return undefined;
+    const found = this.directs.get(factor) ?? DirectLight.ofAsset(this.asset, this.directInputs, renderer, factor);
+    this.directs.set(factor, found);
+    return found;
+  }
+
+  private drawFine(renderer: WebGLRenderer, direct: Texture, alone: boolean): void {
+    const { width, height } = this.asset.manifest;
+    this.fine ??= new FineLightmap(this.fineness * width, this.fineness * height, drawsFloats(renderer));
+    this.fine.draw(renderer, this.lightmap, direct, alone);
   }
 }
 

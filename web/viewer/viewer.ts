@@ -26,7 +26,7 @@ import { Receivers } from "./receivers";
 import { negated } from "./relighting";
 import { saveFrames, savePng, saveRig } from "./saving";
 import { COLORS, screenUniforms, VALUES } from "./screen";
-import { type DirectionPoint, DirectionWidget } from "./direction_widget";
+import { directionPoints, DirectionWidget } from "./direction_widget";
 import { Stage } from "./stage";
 import { type Changed, COMPARES, decodeState, firstState, MOST_LIGHTS, type State, VIEWS } from "./state";
 import { type Subject, Subjects, weightsFor } from "./subject";
@@ -54,7 +54,6 @@ export class Viewer {
   private readonly comparison: Comparison;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
-  private fine = false;
   private outside = "";
   private shining: Light[] = [];
   private readonly environments = new Map<string, Environment>();
@@ -106,7 +105,7 @@ export class Viewer {
       this.stage.setBall(this.ball, quantity);
       dragBall(renderer.domElement, this.stage, this.state, roomOf(probes), changed);
     }
-    this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, this.directionPoints(), changed);
+    this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, directionPoints(this.loaded.references?.lights, this.subject.centers), changed);
     this.measures = new Measures(this.state, this.comparison, this.directions, { wait: () => this.wait(), done: () => this.done(), changed });
     this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
       changed,
@@ -172,12 +171,6 @@ export class Viewer {
     };
   }
 
-  /** The capture's lights, or else the centers of the basis. */
-  private directionPoints(): readonly DirectionPoint[] {
-    const baked = this.loaded.references?.lights.filter((light): light is typeof light & DirectionPoint => light.direction !== undefined);
-    return baked?.length ? baked : this.subject.centers.map((direction): DirectionPoint => ({ direction, role: "center" }));
-  }
-
   /** Show the asset that the state names, once it is loaded. */
   private chooseAsset(): void {
     const index = this.state.asset;
@@ -193,7 +186,7 @@ export class Viewer {
         this.uniforms.ambient.value = ambient;
         this.uniforms.coverage.value = subject.alpha;
         this.state.map = Math.min(this.state.map, subject.maps - 1);
-        this.directions.show(this.directionPoints());
+        this.directions.show(directionPoints(this.loaded.references?.lights, this.subject.centers));
         this.directions.errors = undefined;
         this.panel.setFacts(this.panelFacts());
         titles(element("title"), this.loaded.facts, this.subject);
@@ -265,7 +258,7 @@ export class Viewer {
     if (this.paces.length > PACES) this.paces.shift();
     this.drawNeeded = false;
     try {
-      if (this.lightsChanged || this.fine !== this.showsFine()) this.relight();
+      if (this.lightsChanged || this.subject.onMesh !== this.showsFine()) this.relight();
       this.lightsChanged = false;
       this.present();
       this.error = "";
@@ -309,8 +302,7 @@ export class Viewer {
     }
     const { ball } = this.state;
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
-    this.fine = this.showsFine();
-    this.subject.relight(this.shining, terms, this.renderer, shown, this.fine);
+    this.subject.relight(this.shining, terms, this.renderer, shown, this.showsFine());
     this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
