@@ -122,7 +122,10 @@ def move_inside(asset: Asset, capture: Capture, texels: Int[ndarray, " n"], fram
     InputError on a capture of other lights, without free places or without its scene; MissingLibraryError without embreex.
     """
     if domain_of_asset(asset.manifest).kind != "cloud" or capture.kind not in ("point", "patch"):
-        raise InputError(f"expected an asset and a capture of lights inside a scene, found {capture.kind} lights in {capture.folder}")
+        raise InputError(
+            f"expected a capture of patches or of point lights, whose images tell what moving lights show, found {capture.kind} lights in "
+            f"{capture.folder}"
+        )
     inside = CloudLights.of(capture)
     places, apart = path_through_opening(inside.free, inside.visible, frames)
     picked = asset if asset.width * asset.height == len(texels) else asset.at(texels)

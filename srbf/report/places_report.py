@@ -81,10 +81,11 @@ class PlacesReport(DomainReport):
         error = subject.evaluation[subject.role]
         mean = self._mean(subject.role)
         of_mean = "" if mean is None else f" pooled, {100 * mean:.1f} % in the mean over lights"
+        noise = f", of which the references have about {100 * error['noise']:.1f} % as noise" if "noise" in error else ""
         light = "indirect light" if subject.asset.transport == "indirect" else "light"
         return (
             f"On {len(subject.capture.indices(subject.role))} {subject.role_words} the relative RMSE of {light} is "
-            f"{100 * error['relative_rmse']:.1f} %{of_mean}. Errors are over covered receivers, ambient excluded."
+            f"{100 * error['relative_rmse']:.1f} %{of_mean}{noise}. Errors are over covered receivers, ambient excluded."
         )
 
     def key(self) -> Sequence[tuple[str, str]]:

@@ -34,7 +34,7 @@ def test_watched_errors_are_those_of_a_second_reading(capture: Capture, encoding
     assert watched["holdout"] == read["holdout"]  # the peak of the train images included
     assert watched["train"] == pytest.approx(read["train"], rel=ROUNDING)
     for one, other in zip(watched["lights"], read["lights"], strict=True):
-        assert one == {**other, "rmse": pytest.approx(other["rmse"], rel=ROUNDING)}
+        assert one == {**other, **{key: pytest.approx(other[key], rel=ROUNDING) for key in ("rmse", "relative_rmse")}}
 
 
 def test_a_sample_of_texels_comes_near(capture: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,5 +65,5 @@ def test_captured_point_lights_have_a_reference_too(room: Room, tmp_path: Path) 
 
 def test_other_lights_are_refused(tmp_path: Path) -> None:
     capture = capture_of_names(tmp_path / "names")
-    with pytest.raises(InputError, match="inside a scene"):
+    with pytest.raises(InputError, match="patches or of point lights"):
         move_inside(NamedMaps().encode(capture), capture, np.arange(4))

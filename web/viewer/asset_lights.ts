@@ -5,6 +5,7 @@ import { isPlaced, type LightState, namedState, type PlacedState, pointState } f
 import type { BakedLight } from "./reference";
 import type { Bounds } from "./receivers";
 
+const REACH = 0.25; // of the room's radius: where the first light lays an irradiance of 1, so that white walls are not clipped
 const OUTSIDE = 0.1; // of the longest side of the box about free places: the page says so of a light farther out
 const UNMEASURED = "#9fb2c8";
 
@@ -23,7 +24,7 @@ export function kindsOf(asset: Asset): readonly AddedKind[] {
 export function firstLights(asset: Asset, { center, radius }: Bounds): LightState[] | undefined {
   const { names } = asset.tables;
   if (names) return names.map(namedState);
-  return inside(asset) ? [pointState(middleOf(asset) ?? [center[0], center[1], center[2] + 0.5 * radius], 0.5 * radius)] : undefined;
+  return inside(asset) ? [pointState(middleOf(asset) ?? [center[0], center[1], center[2] + 0.5 * radius], REACH * radius)] : undefined;
 }
 
 /** The place of free space that is nearest to its middle. */
