@@ -64,7 +64,7 @@ ELSEWHERE = {
     "blender --python lights.py *": "tests/viewer/test_shot.py::test_the_script_makes_the_lights_in_blender",
     "blender --command srbf bake *": "tests/extension/test_extension.py::test_the_command_bakes_the_open_file",
     "blender --command srbf fit *": "tests/extension/test_extension.py::test_what_the_command_adds",
-    "srbf demo --scene loft *": "tests/test_demo.py::test_a_loft_from_script_to_picture",
+    "srbf demo --scene loft *": "tests/demo/test_lights_inside_demo.py::test_a_loft_from_script_to_picture",
     "srbf view --probes *": "tests/viewer/test_ball.py::test_the_command_takes_probes_with_it",
     "npm ci *": "tests/npm_package.py::npm",
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
