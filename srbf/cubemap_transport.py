@@ -63,7 +63,7 @@ class CubemapTransport:
         return np.maximum(self.normals[rows] @ directions.T, 0) * self.seen(rows, columns)
 
     def _bounces(self, rows: Int[ndarray, " n"], columns: Int[ndarray, " b"]) -> Float32[ndarray, "n b 3"]:
-        weights = self.weights[:, columns].reshape(len(self.weights), -1)
+        weights = self.weights[:, columns].reshape(len(self.weights), 3 * len(columns))
         return (self.shapes[rows] @ weights).reshape(len(rows), len(columns), 3)
 
 

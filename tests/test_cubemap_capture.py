@@ -30,8 +30,8 @@ WIDTH, HEIGHT, SIDE = 24, 20, 8
 RANK = 2
 
 
-def made(folder: Path, transport: str = "combined", quantity: str = "irradiance", uncovered: int = 7) -> Capture:
-    """A ground of WIDTH x HEIGHT places below a ball, the last few texels empty; bounces of two made-up shapes; two lights that test."""
+def made(folder: Path, transport: str = "combined", quantity: str = "irradiance", uncovered: int = 7, rank: int = RANK) -> Capture:
+    """A ground of WIDTH x HEIGHT places below a ball, the last few texels empty; bounces of made-up shapes; two lights that test."""
     rng = np.random.default_rng(4)
     cubemap = Cubemap(SIDE)
     x, y = np.meshgrid(np.linspace(-1, 1, WIDTH), np.linspace(1, -1, HEIGHT))
@@ -46,7 +46,7 @@ def made(folder: Path, transport: str = "combined", quantity: str = "irradiance"
     )
     (folder / "lights").mkdir(parents=True)
     write_arrays(folder / VISIBILITY_FILE, "made", bits=tracer.all_seen(), receivers=receivers.astype(np.int32), normals=normals)
-    shapes, weights = rng.random((len(receivers), RANK), np.float32), 0.1 * rng.random((RANK, cubemap.count, 3), np.float32)
+    shapes, weights = rng.random((len(receivers), rank), np.float32), 0.1 * rng.random((rank, cubemap.count, 3), np.float32)
     write_arrays(folder / BOUNCES_FILE, "made", shapes=shapes, weights=weights)
     for name, image in (
         ("position", position),
@@ -157,6 +157,18 @@ def test_a_fit_within_a_budget_keeps_to_it_and_relights(capture: Capture) -> Non
     relit, true = linear_response(asset, [DirectionalLight((x, y, z))]), capture.image(index)
     covered = capture.coverage() > 0
     assert np.linalg.norm((relit - true)[covered]) < 0.2 * np.linalg.norm(true[covered])
+
+
+def test_without_bounces_there_is_direct_light_alone(tmp_path: Path) -> None:
+    """As in a convex scene, or where nothing reflects."""
+    capture = made(tmp_path / "capture", rank=0)
+    up = int(Cubemap(SIDE).texel_of(np.array([[0.1, 0.1, 1.0]]))[0])
+    image = capture.image(up).reshape(-1, 3)
+    assert set(np.unique(image.round(5))) == {0, np.float32(Cubemap(SIDE).directions[up, 2]).round(5)}
+    texels = np.array([3, 100, 7])
+    np.testing.assert_array_equal(capture.sample([up, 5], texels)[:, 0], image[texels])
+    asset = fit(capture, budget=16)
+    assert evaluate(asset, capture, roles=("train",))["train"]["relative_rmse"] < 0.15
 
 
 @pytest.mark.parametrize("name", [VISIBILITY_FILE, BOUNCES_FILE])
