@@ -21,6 +21,7 @@ from blender_bake.without_triangles import is_only_volume
 
 TRAIN_CLEARANCE, RANDOM_CLEARANCE, PLACES_CLEARANCE = 0.06, 0.1, 0.06  # m, of surfaces
 SMALLEST = 0.25  # of the clearance: where there is no room for all of it
+LEAST_ROOM = 4.0  # of the clearance: by how much a box grows, at least
 POOL = 10  # candidates of blue noise per light
 BATCH = 2048  # random points at a time
 TRIES, FEWEST = 200, 20_000  # random points per free one, before giving up, and how many to try at least
@@ -38,9 +39,10 @@ SURVEY, TRAIN, RANDOM, PLACES = range(4)  # streams of random numbers
 def places(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     """{box, train, random, places, skipped, open_share, warnings}: free places (m) in `asked["box"]`, by default that of all that renders.
 
-    asked: `box` or null; `count` places of blue noise, or those of a grid of `spacing` m, as `train`; `random` and `places` independent
-    random ones; `seed`; `train_clearance`, `random_clearance` and `places_clearance` (m) off surfaces. How many of one kind are asked for
-    does not move the others. Where a clearance leaves no room, it shrinks, to a quarter at most, with a line in `warnings`.
+    asked: `box` or null; `grows`: whether the bounds of all that renders become larger where they have no room, as light from afar allows;
+    `count` places of blue noise, or those of a grid of `spacing` m, as `train`; `random` and `places` independent random ones; `seed`;
+    `train_clearance`, `random_clearance` and `places_clearance` (m) off surfaces. How many of one kind are asked for does not move the
+    others. Where a clearance leaves no room, it shrinks, to a quarter at most, with a line in `warnings`.
 
     A place is in a solid if a closed mesh has it inside, or if most of what it sees is the back of faces: walls are often of several
     meshes, none of them closed. The latter holds where at least 5 % of the places see fronts alone: elsewhere normals point anyhow.
@@ -48,7 +50,15 @@ def places(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
     outside of the building, and left out; an open scene keeps all. open_share: share of rays from `places` that leave the scene.
     skipped: places of the grid, or candidates of blue noise, that are not free. WorkerError where there is no room.
     """
-    space = FreeSpace(scene, asked["box"], asked["seed"])
+    if asked.get("grows") and asked["box"] is None:
+        try:
+            return _places(FreeSpace(scene, None, asked["seed"]), asked)
+        except WorkerError:
+            return _places(FreeSpace(scene, None, asked["seed"], grown=True), asked)
+    return _places(FreeSpace(scene, asked["box"], asked["seed"]), asked)
+
+
+def _places(space: FreeSpace, asked: dict[str, Any]) -> dict[str, Any]:
     warnings: list[str] = []
     train, skipped = np.zeros((0, 3)), 0
     clearance = asked.get("train_clearance", TRAIN_CLEARANCE)
@@ -82,9 +92,11 @@ def places(scene: bpy.types.Scene, asked: dict[str, Any]) -> dict[str, Any]:
 
 
 class FreeSpace:
-    """Where a box of the scene is free. `tried`, `free`: random points last drawn, and how many of them were."""
+    """Where a box of the scene is free; `grown`: with room around all that renders. `tried`, `free`: random points last drawn, and how many
+    of them were.
+    """
 
-    def __init__(self, scene: bpy.types.Scene, box: list[float] | None, seed: int) -> None:
+    def __init__(self, scene: bpy.types.Scene, box: list[float] | None, seed: int, grown: bool = False) -> None:
         show_as_rendered(scene)
         self._solids, self._tree = _solids_and_tree()
         if not self._solids:
@@ -94,6 +106,9 @@ class FreeSpace:
         else:
             self.low, self.high = np.array(box[:3], np.float64), np.array(box[3:], np.float64)
         self.low, self.high = self.low.astype(np.float64), self.high.astype(np.float64)
+        if grown:
+            room = max(float((self.high - self.low).max()) / 2, LEAST_ROOM * PLACES_CLEARANCE)
+            self.low, self.high = self.low - room, self.high + room
         self._seed = seed
         self.tried = self.free = 0
         self._directions = even_directions(RAYS)

@@ -67,8 +67,9 @@ class CubemapSet:
         return []
 
     def question(self, tested: int, seed: int) -> dict[str, Any]:
-        """What the scene is asked: that of surfels."""
-        return self.surfels.question(0, seed)
+        """What the scene is asked: that of surfels, of which a flat or solid scene has some, too."""
+        asked = self.surfels.question(0, seed)
+        return {**asked, "places": {**asked["places"], "grows": True}}
 
     def with_surfels(self, surfels: CloudSet) -> CubemapSet:
         """With what was found of the scene."""

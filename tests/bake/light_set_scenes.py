@@ -138,6 +138,11 @@ def block() -> None:
     mesh("Floor", corners_of((0, 0, 0), (2, 2, 2)), [face[::-1] for face in FACES.values()], gray())
 
 
+def plane() -> None:
+    """A plane and nothing else: its bounds have no volume."""
+    mesh("Floor", corners_of((0, 0, 0), (3, 3, 0)), [FACES["Floor"]], gray())
+
+
 def open_air() -> None:
     """A plane with a crate on it, under no roof."""
     mesh("Floor", corners_of((0, 0, 0), (3, 3, 0)), [FACES["Floor"]], gray())
@@ -186,7 +191,7 @@ def white_world() -> None:
 
 
 SCENES: dict[str, Callable[[], None]] = {
-    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, open_air, crowd, cellar, sphere, white_world)
+    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
 }
 
 if __name__ == "__main__":

@@ -155,7 +155,20 @@ def test_other_flags_are_refused_in_one_line(scene, tmp_path: Path, words: list[
     assert not (tmp_path / "no").exists()
 
 
-@pytest.mark.parametrize("name", ["black", "block"])
-def test_scenes_that_no_light_bounces_in_are_refused_in_one_line(scene, tmp_path: Path, name: str) -> None:
-    assert ": expected" in refused(["bake", scene(name), "-o", tmp_path / "no", *CUBEMAP])
+@pytest.mark.parametrize("name", ["plane", "block"])
+def test_a_convex_scene_has_direct_light_alone(scene, tmp_path: Path, name: str) -> None:
+    """A texel of a face of normal n gets n . l. No place within the bounds of these scenes is free."""
+    done("bake", scene(name), "-o", tmp_path / "capture", *CUBEMAP)
+    capture = Capture.open(tmp_path / "capture")
+    covered = capture.coverage() >= COVERED
+    images = np.stack([capture.image(i)[covered] for i in capture.indices("train")])
+    normals = np.array([[0, 0, 1]]) if name == "plane" else np.concatenate([np.eye(3), -np.eye(3)])
+    expected = np.maximum(Cubemap(4).directions @ normals.T, 0)  # (N, n)
+    off = np.abs(images[:, :, 0][:, :, None] - expected[:, None]).max(axis=0).min(axis=1)
+    assert off.max() < 1e-5
+    done("fit", tmp_path / "capture", "-o", tmp_path / "asset", "--budget", "16")
+
+
+def test_a_scene_that_nothing_reflects_in_is_refused_in_one_line(scene, tmp_path: Path) -> None:
+    assert ": expected" in refused(["bake", scene("black"), "-o", tmp_path / "no", *CUBEMAP])
     assert not (tmp_path / "no" / "capture.json").exists()

@@ -66,6 +66,7 @@ def found(changes: dict[str, Any], scenery: str = "building") -> dict[str, Any]:
         "open": lambda: building(lid=False),
         "outwards": lambda: room(inwards=False),
         "furnished": furnished,
+        "block": block,
     }[scenery]()
     started = time.perf_counter()
     try:
@@ -146,6 +147,22 @@ def test_narrow_rooms_shrink_the_clearance_or_refuse() -> None:
     assert (
         "expected room for 40 train lights in the box 1.2,1.2,0.6 to 1.8,1.8,1.4 m" in solid["error"] and "`light_bounds`" in solid["error"]
     )
+
+
+def test_a_box_without_room_grows_where_light_comes_from_afar() -> None:
+    asked: dict[str, Any] = {"random": 0, "count": 0, "grows": True}
+    assert ask("block", **asked | {"grows": False})["error"].startswith("expected room for 60 free places")
+    facts = ask("block", **asked)
+    np.testing.assert_allclose(facts["box"], [0.5] * 3 + [2.5] * 3, atol=1e-6)
+    assert len(facts["places"]) == 60 and (depth(np.array(facts["places"]), (1, 1, 1), (2, 2, 2)) <= -0.06 / np.sqrt(3)).all()
+    assert ask(**asked) == ask(**asked | {"grows": False})
+
+
+def block() -> None:
+    import bpy
+
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    add_box("Block", (1, 1, 1), (2, 2, 2))
 
 
 def furnished() -> None:
