@@ -13,7 +13,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
-from srbf.errors import InputError
+from srbf.errors import InputError, MissingLibraryError
 from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, NamedLight, moved
@@ -110,6 +110,8 @@ class Added:
     def _on(self, receivers: Receivers, kind: Literal["ray", "shadow-map"]) -> DirectLight:
         """What the surfaces of receivers reflect, lobes included."""
         if kind == "ray":
+            if not has_embree():
+                raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use `direct='shadow-map'`")
             tracer = RayTracer(receivers)
             return GlossyRays(receivers, tracer) if has_gloss(receivers) else tracer
         mapper = self._stack.enter_context(ShadowMapper(receivers))

@@ -25,7 +25,7 @@ class EmbreeTriangles:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
-            raise MissingLibraryError("exact direct light needs embreex: pip install embreex; or use `direct='shadow-map'`") from error
+            raise MissingLibraryError("rays need embreex, found it missing; pip install srbf[ray]") from error
         self._scene: Any = EmbreeScene()
         self._empty = not len(corners)
         if not self._empty:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from srbf.bake import surface_checks
 from srbf.bake.light_sets import CloudSet
 from srbf.bake.scene_query import _with_places
 from srbf.bake.surface_checks import warn_of_receivers
-from srbf.errors import InputError
+from srbf.errors import InputError, MissingLibraryError
 from srbf.methods.transfer import Transfer
 from srbf.visibility.transfer_operator import TransferOperator
 
@@ -47,6 +48,13 @@ def test_a_sound_room_has_one_line() -> None:
     found, said = baked()
     assert len(said) == 1 and "surfels in the box" in said[0]
     assert found.found is not None and found.found.surfels is not None
+
+
+def test_without_embreex_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore_scene"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(MissingLibraryError, match=r"^rays need embreex, found it missing; pip install srbf\[ray\]$"):
+        baked()
 
 
 def test_an_inside_out_room_has_the_same_surfels() -> None:
