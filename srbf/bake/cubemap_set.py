@@ -42,12 +42,15 @@ class CubemapSet:
             raise InputError(f"expected a sampling of {', '.join(get_args(Sampling))}, found {self.sampling!r}")
 
     @staticmethod
-    def parse(word: str, sparse: bool | None, sparse_by: str, light_bounds: str | None) -> CubemapSet:
-        """From the command line's cubemap:SIDE and flags."""
+    def parse(word: str, sparse: bool, full: bool, sparse_by: str | None, light_bounds: str | None) -> CubemapSet:
+        """From the command line's cubemap:SIDE and flags; InputError on those that exclude each other."""
         text = word.removeprefix(WORD)
         if not text.isdecimal():
             raise InputError(f"expected `light_set` cubemap:SIDE, the texels a side, as in cubemap:32, found {word!r}")
-        sampling: Any = {None: "auto" if sparse_by == "neighbors" else sparse_by, True: sparse_by, False: "full"}[sparse]
+        if full and (sparse or sparse_by):
+            other = "`sparse`" if sparse else f"`sparse_by={sparse_by}`"
+            raise InputError(f"expected `full` or {other}, found both; leave one of them out")
+        sampling: Any = "full" if full else sparse_by or ("neighbors" if sparse else "auto")
         return CubemapSet(int(text), sampling, CloudSet("surfels", SURFELS, None, parse_box(light_bounds)))
 
     @property

@@ -27,6 +27,7 @@ from srbf.cli.terminal import json_line, json_progress_lines, note, progress_bar
 from srbf.cli.values import Size
 
 DEFAULT_SIZE = 256  # texels on the longer side
+DEFAULT_LIGHTS = 400
 UNLIMITED = 1 << 16  # samples per texel: more than any bake's time allows
 
 
@@ -43,7 +44,7 @@ def bake(
     unwrap: flag.UnwrapBy = "smart",
     no_cast_shadow: flag.NoCastShadow = None,
     keep_scene_lights: flag.KeepSceneLights = False,
-    lights: flag.Lights = 400,
+    lights: flag.Lights = None,
     domain: flag.DomainOfLights = "hemisphere",
     light_list: flag.LightList = None,
     light_set: flag.LightSet = None,
@@ -53,8 +54,9 @@ def bake(
     pool: flag.PoolSize = None,
     view_clusters: flag.ViewClusterCount = None,
     operator: flag.OperatorOf = "rays",
-    sparse: flag.Sparse = None,
-    sparse_by: flag.SparseBy = "neighbors",
+    sparse: flag.Sparse = False,
+    full: flag.Full = False,
+    sparse_by: flag.SparseBy = None,
     grid: flag.GridSpacing = None,
     light_bounds: flag.LightBounds = None,
     sun_angle: flag.SunAngle = "0",
@@ -83,6 +85,7 @@ def bake(
     restart: flag.Restart = False,
 ) -> None:
     """Bake SCENE under many lights, one at a time, in passes. If it is stopped, the same command resumes it."""
+    count = DEFAULT_LIGHTS if lights is None else lights
     width, height = size or Size(DEFAULT_SIZE, DEFAULT_SIZE)
     with flags_alone():
         named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
@@ -92,9 +95,9 @@ def bake(
         if light_set == GatherSet.kind:
             inside = GatherSet.parse(pool, view_clusters, light_bounds)
         elif light_set is not None and light_set.startswith(WORD):
-            inside = CubemapSet.parse(light_set, sparse, sparse_by, light_bounds)
+            inside = CubemapSet.parse(light_set, sparse, full, sparse_by, light_bounds)
         elif light_set is not None and not by_grid:
-            inside = parse_light_set(light_set, light_group or (), lights, patches, grid, light_bounds, surfels_per_m2, operator)
+            inside = parse_light_set(light_set, light_group or (), count, patches, grid, light_bounds, surfels_per_m2, operator)
     if not (named or collection):
         raise typer.BadParameter("expected a --receiver or a --collection, found neither; name one, as in --receiver lightmap:OBJECT")
     for name, value in (
@@ -107,9 +110,9 @@ def bake(
     ):
         if value and (light_set is None or (by_grid and name != "--light-bounds")):
             raise typer.BadParameter(f"expected --light-set named, cloud, patches or surfels with {name}, found {light_set or 'none'}")
-    if not isinstance(inside, CubemapSet) and (sparse is not None or sparse_by != "neighbors"):
-        given = "--sparse-by" if sparse is None else "--sparse" if sparse else "--full"
-        raise typer.BadParameter(f"expected --light-set cubemap:SIDE with {given}, found {light_set or 'none'}")
+    for name, value in (("--sparse", sparse), ("--full", full), ("--sparse-by", sparse_by)):
+        if value and not isinstance(inside, CubemapSet):
+            raise typer.BadParameter(f"expected --light-set cubemap:SIDE with {name}, found {light_set or 'none'}")
     gathers = light_set == GatherSet.kind
     for name, value in (("--pool", pool), ("--view-clusters", view_clusters)):
         if value is not None and not gathers:
@@ -117,6 +120,11 @@ def bake(
     for name, value in (("--light-group", light_group), ("--patches", patches), ("--grid", grid), ("--surfels-per-m2", surfels_per_m2)):
         if value and (gathers or isinstance(inside, CubemapSet)):
             raise typer.BadParameter(f"expected --light-set {light_set} without {name}, found both; leave it out")
+    for name, value in (("--lights", lights), ("--samples", samples)):
+        if value is not None and isinstance(inside, CubemapSet):
+            raise typer.BadParameter(
+                f"expected --light-set {light_set} without {name}, found both: its lights are traced, not rendered; leave it out"
+            )
     workers_of = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
@@ -125,7 +133,7 @@ def bake(
                 receiver=one,
                 width=width,
                 height=height,
-                lights=lights,
+                lights=count,
                 domain=domain,
                 samples=samples or (2 if time_limit is None else UNLIMITED),
                 validation=(0 if gathers else 16) if validation is None else validation,

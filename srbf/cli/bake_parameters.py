@@ -70,7 +70,14 @@ KeepSceneLights = Annotated[
 ]
 
 Lights = Annotated[
-    int, typer.Option(metavar="COUNT", parser=COUNT, help="Directions to fit (Hammersley), or lights of a cloud.", rich_help_panel=LIGHTS)
+    int | None,
+    typer.Option(
+        metavar="COUNT",
+        parser=COUNT,
+        help="Directions to fit (Hammersley), or lights of a cloud (400).",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
 ]
 DomainOfLights = Annotated[
     Literal["sphere", "hemisphere"],
@@ -149,19 +156,20 @@ OperatorOf = Annotated[
     ),
 ]
 Sparse = Annotated[
-    bool | None,
+    bool,
     typer.Option(
-        "--sparse/--full",
-        help="cubemap: trace the elements that neighbors do not tell, or all. Default: sparse from 16.8 million on.",
-        show_default=False,
+        "--sparse",
+        help="cubemap: trace the elements that neighbors do not tell; the default from 16.8 million on.",
         rich_help_panel=LIGHTS,
     ),
 ]
+Full = Annotated[bool, typer.Option("--full", help="cubemap: trace every element; the default for fewer.", rich_help_panel=LIGHTS)]
 SparseBy = Annotated[
-    Literal["neighbors", "l1"],
+    Literal["neighbors", "l1"] | None,
     typer.Option(
         "--sparse-by",
-        help="cubemap: what tells them. neighbors: coarser receivers that agree; l1: sparse combinations of dense rows.",
+        help="cubemap: what tells them. neighbors, the default: coarser receivers that agree; l1: sparse combinations of dense rows.",
+        show_default=False,
         rich_help_panel=LIGHTS,
     ),
 ]

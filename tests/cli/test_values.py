@@ -41,6 +41,11 @@ from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size
         (["--shard", "1/2", "--dask", "tcp://a:1"], "one way to spread the work"),
         (["--shard", "1/2", "--force"], "--shard prepare"),
         (["--dask", "tcp://a:1", "--workers", "2"], "--workers"),
+        (["--light-set", "cubemap:4", "--lights", "400"], "expected --light-set cubemap:4 without --lights, found both"),
+        (["--light-set", "cubemap:4", "--samples", "5"], "expected --light-set cubemap:4 without --samples, found both"),
+        (["--light-set", "cubemap:4", "--full", "--sparse-by", "l1"], "expected --full or --sparse-by l1, found both; leave one"),
+        (["--light-set", "cubemap:4", "--sparse", "--full"], "expected --full or --sparse, found both"),
+        (["--sparse-by", "neighbors"], "expected --light-set cubemap:SIDE with --sparse-by, found none"),
     ],
 )
 def test_a_bakes_flags(tmp_path: Path, flags: list[str], words: str) -> None:

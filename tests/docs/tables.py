@@ -34,7 +34,7 @@ STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one
 FEW = "--lights 28 --size 24 --samples 1 --validation 4 --holdout 2 --holdout-samples 1"
 SHORTER = {
     "srbf bake --light-set surfels *": f"{FEW} --surfels-per-m2 4",
-    "srbf bake --light-set cubemap:32 *": f"{FEW} --light-set cubemap:8",
+    "srbf bake --light-set cubemap:32 *": "--light-set cubemap:8 --size 24 --validation 4 --holdout 2",
     "srbf bake *": FEW,
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
