@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -250,13 +250,26 @@ def trace_cubemap(
     return {"cubemap": told if chosen == "full" else {**told, "predicted_error": error}, "lights": entries}
 
 
-def totals(folder: Path) -> dict[str, Any] | None:
-    """{rays, cpu_seconds, sampled} of a capture under a cubemap, over all runs of its bake; None where it is another, or not done."""
+def totals(folders: Sequence[Path]) -> dict[str, Any] | None:
+    """{rays, cpu_seconds, sampled} of captures under a cubemap together, over all runs of their bakes; None where none is one that is done.
+
+    `sampled`: the share of all elements of their visibility that was asked for.
+    """
+    parts = [part for part in map(_totals, folders) if part is not None]
+    if not parts:
+        return None
+    receivers, rays, seconds, sampled = (np.array(column) for column in zip(*parts, strict=True))
+    share = float((receivers * sampled).sum() / receivers.sum())
+    return {"rays": int(rays.sum()), "cpu_seconds": round(float(seconds.sum()), 2), "sampled": share}
+
+
+def _totals(folder: Path) -> tuple[int, int, float, float] | None:
+    """(receivers, rays, seconds, share sampled) of one capture."""
     if not (folder / MANIFEST).is_file():
         return None
     told = files.read_json(folder / MANIFEST).get("cubemap")
-    stages = [stored_arrays(folder / name) for name in (VISIBILITY_FILE, BOUNCES_FILE)]
-    if told is None or None in stages:
+    visibility, bounces = (stored_arrays(folder / name) for name in (VISIBILITY_FILE, BOUNCES_FILE))
+    if told is None or visibility is None or bounces is None:
         return None
-    seconds = sum(float(stage["cpu_seconds"]) for stage in stages if stage is not None)
-    return {"rays": told["rays"], "cpu_seconds": round(seconds, 2), "sampled": told["sampled"]}
+    seconds = float(visibility["cpu_seconds"]) + float(bounces["cpu_seconds"])
+    return len(visibility["receivers"]), int(told["rays"]), seconds, float(told["sampled"])

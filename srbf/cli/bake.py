@@ -187,8 +187,8 @@ def bake(
         with json_progress_lines() if json_progress else progress_bar("bake") as update:
             baked = job.run(Reporter(update, note), force, restart, shard)
         note(f"{_done(shard)} {job.folder}" if baked else f"{job.folder} is complete already")
-        if json_progress and (told := totals(job.folder)) is not None:
-            json_line(told)
+    if json_progress and not dry_run and farm is None and (told := totals([job.folder for job in jobs])) is not None:
+        json_line(told)
 
 
 def _done(shard: Shard | None) -> str:
