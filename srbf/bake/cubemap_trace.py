@@ -13,6 +13,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float32, Float64, Int
+from srbf.bake.surface_checks import warn_of_duplicates, warn_of_unlit
 from srbf.capture import Capture
 from srbf.cubemap import Cubemap
 from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, stored_arrays, write_arrays
@@ -88,9 +89,23 @@ class _Stages:
         return Points.of(self.receivers, self.is_lightmap)
 
     @property
-    def is_lightmap(self) -> bool:
+    def described(self) -> list[dict[str, Any]]:
+        """Of each receiver what the manifest has."""
         described = [self.capture.manifest.get("receiver"), *self.capture.manifest.get("receivers", [])]
-        return any(one is not None and one["kind"] == "lightmap" for one in described)
+        return [one for one in described if one is not None]
+
+    @property
+    def is_lightmap(self) -> bool:
+        return any(one["kind"] == "lightmap" for one in self.described)
+
+    def warn(self, visibility: dict[str, ndarray], bounces: dict[str, ndarray]) -> None:
+        """Lines for receivers that suit the bake badly."""
+        is_lit = visibility["bits"].any(axis=1) | bounces["shapes"].any(axis=1)
+        names = [repr(one["object"]) for one in self.described]
+        what = names[0] if len(names) == 1 else f"{len(names)} objects"
+        warn_of_unlit(is_lit, what, self.say)
+        if not self.is_lightmap:
+            warn_of_duplicates(self.points.starts, self.points.normals, what, self.say)
 
     @cached_property
     def occluders(self) -> EmbreeTriangles:
@@ -234,6 +249,7 @@ def trace_cubemap(
     visibility = stages.visibility()
     chosen = str(visibility["sampling"])
     reflected = stages.reflected(chosen)
+    stages.warn(visibility, reflected)
     entries = stages.tested(roles, reflected)
     rays, sampled, error = int(visibility["rays"]) + int(reflected["rays"]), float(visibility["sampled"]), float(visibility["error"])
     predicted = "" if chosen == "full" else f"; predicted error of direct light under suns {error:.2%}"

@@ -1,4 +1,4 @@
-"""What a bake of surfels says of surfaces that suit it badly: without area, too many, black throughout, unseen by the receivers."""
+"""What a bake of rays says of surfaces and receivers that suit it badly: without area, too many, black throughout, unseen, twice there."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool
+from srbf.arrays import Bool, Float32
 from srbf.errors import InputError
 from srbf.visibility.surface_cells import DARK, Fragments
 from srbf.visibility.surfels import Surfels
@@ -53,3 +53,21 @@ def warn_of_receivers(operator: TransferOperator, covered: Bool[ndarray, " P"], 
         raise InputError(f"expected receivers that see surfaces which light reaches, found none; {advice}")
     if share > BLIND:
         say(f"{share:.0%} of the receivers see no surface that light reaches and stay black; {advice}")
+
+
+def warn_of_unlit(is_lit: Bool[ndarray, " R"], what: str, say: Callable[[str], None]) -> None:
+    """A line for receivers that no light reaches under any direction."""
+    dark = int((~is_lit).sum())
+    if dark:
+        say(
+            f"{dark} of {len(is_lit)} receivers of {what} see nothing and stay black: they lie inside geometry or touch it, or their "
+            "normals point into it"
+        )
+
+
+def warn_of_duplicates(places: Float32[ndarray, "R 3"], normals: Float32[ndarray, "R 3"], what: str, say: Callable[[str], None]) -> None:
+    """A line for vertices that are where another is, and face as it does."""
+    count = len(places)
+    twice = count - len(np.unique(np.concatenate([places, normals], axis=1), axis=0))
+    if twice:
+        say(f"{twice} of {count} receivers of {what} are where another is, with its normal: merge vertices by distance to trace each once")

@@ -70,12 +70,19 @@ def sparsely_sampled(
         rows = rest[start : start + BATCH]
         sampler.bits[rows] = sampler.reconstructed(rows, radius)
         progress(len(sampler.dense) + start + len(rows), tracer.count)
+    if sampler.alone:
+        say(
+            f"{sampler.alone} of {tracer.count} receivers have fewer than {FEWEST} dense neighbors within {radius:.3g} m and are sampled "
+            "like dense ones"
+        )
     return SampledVisibility(sampler.bits, sampler.asked, float(error) if np.isfinite(error) else 0.0)
 
 
 @dataclass(eq=False)
 class _Sampler:
-    """Dense receivers so far: their rows of `bits`, their features (bits), and how many elements were asked for."""
+    """Dense receivers so far: their rows of `bits`, their features (bits), how many elements were asked for, and how many receivers were
+    `alone`, without neighbors.
+    """
 
     tracer: ElementTracer
     cubemap: Cubemap
@@ -84,6 +91,7 @@ class _Sampler:
     changes: Bits
     dense: Int[ndarray, " d"]
     asked: int
+    alone: int = 0
 
     @staticmethod
     def of(tracer: ElementTracer, cubemap: Cubemap, seed: int) -> _Sampler:
@@ -176,6 +184,7 @@ class _Sampler:
         told &= above
         if len(lonely) and not judged:
             self.asked += coarse_rows(self.tracer, self.cubemap, rows[lonely], self.bits, self.changes)
+            self.alone += len(lonely)
             told[lonely] = self._unpacked(self.bits[rows[lonely]]).astype(bool)
         return np.packbits(told, axis=1)
 

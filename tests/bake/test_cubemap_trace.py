@@ -1,4 +1,4 @@
-"""What bakes under a cubemap tell of several captures, without Blender."""
+"""What bakes under a cubemap tell of their receivers, one and several, without Blender."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from srbf.bake.cubemap_trace import totals
+from srbf.bake.surface_checks import warn_of_duplicates, warn_of_unlit
 from srbf.cubemap_transport import BOUNCES_FILE, VISIBILITY_FILE, write_arrays
 from srbf.io import files
 from srbf.receiver_images import MANIFEST
@@ -27,3 +28,19 @@ def test_totals_are_sums_over_all_receivers(tmp_path: Path) -> None:
     assert totals([one]) == {"rays": 1000, "cpu_seconds": 3.5, "sampled": pytest.approx(0.5)}
     assert totals([one, two]) == {"rays": 1234, "cpu_seconds": 7.0, "sampled": pytest.approx(0.4)}
     assert totals([tmp_path / "none", two]) == totals([two]) and totals([tmp_path / "none"]) is None
+
+
+def test_receivers_that_see_nothing_and_duplicates_have_a_line_each() -> None:
+    starts = np.arange(15, dtype=np.float32).reshape(5, 3)
+    normals = np.tile(np.array([0, 0, 1], np.float32), (5, 1))
+    said: list[str] = []
+    warn_of_unlit(np.ones(5, bool), "'Ball'", said.append)
+    warn_of_duplicates(starts, normals, "'Ball'", said.append)
+    warn_of_duplicates(starts[[0, 0]], np.array([[0, 0, 1], [1, 0, 0]], np.float32), "'Ball'", said.append)
+    assert said == []
+    warn_of_unlit(np.array([1, 1, 0, 1, 0], bool), "'Ball'", said.append)
+    warn_of_duplicates(starts[[0, 1, 1, 2, 1]], normals, "'Ball'", said.append)
+    assert [line.partition(":")[0] for line in said] == [
+        "2 of 5 receivers of 'Ball' see nothing and stay black",
+        "2 of 5 receivers of 'Ball' are where another is, with its normal",
+    ]

@@ -126,6 +126,20 @@ def test_a_few_receivers_far_apart(sample: Sample, count: int) -> None:
     assert found.bits.shape == (count, tracer.row_bytes) and under_suns(found.bits, tracer.all_seen(), tracer) < 0.2
 
 
+@pytest.mark.slow
+def test_receivers_without_dense_neighbors_are_sampled_and_said() -> None:
+    """A ground, and places a kilometer apart."""
+    places, normals = grid()
+    alone = np.array([[1000.0 * i, 1000, 1e-4] for i in range(40)], np.float32)
+    starts, facing = np.concatenate([places, alone]), np.concatenate([normals, np.tile(UP, (40, 1))])
+    tracer = ElementTracer(starts, facing, CUBEMAP.directions.astype(np.float32), EmbreeTriangles(BALL))
+    said: list[str] = []
+    found = sparsely_sampled(tracer, CUBEMAP, 0, say=said.append)
+    count, _, rest = said[1].partition(" of ")
+    assert 20 <= int(count) <= 40 and rest.startswith(f"{len(starts)} receivers have fewer than 4 dense neighbors within")
+    np.testing.assert_array_equal(found.bits[-40:], tracer.all_seen()[-40:])
+
+
 def test_levels_hold_every_receiver_once() -> None:
     places, normals = grid()
     levels = levels_of(places, normals)
