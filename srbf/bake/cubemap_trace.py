@@ -34,6 +34,7 @@ from srbf.visibility.sparse_transport import sparsely_sampled
 from srbf.visibility.surfels import Surfels
 
 WORTHWHILE = 1 << 24  # elements, from which on `auto` samples a part of them
+BLACK = 1e-4  # rms irradiance of bounces: less comes through the edges of closed meshes, by single rays
 Progress = Callable[[int, int, str], None]
 
 
@@ -100,7 +101,8 @@ class _Stages:
 
     def warn(self, visibility: dict[str, ndarray], bounces: dict[str, ndarray]) -> None:
         """Lines for receivers that suit the bake badly."""
-        is_lit = visibility["bits"].any(axis=1) | bounces["shapes"].any(axis=1)
+        reflected = np.linalg.norm(bounces["shapes"].astype(np.float32), axis=1)  # rms over the directions: weights have a mean square of 1
+        is_lit = visibility["bits"].any(axis=1) | (reflected > BLACK)
         names = [repr(one["object"]) for one in self.described]
         what = names[0] if len(names) == 1 else f"{len(names)} objects"
         warn_of_unlit(is_lit, what, self.say)

@@ -131,6 +131,17 @@ def test_indirect_transport_and_vertices(scene, tmp_path: Path) -> None:
     assert capture.combined().image(up).sum() > capture.image(up).sum() > 0
 
 
+def test_receivers_inside_another_mesh_are_counted_and_black(scene, tmp_path: Path) -> None:
+    """The crate stands on the floor, of which it hides a ninth from all light; some texels are at its edge."""
+    said = done("bake", scene("open_air"), "-o", tmp_path / "capture", *CUBEMAP).stderr
+    (line,) = [line for line in said.splitlines() if "see nothing" in line]
+    dark, count = (int(word) for word in line.removeprefix("srbf: ").split()[:3:2])
+    capture = Capture.open(tmp_path / "capture")
+    covered = capture.coverage() >= COVERED
+    brightest = np.max([capture.image(i)[covered].max(axis=1) for i in capture.indices("train")], axis=0)
+    assert count == covered.sum() and dark == (brightest < 1e-3).sum() and abs(dark / count - 1 / 9) < 0.03
+
+
 def test_a_dry_run_says_what_it_would_trace(scene, tmp_path: Path) -> None:
     output = done("bake", scene("open_air"), "-o", tmp_path / "dry", *CUBEMAP, "--dry-run").output
     assert "cubemap" in output and not (tmp_path / "dry").exists()
