@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import threading
 from collections import deque
@@ -13,6 +14,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
+
+SESSION = "blender_"  # begins the name of the temporary folder that Blender makes when it starts
 
 
 class WorkerError(Exception):
@@ -84,6 +87,10 @@ class Requests:
 
 
 def leave(status: int) -> NoReturn:
-    """Exit at once: after a failed driver Blender can hang in its own shutdown."""
+    """Exit at once: after a failed driver Blender can hang in its shutdown. Its temporary folder, which that would remove, goes first."""
     sys.stderr.flush()
+    blender = sys.modules.get("bpy")
+    folder = Path(getattr(getattr(blender, "app", None), "tempdir", ""))
+    if folder.name.startswith(SESSION):  # else it is the system's
+        shutil.rmtree(folder, ignore_errors=True)
     os._exit(status)
