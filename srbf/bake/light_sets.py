@@ -35,7 +35,7 @@ MOST_NAMES = 4096
 MOST_LIGHTS = 20_000  # of a cloud, or patches
 SURFELS = 5000  # of the transfer operator, about, unless a density is given; as many more, up to MOST_SURFELS, as this size asks for:
 SURFEL_SIZE = 0.16  # m
-MOST_SURFELS = 8000
+MOST_SURFELS = 10_000
 
 
 @dataclass(frozen=True)

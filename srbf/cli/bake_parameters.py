@@ -120,7 +120,7 @@ SurfelDensity = Annotated[
         "--surfels-per-m2",
         metavar="DENSITY",
         parser=POSITIVE,
-        help="surfels: how many per square meter of surface, 8000 in all at most (5000 to 8000 in all, about 16 cm in size).",
+        help="surfels: how many per square meter of surface, 10000 in all at most (5000 to 10000 in all, about 16 cm in size).",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),

@@ -34,6 +34,7 @@ from srbf.methods.carried import carried_images, carried_scene, common_manifest
 from srbf.methods.component_maps import ComponentMaps, check_layers, components_of, read_cluster_index, stored_components
 from srbf.methods.protocol import FitRun
 from srbf.methods.seam_report import seam_report
+from srbf.solve.row_sample import bright_rows
 from srbf.solve.zones import split_zones
 
 VALUES_FILE = "light_values.exr"
@@ -119,11 +120,13 @@ def encode_table(
     seed: int,
     zones: int = 1,
     respond: Callable[[Asset, Capture, Sequence[int]], ndarray] | None = None,
+    energy: Float32[ndarray, " P"] | None = None,
 ) -> Asset:
     """Clusters and components by the responses to V mixtures of the captured lights, then the table of all of them, in three passes.
 
     `respond`: what an asset of this table shows under lights of the capture, by default the method's `captured_responses`. With `zones`,
-    every cluster is of one part of the scene, by the receivers' positions; `cluster_zone` of the manifest says which.
+    every cluster is of one part of the scene, by the receivers' positions; `cluster_zone` of the manifest says which. `energy` of each
+    texel: clusters are made for bright ones more than for dim ones; None: for all evenly.
     The manifest has no keys of the table's own meaning yet. InputError without train lights, or with more components than numbers per
     texel. Peak memory: that of a clustered eigen map, and 12 (V + L) bytes per sampled texel.
     """
@@ -132,7 +135,7 @@ def encode_table(
         raise InputError(f"expected train lights in {capture.folder}, found none")
     components = min(method.components, 3 * len(train))
     clusters = max(1, min(clusters, int((capture.coverage() >= COVERED).sum()) // (components + 1)))
-    texels = sampled_texels(capture, max(SAMPLE_TEXELS, TEXELS_PER_CLUSTER * clusters))
+    texels = _sampled(capture, max(SAMPLE_TEXELS, TEXELS_PER_CLUSTER * clusters), energy, seed)
     space = MixedSpace.of(capture.sample(train, texels), mixtures)
     steps = 3 * len(train)
     parts = zones_of(capture, texels, zones)
@@ -171,6 +174,13 @@ def encode_table(
             asset, capture, run.stitch, own.unstitched, respond or method.captured_responses, own.unstitched_index
         )
     return asset
+
+
+def _sampled(capture: Capture, count: int, energy: Float32[ndarray, " P"] | None, seed: int) -> Int[ndarray, " n"]:
+    covered = np.flatnonzero(capture.coverage().ravel() >= COVERED)
+    if energy is None or len(covered) <= count:
+        return sampled_texels(capture, count)
+    return covered[bright_rows(energy[covered], count, np.random.default_rng(seed))[0]]
 
 
 def refinement(capture: Capture) -> Callable[[ndarray, ndarray], ndarray]:

@@ -24,6 +24,7 @@ GATHER, ALBEDO, SERIES = "surfel_gather", "surfel_albedo", "surfel_series"
 FILES = {TRANSFER: "transfer.exr", **{name: f"{name}.exr" for name in (GATHER, ALBEDO, SERIES)}}
 GATHER_ERROR = 0.03  # of what one surfel lays on the receivers, rms: more shows as blotches in a dim room next to the lit one
 SERIES_ERROR = 0.005  # of pictures
+MOST_STEPS = 1 << 14  # of the largest number of a row: finer ones are lost in half floats, and take a third byte
 FAINT = 2.0**-12  # of the brightest surfel: fainter ones are rounded as much as one of that
 
 
@@ -64,7 +65,7 @@ def set_series(asset: Asset, series: Float32[ndarray, "r r 3"], shapes: Float32[
     if shapes is not None:
         size = np.maximum(shapes, 1e-30)
         error = SERIES_ERROR * np.sqrt((size**2).sum()) / len(size)
-        step = power_of_two((error / ROUNDING_NOISE / size).astype(np.float32))[:, None, None]
+        step = power_of_two(np.maximum(error / ROUNDING_NOISE / size, np.abs(later).max(axis=(1, 2)) / MOST_STEPS))[:, None, None]
         later = np.round(later / step) * step
     _store(asset, SERIES, later)
 

@@ -38,14 +38,15 @@ from srbf.methods.surfel_tables import FILES as SURFEL_FILES
 from srbf.methods.surfel_tables import add_surfel_tables, read_surfel_tables, sizes_of, weights_of_shapes, with_transfer
 from srbf.methods.transfer_choice import Judges, Sizes, fit_for_error, truncated
 from srbf.visibility.cloud_lights import CloudLights
-from srbf.visibility.patches import surfel_groups
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.surface_cells import DARK, Cells
+from srbf.visibility.surfel_groups import SurfelEffects
 from srbf.visibility.transfer_basis import MOST_RANK, RANK_ERROR, TransferBasis, exchange_of, grouped, training_light, transfer_basis
 from srbf.visibility.transfer_operator import TransferOperator
 
 PACKED: dict[str, Packed] = {"light_values": "rows", "position_basis": "columns"}
 MOST_SURFELS = 8000
+MERGED_ERROR = 0.003  # of pictures, rms over lights, that `auto` leaves out by fewer surfels
 SHAPES_LEFT_OUT = 0.25  # of an error that is asked for, on the lights that shapes are made for
 MOST_TRIED = 64  # components of a candidate
 FEWEST_CLUSTERS, MOST_CLUSTERS = 16, 256
@@ -66,9 +67,9 @@ class Transfer(LightsInsideMaps):
     Parameters
     ----------
     surfels
-        How many parts of the surfaces a light is measured by; `auto`: the capture's surfels, at most 8000.
+        How many parts of the surfaces a light is measured by, at most 8000; `auto`: as few as leave out 0.3 % of pictures.
     rank
-        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 512.
+        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 640.
     clusters
         1 to 256: the index per texel is one byte.
     components
@@ -169,10 +170,6 @@ class Transfer(LightsInsideMaps):
         measured = np.full(len(operator.objects), True) if self.editable else operator.cells.albedo.max(axis=1) >= DARK
         cells = operator.cells.at(measured)
 
-        def cells_of(count: int) -> Cells:
-            found = surfel_groups(cells, inside.occluders, inside.free, count, self.seed)
-            return found.with_patches(_parted(found.patches, operator.objects)) if self.editable else found  # an object emits by itself
-
         told = capture.manifest["surfels"]
         parts = self._parts(inside, operator)
         received = ReceivedLight(parts, inside.occluders)
@@ -183,13 +180,19 @@ class Transfer(LightsInsideMaps):
         exchange, bounces = exchange_of(operator, told.get("bounces"))
         left_out = RANK_ERROR if self.error is None else min(RANK_ERROR, SHAPES_LEFT_OUT * self.error)
         basis = transfer_basis(operator, lit, (exchange, bounces), asked, self.seed, most, emitted, left_out)
+        effects = SurfelEffects.of(cells, lit[measured], basis.at(measured), self.editable, self.seed)
+        owners = operator.objects[measured] if self.editable else np.zeros(len(cells.places), np.int64)  # an object emits by itself
+
+        def cells_of(count: int, merged: float = 0.0) -> Cells:
+            return cells.with_patches(effects.groups(cells, owners, count, merged))
+
         silent = replace(run, on_image=QUIET.on_image)
 
         def encode(basis: TransferBasis, cells: Cells, components: int) -> Asset:
             return replace(self, components=components)._of_basis(capture, silent, basis, cells, measured, told.get("bounces"))
 
         if self.error is None:
-            cells = cells_of(MOST_SURFELS if self.surfels == "auto" else int(self.surfels))
+            cells = cells_of(MOST_SURFELS, MERGED_ERROR) if self.surfels == "auto" else cells_of(int(self.surfels))
             asset = encode(basis, cells, self.components)
         else:
             judges = Judges.of(capture, operator, received, bounces, inside.free)
@@ -221,7 +224,8 @@ class Transfer(LightsInsideMaps):
     ) -> Asset:
         """Components of the shapes in clusters, and weights of the shapes from light on the patches of `cells`, the `measured` surfels."""
         rank = basis.shapes.shape[1]
-        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed)
+        energy = (basis.shapes**2).sum(axis=1)
+        asset = encode_table(self, _of_shapes(capture, basis), run, np.eye(rank), self.clusters, self.seed, energy=energy)
         if capture.quantity == "irradiance":  # shapes have no color
             asset.tables["light_values"] = asset.tables["light_values"][:, :, :1].copy()
             asset.manifest["light_values"]["channels"] = 1
@@ -296,11 +300,6 @@ def _gathered(gather: Float32[ndarray, "r S"], cells: Cells) -> tuple[Float32[nd
     own, mean = cells.albedo.mean(axis=1), albedo.mean(axis=1)[cells.patches]
     share = np.divide(own, mean, out=np.ones_like(mean), where=mean > 0)
     return grouped(gather * share.astype(np.float32), cells.patches, count), albedo.astype(np.float32)
-
-
-def _parted(patches: Int[ndarray, " N"], objects: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
-    """Patches of one object each."""
-    return np.unique(np.stack([patches, objects]), axis=1, return_inverse=True)[1].ravel()
 
 
 def _of_shapes(capture: Capture, basis: TransferBasis) -> Capture:

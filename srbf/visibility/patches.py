@@ -60,12 +60,6 @@ def unemitting(cells: Cells) -> Patches:
     return Patches(cells, nothing, np.zeros(0, np.int64))
 
 
-def surfel_groups(cells: Cells, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"], count: int, seed: int = 0) -> Cells:
-    """Cells in at most `count` patches by which a light is measured, as `patches_of` groups them."""
-    seen = lit(cells.places.astype(np.float64), cells.normals.astype(np.float64), occluders, free)
-    return cells.with_patches(label_cells(cells, seen, count, seed))
-
-
 def cell_count(patches: int) -> int:
     """About how many cells that many patches are made of."""
     return int(np.clip(CELLS_PER_PATCH * patches, FEWEST_CELLS, MOST_CELLS))

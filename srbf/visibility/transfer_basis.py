@@ -7,7 +7,7 @@ matrix product with its direct irradiance e on the surfels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from srbf.arrays import Float32, Float64, Int
 from srbf.errors import InputError
 from srbf.lights import PointLight, SpotLight
 from srbf.solve.radiosity import Bounces, reciprocal, series_by_channel
+from srbf.solve.row_sample import bright_rows
 from srbf.solve.sparse_rows import product, transposed_product
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.transfer_operator import TransferOperator
@@ -32,9 +33,12 @@ CONE = (0.25, 0.7)  # rad, half-angles
 OVERSAMPLED = 0.5  # more mixtures than shapes, of these: faint rooms are in the last axes, which few mixtures find badly
 POWER_STEPS = 1
 RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
-MOST_RANK = 512
-NORM_TEXELS = 2048
-SAMPLE_TEXELS = 1 << 15  # whose pictures the shapes are made for
+MOST_RANK = 640
+EQUAL = (
+    0.5  # of lights' pictures: 0 counts errors as they are, by which dim places are lost, 1 each over its picture, and bright corners are
+)
+SUMS = 256  # random ones, by which norms are known to 4 %
+SAMPLE_TEXELS = 1 << 14  # about, whose pictures the shapes are made for
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
 
 
@@ -56,6 +60,10 @@ class TransferBasis:
     def sizes(self) -> Float32[ndarray, " r"]:
         """The rms of each shape."""
         return np.sqrt(np.mean(self.shapes**2, axis=0))
+
+    def at(self, chosen: ndarray) -> TransferBasis:
+        """With the surfels of a mask or of indices."""
+        return replace(self, transfer=self.transfer[:, chosen], gather=self.gather[:, chosen], sent=self.sent[chosen])
 
     def series(self, most_bounces: int | None) -> Float32[ndarray, "r r 3"]:
         """The sum over k of feedback^k: from weights of light that was reflected once to those of all, at most so often reflected."""
@@ -116,36 +124,40 @@ def transfer_basis(
     emitted: Emitted | None = None,
     left_out: float = RANK_ERROR,
 ) -> TransferBasis:
-    """At most `rank` shapes of the pictures of V lights, each picture of unit norm; None: as many as leave out `left_out`, or `most_rank`.
+    """At most `rank` shapes of the pictures of V lights, dim ones nearly as important as bright ones.
 
+    rank None: as many as leave out `left_out`, or `most_rank`.
     `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many lights. The pictures are never formed:
-    their axes come from random mixtures of them [Halko2011], at SAMPLE_TEXELS receivers. InputError where no light bounces onto a receiver.
+    their axes come from random mixtures of them [Halko2011], at some of the receivers. InputError where no light bounces onto a receiver.
     """
     rng = np.random.default_rng(seed)
     cells = operator.cells
     exchange, bounces = exchanged
     lit = np.flatnonzero(np.diff(operator.receivers.indptr))
-    some = operator.receivers[lit[:: max(1, len(lit) // NORM_TEXELS)]]
-    sampled = len(lit) > SAMPLE_TEXELS
-    form_factors = operator.receivers[np.sort(rng.choice(lit, SAMPLE_TEXELS, replace=False)) if sampled else lit]
+    form_factors = operator.receivers[lit]
+    sums = transposed_product(form_factors, random_signs(rng, len(lit), SUMS)).T  # (n, S)
     in_turn = irradiance.shape[1] > IN_EVERY_COLOR
     radiosity = []
     for channel, one in enumerate(bounces):
-        own = _of_unit_norm(one.radiosity(irradiance[:, channel::3] if in_turn else irradiance), some)
+        own = _weighed(one.radiosity(irradiance[:, channel::3] if in_turn else irradiance), sums)
         if emitted is not None:
             first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
-            shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), some)
+            shining = _weighed(first + one.radiosity(np.asarray(exchange @ first, np.float32)), sums)
             counts = emitted.counts / (len(bounces) if in_turn else 1)  # as a light is in one color then
             own = np.concatenate([own, np.sqrt(counts).astype(np.float32) * shining], axis=1)
         radiosity.append(own)
     lights = np.concatenate(radiosity, axis=1)  # (S, 3 V)
-    if not (some @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
+    if not (sums @ lights[:, :: max(1, lights.shape[1] // JUDGES)]).any():
         raise InputError(
             "expected light that bounces onto the receivers, found none: no light reaches a surface that they see, or the scene has no "
             "diffuse bounces; choose other receivers or `light_bounds`, or raise the bounces"
         )
-    most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, len(lit)))
-    sketched = min(most + max(16, int(OVERSAMPLED * most)), len(lit))
+    sampled = len(lit) > SAMPLE_TEXELS
+    if sampled:
+        brightness = product(form_factors, lights @ random_signs(rng, lights.shape[1], SUMS))
+        form_factors = _sample(form_factors, (brightness**2).sum(axis=1), rng)
+    most = min(most_rank, most_rank if rank is None else rank, *lights.shape, max(1, form_factors.shape[0]))
+    sketched = min(most + max(16, int(OVERSAMPLED * most)), form_factors.shape[0])
     mixed = lights @ rng.normal(size=(lights.shape[1], sketched)).astype(np.float32)
     found = np.linalg.qr(product(form_factors, mixed))[0]
     for _ in range(POWER_STEPS):
@@ -169,10 +181,20 @@ def transfer_basis(
     return TransferBasis(shapes, transfer.astype(np.float32), gather.astype(np.float32), sent.astype(np.float32), feedback)
 
 
-def _of_unit_norm(radiosity: Float32[ndarray, "S n"], receivers: csr_array) -> Float32[ndarray, "S n"]:
-    """Lights whose pictures have unit norm; those that next to nothing arrives of stay dark."""
-    norm = np.sqrt(((receivers @ radiosity) ** 2).sum(axis=0))
-    return radiosity / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)).astype(np.float32)
+def _sample(rows: csr_array, brightness: Float32[ndarray, " P"], rng: np.random.Generator) -> csr_array:
+    """About SAMPLE_TEXELS of the rows, by their `brightness`, scaled so that sums of squares are those of all rows."""
+    chosen, probability = bright_rows(brightness, SAMPLE_TEXELS, rng)
+    found = rows[chosen]
+    scale = np.sqrt(SAMPLE_TEXELS / len(brightness) / probability).astype(np.float32)
+    found.data *= np.repeat(scale, np.diff(found.indptr))
+    return found
+
+
+def _weighed(radiosity: Float32[ndarray, "S n"], sums: Float32[ndarray, "k S"]) -> Float32[ndarray, "S n"]:
+    """Lights whose pictures' norms are the power EQUAL of what they were, by random sums of receivers; next to nothing stays that."""
+    norm = np.sqrt(((sums @ radiosity) ** 2).sum(axis=0))
+    norm = np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30))
+    return radiosity / ((norm / np.median(norm)) ** EQUAL).astype(np.float32)
 
 
 def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray, left_out: float) -> int:
@@ -180,6 +202,11 @@ def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray, left_out: float) -
     energy = float((pictures.astype(np.float64) ** 2).sum())
     kept = np.cumsum(((axes.T @ pictures).astype(np.float64) ** 2).sum(axis=1))
     return min(len(kept), int(np.searchsorted(kept, (1 - left_out**2) * energy)) + 1)
+
+
+def random_signs(rng: np.random.Generator, count: int, sums: int) -> Float32[ndarray, "n k"]:
+    """Of random sums, whose mean square is the sum of squares."""
+    return rng.choice(np.array([-1, 1], np.float32), (count, sums)) / np.float32(np.sqrt(sums))
 
 
 def grouped(values: Float32[ndarray, "r S"], groups: Int[ndarray, " S"], count: int) -> Float32[ndarray, "r G"]:
