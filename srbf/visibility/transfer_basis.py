@@ -32,7 +32,7 @@ NEAR_RANGE = (0.03, 0.12)  # m from a surface
 CONE = (0.25, 0.7)  # rad, half-angles
 OVERSAMPLED = 0.5  # more mixtures than shapes, of these: faint rooms are in the last axes, which few mixtures find badly
 POWER_STEPS = 1
-RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
+RANK_ERROR = 0.01  # of the training lights' pictures, rms, that `auto` leaves out
 MOST_RANK = 640
 EQUAL = (
     0.5  # of lights' pictures: 0 counts errors as they are, by which dim places are lost, 1 each over its picture, and bright corners are

@@ -16,7 +16,7 @@ def wall() -> Cells:
     x, y = ((np.indices((SIDE, SIDE)) + 0.5) / SIDE).reshape(2, -1)
     count = SIDE * SIDE
     places = np.stack([x, y, np.zeros(count)], axis=1).astype(np.float32)
-    normals = np.tile(np.float32([0, 0, 1]), (count, 1))
+    normals = np.tile(np.array([0, 0, 1], np.float32), (count, 1))
     return Cells(places, normals, np.full(count, 1 / count, np.float32), np.full((count, 3), 0.5, np.float32), np.arange(count))
 
 
