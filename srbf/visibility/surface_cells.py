@@ -17,6 +17,7 @@ from srbf.visibility.embree import EmbreeTriangles
 OFFSET = 1e-4  # of the scene's size: between a surface and the end of a ray to it
 STAGES = (16, 192)  # places that most surfaces are seen from
 RAYS = 1 << 20  # traced at a time
+MOST_RAYS, FEWEST_PLACES = 1 << 26, 48  # of points to places, in a stage, where the points are more than that many each
 LAYERS = 1 / 8  # of a cell's size: walls that are farther apart are not in one cell
 NORMAL_BINS = 2  # per axis and sign: a cell's fragments face about the same way
 FLAT = 0.01  # of a fragment's longest edge: how far a point is off it at most
@@ -101,14 +102,19 @@ class Cells:
 
 
 def exposed(fragments: Fragments, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"]) -> Bool[ndarray, " T"]:
-    """Which fragments are seen from any of the free places, on the side of their normal."""
+    """Which fragments are seen from any of the free places, on the side of their normal; of a million, from some of them."""
     found = np.zeros(len(fragments.corners), bool)
     for first, last in zip((0, *STAGES), (*STAGES, len(free)), strict=True):
-        places = free[first:last]
         left = np.flatnonzero(~found)
+        places = free[first : min(last, first + places_for(len(left)))]
         if len(left) and len(places):
             found[left] = lit(fragments.centers[left], fragments.normals[left], occluders, places).any(axis=1)
     return found
+
+
+def places_for(points: int) -> int:
+    """How many places may be tested at so many points."""
+    return max(FEWEST_PLACES, MOST_RAYS // max(1, points))
 
 
 def lit(

@@ -13,7 +13,7 @@ from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.emitting_sides import lighting_others
 from srbf.visibility.hemisphere import cosine_directions
 from srbf.visibility.patches import parted
-from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, cells_of, exposed, grouped_cells, lit
+from srbf.visibility.surface_cells import DARK, OFFSET, Cells, Fragments, cells_of, exposed, grouped_cells, lit, places_for
 
 WITNESSES = 256  # free places by which it is known what a wall parts
 REACH, REACH_RAYS = 3, 64  # bounces and rays by which sides are found that no free place sees
@@ -124,7 +124,7 @@ def surfels_of(
         dark = np.zeros((0, 3), np.float32)
         return Surfels(nothing, surfaces.corners, owners.reshape(2, -1), np.zeros(0, np.int64), dark, np.zeros(0, bool))
     fragments = both.at(kept)
-    witnesses = lit(fragments.centers, fragments.normals, occluders, free[:WITNESSES])
+    witnesses = lit(fragments.centers, fragments.normals, occluders, free[: min(WITNESSES, places_for(len(kept)))])
     under = covered(fragments.centers, fragments.normals, occluders, GAP * width)
     sides = _Sides(fragments, object_of[kept], shines[kept], hidden[kept], under, witnesses)
     area = sides.fragments.areas / sides.sizes**2
