@@ -43,7 +43,7 @@ class SurfelEffects:
     ) -> SurfelEffects:
         """By random sums over V lights, each of which counts as much, and over the shapes of `basis`, whose surfels these are.
 
-        `repainted`: surfels of any albedo, so that dark ones are told apart as well.
+        `repainted`: surfels of any albedo, so that dark ones stay apart as well.
         """
         rng = np.random.default_rng(seed)
         signs = random_signs(rng, basis.shapes.shape[1], EFFECT_SUMS) * basis.sizes[:, None]
