@@ -78,15 +78,15 @@ def template(bake: Bake, tasks: int | None = None) -> dict[str, Any]:
 
 def arguments(settings: BakeSettings) -> list[str]:
     """The flags of `srbf bake` that give exactly these settings; a light list is the job's parameter."""
-    receiver, points = settings.receiver, settings.points
+    receiver, points, inside = settings.receiver, settings.points, settings.light_set
     named = {
         "scene": settings.scene,
         "uv-layer": receiver.uv_layer,
         "unwrap": receiver.unwrap,
         "size": f"{settings.width}x{settings.height}",
-        "lights": settings.lights,
-        "domain": settings.domain,
-        "samples": settings.samples,
+        "lights": settings.lights if inside is None else None,
+        "domain": settings.domain if inside is None and points is None else None,
+        "samples": None if inside is not None and inside.kind in ("surfels", "gather") else settings.samples,
         "validation": settings.validation,
         "holdout": settings.holdout,
         "holdout-samples": settings.holdout_samples,
@@ -97,7 +97,7 @@ def arguments(settings: BakeSettings) -> list[str]:
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",
         "light-bounds": None if points is None or points.box is None else ",".join(map(repr, points.box)),
-        **_light_set(settings.light_set),
+        **_light_set(inside),
         "light-list": None if settings.light_list is None else "{{Param.LightList}}",
     }
     words = [receiver.word, *(f"{receiver.kind}:{name}" for name in receiver.also)]

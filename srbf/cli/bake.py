@@ -45,7 +45,7 @@ def bake(
     no_cast_shadow: flag.NoCastShadow = None,
     keep_scene_lights: flag.KeepSceneLights = False,
     lights: flag.Lights = None,
-    domain: flag.DomainOfLights = "hemisphere",
+    domain: flag.DomainOfLights = None,
     light_list: flag.LightList = None,
     light_set: flag.LightSet = None,
     light_group: flag.LightGroups = None,
@@ -120,11 +120,18 @@ def bake(
     for name, value in (("--light-group", light_group), ("--patches", patches), ("--grid", grid), ("--surfels-per-m2", surfels_per_m2)):
         if value and (gathers or isinstance(inside, CubemapSet)):
             raise typer.BadParameter(f"expected --light-set {light_set} without {name}, found both; leave it out")
-    for name, value in (("--lights", lights), ("--samples", samples)):
-        if value is not None and isinstance(inside, CubemapSet):
+    if operator == "cycles" and (gathers or isinstance(inside, CubemapSet)):
+        raise typer.BadParameter(f"expected --light-set surfels with --operator cycles, found {light_set}")
+    if domain is not None and light_set is not None:
+        raise typer.BadParameter(f"expected --light-set {light_set} without --domain, found both: it is of directions; leave it out")
+    traced = inside is not None and inside.kind in ("surfels", "gather", "cubemap")
+    for name, value, is_unused in (("--lights", lights, traced or operator == "cycles"), ("--samples", samples, traced)):
+        if value is not None and is_unused:
             raise typer.BadParameter(
-                f"expected --light-set {light_set} without {name}, found both: its lights are traced, not rendered; leave it out"
+                f"expected --light-set {light_set} without {name}, found both: it has no train lights to render; leave it out"
             )
+    if size is not None and not collection and all(one.kind in ("vertices", "probes") for one in named):
+        note(f"--size is not used: {named[0].kind} have a texel each")
     workers_of = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:
@@ -134,7 +141,7 @@ def bake(
                 width=width,
                 height=height,
                 lights=count,
-                domain=domain,
+                domain=domain or "hemisphere",
                 samples=samples or (2 if time_limit is None else UNLIMITED),
                 validation=(0 if gathers else 16) if validation is None else validation,
                 holdout=holdout,

@@ -80,8 +80,10 @@ Lights = Annotated[
     ),
 ]
 DomainOfLights = Annotated[
-    Literal["sphere", "hemisphere"],
-    typer.Option(help="Where the light comes from; hemisphere: from above the ground.", rich_help_panel=LIGHTS),
+    Literal["sphere", "hemisphere"] | None,
+    typer.Option(
+        help="Where the light comes from; hemisphere, the default: from above the ground.", show_default=False, rich_help_panel=LIGHTS
+    ),
 ]
 LightList = Annotated[
     Path | None,

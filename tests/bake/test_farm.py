@@ -308,12 +308,15 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     [
         (NamedSet(("Hall", "Yard"), (("Hall", ()),)), ["--light-set=named", "--light-group=Hall", "--light-group=Yard"]),
         (CloudSet("cloud", 77, 0.5, (0, 0, 0, 1, 2, 3)), ["--light-set=cloud", "--lights=77", "--grid=0.5", "--light-bounds=0,0,0,1,2,3"]),
-        (CloudSet("patches", 300), ["--light-set=patches", "--patches=300", "--transport=indirect"]),
+        (CloudSet("patches", 300), ["--light-set=patches", "--patches=300", "--transport=indirect", "--samples=2"]),
+        (CloudSet("surfels", 300, 0.5), ["--light-set=surfels", "--surfels-per-m2=4.0", "--transport=indirect"]),
     ],
 )
 def test_a_job_of_a_light_set_says_what_it_is(light_set: NamedSet | CloudSet, expected: list[str]) -> None:
     flags = arguments(BakeSettings(Receiver("lightmap", "A"), transport="indirect", light_set=light_set))
     assert set(expected) <= set(flags)
+    refused = {"--domain", *(("--lights", "--samples") if light_set.kind == "surfels" else ())}
+    assert not refused & {flag.partition("=")[0] for flag in flags}
     if light_set.kind == "cloud":
         glossy = BakeSettings(Receiver("lightmap", "A"), light_set=light_set, quantity="radiance", gloss=2)
         assert {*expected, "--gloss=2", "--quantity=radiance"} <= set(arguments(glossy))

@@ -31,9 +31,11 @@ STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one
 # The tables below are by the words of a command: all of them, in any order, with ` *` at the end also among others.
 
 # What is appended; the last value of a flag is the one that counts.
-FEW = "--lights 28 --size 24 --samples 1 --validation 4 --holdout 2 --holdout-samples 1"
+TESTED = "--validation 4 --holdout 2 --holdout-samples 1"
+FEW = f"--lights 28 --size 24 --samples 1 {TESTED}"
 SHORTER = {
-    "srbf bake --light-set surfels *": f"{FEW} --surfels-per-m2 4",
+    "srbf bake --light-set surfels *": f"--size 24 {TESTED} --surfels-per-m2 4",
+    "srbf bake --light-set gather *": f"--size 24 {TESTED}",
     "srbf bake --light-set cubemap:32 *": "--light-set cubemap:8 --size 24 --validation 4 --holdout 2",
     "srbf bake *": FEW,
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
