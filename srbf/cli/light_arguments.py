@@ -62,14 +62,14 @@ def parse_area(text: str, a0: float) -> AreaLight:
     return AreaLight(_xyz(n, 0), u=_xyz(n, 3), v=_xyz(n, 6), a0=a0, **_color(n, 9))
 
 
-def parse_object(text: str, flag: str) -> tuple[str, Triple]:
-    """`OBJECT=R,G,B`: the name is all before the last `=`, the color linear and at least 0."""
+def parse_object(text: str, flag: str, most: float = np.inf) -> tuple[str, Triple]:
+    """`OBJECT=R,G,B`: the name is all before the last `=`, the color linear, at least 0 and at `most`."""
     name, equals, rest = text.rpartition("=")
-    usage = f"`{flag}` OBJECT=R,G,B of at least 0"
+    usage = f"`{flag}` OBJECT=R,G,B of " + (f"0 to {most:g}" if np.isfinite(most) else "at least 0")
     if not (name and equals):
         raise InputError(f"expected {usage}, found {text!r}")
     color = _xyz(_numbers(rest, (3, 3), usage, text), 0)
-    if min(color) < 0:
+    if min(color) < 0 or max(color) > most:
         raise InputError(f"expected {usage}, found {text!r}")
     return name, color
 

@@ -193,7 +193,7 @@ def relight(
             *map(parse_named, light or []),
             *(NamedLight(*parse_object(text, "emissive")) for text in emissive or []),
         ]
-        painted = dict(parse_object(text, "albedo") for text in albedo or [])
+        painted = dict(parse_object(text, "albedo", 1.0) for text in albedo or [])
         seen_from = None if viewer is None else parse_viewer(viewer)
     has_light = bool(placed or environment)
     if lights is not None and has_light:

@@ -203,7 +203,7 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     Raises
     ------
     InputError
-        On an object that the asset does not know, and on an asset that cannot change.
+        On an object that the asset does not know, on a color out of range, and on an asset that cannot change.
 
     Examples
     --------
@@ -211,6 +211,9 @@ def with_albedo(asset: Asset, albedo: Mapping[str, tuple[float, float, float]]) 
     >>> with_albedo(asset, {"Wall": (0.8, 0.1, 0.1)})  # doctest: +SKIP
     """
     surfaces = Surfaces.of(asset)
+    for name, color in albedo.items():
+        if not all(0 <= value <= 1 for value in color):
+            raise InputError(f"expected an `albedo` of 0 to 1 for {name!r}, found {', '.join(f'{value:g}' for value in color)}")
     if asset.quantity != "irradiance":
         raise InputError(
             "expected an asset of irradiance to change the albedo of, found radiance, which has the albedo in it; bake irradiance"

@@ -207,6 +207,9 @@ def test_what_cannot_change_is_said(editable: Asset, asset: Asset) -> None:
             wrong()
     with pytest.raises(InputError, match="expected an object of the asset .Walls, Red wall., found 'Sofa'"):
         with_albedo(editable, {"Sofa": (0.5, 0.5, 0.5)})
+    for color in ((2.0, 0.5, 0.5), (0.5, -0.1, 0.5), (0.5, 0.5, float("nan"))):
+        with pytest.raises(InputError, match="expected an `albedo` of 0 to 1 for 'Walls', found"):
+            with_albedo(editable, {"Walls": color})
 
 
 def test_groups_are_of_one_object_and_objects_without_surfels_are_not_offered(editable: Asset, black: Capture) -> None:
