@@ -147,11 +147,7 @@ class GatherSet:
         """The set with the facts of the scene."""
         found = FoundSurfaces.of_facts(facts)
         x0, y0, z0, x1, y1, z1 = found.box.tolist()
-        skipped = facts["places"]["skipped"]
-        say(
-            f"{len(found.corners)} fragments of surfaces; lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
-            f"{skipped} places are in or near geometry"
-        )
+        say(f"{len(found.corners)} fragments of surfaces; lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m")
         return replace(self, found=found)
 
     def record(self) -> dict[str, Any]:

@@ -225,10 +225,8 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
         )
     train, random = (np.array(places[key], np.float64).reshape(-1, 3) for key in ("train", "random"))
     lights = {"patches": f"{patches.count} patches", "cloud": f"{len(train)} point lights"}.get(light_set.kind, f"{patches.count} surfels")
-    say(
-        f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m; "
-        f"{places['skipped']} places are in or near geometry"
-    )
+    skipped = f"; {places['skipped']} places are in or near geometry" if light_set.kind == "cloud" else ""  # others have no train lights
+    say(f"{lights} in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m{skipped}")
     if places.get("open_share", 0) > OPEN and not distant:
         say(
             f"the scene is open: {places['open_share']:.0%} of rays from the free places leave it; lights are captured in that box "

@@ -10,6 +10,7 @@ import pytest
 from made_rooms import Room, divided, room_of_surfels
 
 from srbf.bake import surface_checks
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import CloudSet
 from srbf.bake.scene_query import _with_places
 from srbf.bake.surface_checks import warn_of_receivers
@@ -39,6 +40,12 @@ def facts(corners: np.ndarray = BOX.corners, albedo: float = 0.5, open_share: fl
     return {"arrays": {**told, **arrays}, "places": places, "surface_objects": ["Walls"], "bounces": 4}
 
 
+def gathered(**changes: Any) -> dict[str, Any]:
+    """The same for a gather."""
+    told = facts(**changes)
+    return {**told, "arrays": {**told["arrays"], "transmission": np.zeros_like(told["arrays"]["albedo"])}}
+
+
 def baked(**changes: Any) -> tuple[CloudSet, list[str]]:
     said: list[str] = []
     return _with_places(CloudSet("surfels", 200), facts(**changes), 0, said.append), said
@@ -46,8 +53,17 @@ def baked(**changes: Any) -> tuple[CloudSet, list[str]]:
 
 def test_a_sound_room_has_one_line() -> None:
     found, said = baked()
-    assert len(said) == 1 and "surfels in the box" in said[0]
+    assert len(said) == 1 and said[0].endswith("surfels in the box 0,0,0 to 2,1.5,1.5 m")
     assert found.found is not None and found.found.surfels is not None
+
+
+def test_places_in_geometry_are_counted_where_lights_are_looked_for() -> None:
+    said: list[str] = []
+    _with_places(CloudSet("cloud", 1), facts(), 0, said.append)
+    assert "0 places are in or near geometry" in said[0]
+    said.clear()
+    GatherSet().with_facts(gathered(), said.append)
+    assert said == [f"{len(gathered()['arrays']['corners'])} fragments of surfaces; lights in the box 0,0,0 to 2,1.5,1.5 m"]
 
 
 def test_without_embreex_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
