@@ -170,9 +170,9 @@ def captures_of(receivers: Sequence[Receiver], separate: bool = False) -> list[R
     InputError where one is named twice.
     """
     named = [(receiver.kind, receiver.name) for receiver in receivers]
-    for kind, name in named:
-        if named.count((kind, name)) > 1:
-            raise InputError(f"expected each receiver once, found {kind}:{name} {named.count((kind, name))} times")
+    for one, receiver in zip(named, receivers, strict=True):
+        if named.count(one) > 1:
+            raise InputError(f"expected each receiver once, found {receiver.word} {named.count(one)} times")
     lightmaps = [receiver for receiver in receivers if receiver.kind == "lightmap"]
     if separate or len(lightmaps) < 2:
         return list(receivers)

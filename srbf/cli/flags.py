@@ -26,6 +26,7 @@ FORMER_FLAGS = {  # hidden aliases, for one version
     "--texels-per-metre": "--texels-per-meter",  # words: ok
     "--time": "--time-limit",
 }
+SHORT = {"k": "-k"}  # flags of one letter
 OTHERWISE_NAMED = {  # arguments of the library whose flag has another name
     "a0": "reference_distance",
     "count": "reduce_to",
@@ -47,16 +48,16 @@ def present(word: str, flags: Collection[str]) -> str:
 def in_flags(message: str, parameters: Sequence[Any]) -> str:
     """A message of the library, its arguments in backticks replaced by the flags of the command whose `parameters` these are.
 
-    `name` and `name=value` become --name and --name value, `name=True` --name; what the command has no flag for stays as it is.
+    `name` and `name=value` become --name and --name value, `name=True` --name; what the command has no flag for is one of another command.
     """
     by_name = {parameter.name: parameter for parameter in parameters}
 
     def flag(found: re.Match[str]) -> str:
         name, value = found[1], found[2]
-        parameter = by_name.get(OTHERWISE_NAMED.get(name, "")) or by_name.get(name)
-        if parameter is None:
-            return found[0]
-        return called(parameter) if value in (None, "True") else f"{called(parameter)} " + QUOTED.sub(r"\1", value)
+        known = OTHERWISE_NAMED.get(name, name)
+        parameter = by_name.get(known) or by_name.get(name)
+        word = SHORT.get(known, f"--{known.replace('_', '-')}") if parameter is None else called(parameter)
+        return word if value in (None, "True") else f"{word} " + QUOTED.sub(r"\1", value)
 
     return ARGUMENT.sub(flag, message)
 

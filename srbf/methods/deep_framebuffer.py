@@ -185,6 +185,9 @@ class DeepFramebuffer(Method):
             raise InputError(f"expected a `budget` of {least} megabytes or more for this view, found {self.budget}")
         return operator.view.thinned(share, self.seed)
 
+    def __str__(self) -> str:
+        return f"a deep framebuffer, {self.nearest} view clusters a pixel"
+
     @classmethod
     def candidates(cls, size: int, texels: int, numbers: int) -> Iterable[DeepFramebuffer]:
         """Bytes per texel say little of it."""

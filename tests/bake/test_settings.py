@@ -58,6 +58,8 @@ def test_lightmaps_share_an_atlas_and_others_stand_alone() -> None:
     assert len(captures_of([Receiver.parse(word) for word in words], separate=True)) == 5
     with pytest.raises(InputError, match="found lightmap:A 2 times"):
         captures_of([Receiver("lightmap", "A"), Receiver("lightmap", "A")])
+    with pytest.raises(InputError, match="found view 2 times"):
+        captures_of([Receiver("view"), Receiver("view")])
 
 
 def test_captures_of_one_bake_have_folders_of_their_own() -> None:

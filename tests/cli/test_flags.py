@@ -64,7 +64,10 @@ def test_messages_name_flags() -> None:
     ]
     text = "expected `k` of 1, found `direct='ray'`, `levels=3` and `budget`; give `force=True`, `asset` or run `srbf complete`"
     assert in_flags(text, parameters) == (
-        "expected -k of 1, found --direct ray, --mip-levels 3 and `budget`; give --force, ASSET or run `srbf complete`"
+        "expected -k of 1, found --direct ray, --mip-levels 3 and --budget; give --force, ASSET or run `srbf complete`"
+    )
+    assert (
+        in_flags("fit with `visibility=pca:50`, `editable` or `k=4`", parameters[1:]) == "fit with --visibility pca:50, --editable or -k 4"
     )
 
 

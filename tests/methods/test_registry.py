@@ -60,6 +60,11 @@ def test_methods_are_listed_from_the_simplest() -> None:
     assert [registry.method_named(name).name for name in registry.method_names()] == list(registry.method_names())
 
 
+@pytest.mark.parametrize("name", registry.method_names())
+def test_a_choice_is_told_in_words(name: str) -> None:
+    assert not set("()=`") & set(str(registry.method_named(name)()))
+
+
 @pytest.mark.usefixtures("another")
 def test_another_file_is_another_method_with_its_flags() -> None:
     assert registry.method_names()[-1] == "hologram" and registry.method_named("hologram").settings()[-1] == "fringes"
