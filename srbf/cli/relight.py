@@ -30,10 +30,10 @@ from srbf.cli.parameters import AssetFolder, Force
 from srbf.cli.probe_arguments import read_places, write_places
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
-from srbf.errors import MissingLibraryError
+from srbf.errors import InputError, MissingLibraryError
 from srbf.io.files import atomic_folder, check_replaceable
 from srbf.io.image import write_image
-from srbf.light_domain import domain_of_asset
+from srbf.light_domain import Named, domain_of_asset
 from srbf.lights import Light, NamedLight
 from srbf.methods import outside_domain
 from srbf.methods.environment_table import without_environment_table
@@ -225,6 +225,8 @@ def relight(
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
     opened = _opened(asset, painted, ambient)
+    if emissive:
+        _check_emissive(opened)
     places = None if at is None else read_places(at)
     if harmonics or places is not None:
         probe_light.grid_of(opened)
@@ -302,6 +304,12 @@ def _opened(folder: Path, albedo: dict[str, tuple[float, float, float]], ambient
     if not ambient:
         opened = replace(opened, images={name: image for name, image in opened.images.items() if name != "ambient"})
     return with_albedo(opened, albedo) if albedo else opened
+
+
+def _check_emissive(asset: Asset) -> None:
+    """InputError where the asset has neither objects that emit nor lights by name."""
+    if not (methods.method_of(asset).takes_objects or domain_of_asset(asset.manifest).kind == Named.kind):
+        raise InputError(f"expected a transfer asset fitted with `editable` for `emissive` objects, found a {asset.method} one")
 
 
 def _shadowed(asset: Asset, shadows: Shadows | None) -> Asset:

@@ -148,6 +148,11 @@ def test_a_named_light_has_no_direct_light_of_its_own(asset: Path) -> None:
         assert len(added.notes([NamedLight("Window"), PointLight((0.0, 0.0, 1.0))])) == 2
 
 
+def test_objects_that_emit_need_an_editable_asset(asset: Path, tmp_path: Path) -> None:
+    line = refused("relight", asset, "-o", tmp_path / "lit.exr", "--emissive", "Window=1,1,1")
+    assert "expected a transfer asset fitted with --editable for --emissive objects, found a relighting-map one" in line
+
+
 def test_an_environments_direct_light_is_added_by_rays(asset: Path, tmp_path: Path) -> None:
     write_image(tmp_path / "environment.exr", np.ones((4, 8, 3), np.float32), "float")
     done = srbf("relight", asset, "-o", tmp_path / "lit.exr", "--environment", tmp_path / "environment.exr")
