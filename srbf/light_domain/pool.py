@@ -14,3 +14,4 @@ class PoolLights(Cloud):
 
     kind: ClassVar[str] = "pool"
     captured_kinds: ClassVar[tuple[str, ...]] = ("point", "pool")
+    is_traced: ClassVar[bool] = True

@@ -28,6 +28,7 @@ class LightDomain(ABC):
     captured_kinds: ClassVar[tuple[str, ...]]  # of the train lights of a capture in this domain
     falloff: ClassVar[Falloff]  # of a point light that does not say
     is_inside: ClassVar[bool] = False  # whether lights have places in the scene
+    is_traced: ClassVar[bool] = False  # whether rays measure any light: then none is extrapolated
 
     @classmethod
     @abstractmethod

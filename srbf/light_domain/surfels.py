@@ -14,3 +14,4 @@ class SurfelLights(Cloud):
 
     kind: ClassVar[str] = "surfels"
     captured_kinds: ClassVar[tuple[str, ...]] = ("point", "surfel")
+    is_traced: ClassVar[bool] = True

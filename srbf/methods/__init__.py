@@ -15,6 +15,7 @@ from srbf.lights import Light, moved
 from srbf.methods.over_lights import finish
 from srbf.methods.protocol import FitRun, Method, Moving
 from srbf.registry import method_named
+from srbf.visibility.embree import has_embree
 
 __all__ = [
     "FitRun",
@@ -311,7 +312,7 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
     Returns
     -------
     list
-        Of strings, one per light outside; empty where all are inside.
+        Of strings, one per light outside; empty where all are inside, or are traced wherever they are.
 
     Examples
     --------
@@ -319,7 +320,10 @@ def outside_domain(asset: Asset, lights: Sequence[Light]) -> list[str]:
     >>> outside_domain(asset, [DirectionalLight((0.0, 0.0, -1.0))])
     ['light 0 comes from below the captured hemisphere (z = -1): its response is extrapolated']
     """
+    domain = domain_of_asset(asset.manifest)
+    if domain.is_traced and (has_embree() or "surfel_visibility" in asset.manifest):
+        return []
     positions = asset.images.get("position")
     covered = None if positions is None else positions[asset.covered]
     fit = asset.manifest.get("source", {}).get("fit", {})
-    return domain_of_asset(asset.manifest).outside(in_asset_frame(asset, lights), covered, fit)
+    return domain.outside(in_asset_frame(asset, lights), covered, fit)

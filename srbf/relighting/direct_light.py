@@ -137,8 +137,10 @@ class Added:
             return []
         if self._emits:
             lights = [light for light in lights if not isinstance(light, NamedLight)]  # what it lays on receivers is in the asset
+        if not lights:
+            return []
         without = (NamedLight,) if self._kind == "ray" else (EnvironmentLight, NamedLight)
-        lines = [] if lights and all(isinstance(light, without) for light in lights) else [f"added {NAMES[self._kind]}"]
+        lines = [] if all(isinstance(light, without) for light in lights) else [f"added {NAMES[self._kind]}"]
         if self._kind != "ray" and any(isinstance(light, EnvironmentLight) for light in lights):
             lines.append("an environment's direct light is not added: the picture holds only what it reflects on")
         if any(isinstance(light, NamedLight) for light in lights):

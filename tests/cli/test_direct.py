@@ -146,6 +146,7 @@ def test_a_named_light_has_no_direct_light_of_its_own(asset: Path) -> None:
             "a named light's direct light is not added: the picture holds only what it reflects on"
         ]
         assert len(added.notes([NamedLight("Window"), PointLight((0.0, 0.0, 1.0))])) == 2
+        assert added.notes([]) == []
 
 
 def test_objects_that_emit_need_an_editable_asset(asset: Path, tmp_path: Path) -> None:

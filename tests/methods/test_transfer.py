@@ -10,15 +10,17 @@ import numpy as np
 import pytest
 from made_rooms import Room, room_of_surfels
 
+from srbf import methods
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.errors import ImageError, InputError
 from srbf.evaluation.errors_by_role import evaluate
 from srbf.fitting.options import fit
-from srbf.lights import AreaLight, DirectionalLight, NamedLight, PointLight, SpotLight
-from srbf.methods import linear_response
+from srbf.lights import AreaLight, DirectionalLight, Light, NamedLight, PointLight, SpotLight
+from srbf.methods import linear_response, outside_domain
 from srbf.methods.surface_changes import Surfaces, emitted_by_objects, with_albedo
 from srbf.methods.transfer import Transfer
+from srbf.relighting.direct_light import Added
 from srbf.solve.radiosity import Bounces, reciprocal
 from srbf.visibility.cloud_lights import CloudLights
 from srbf.visibility.received import ReceivedLight
@@ -210,6 +212,18 @@ def test_what_cannot_change_is_said(editable: Asset, asset: Asset) -> None:
     for color in ((2.0, 0.5, 0.5), (0.5, -0.1, 0.5), (0.5, 0.5, float("nan"))):
         with pytest.raises(InputError, match="expected an `albedo` of 0 to 1 for 'Walls', found"):
             with_albedo(editable, {"Walls": color})
+
+
+def test_an_object_that_emits_has_no_direct_light_to_add(editable: Asset) -> None:
+    with Added(editable, "ray") as added:
+        assert added.notes([NamedLight("Walls")]) == []
+
+
+def test_lights_beyond_the_box_of_lights_are_traced(asset: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
+    beyond: list[Light] = [light((9.0, 1.0, 1.0))]
+    assert outside_domain(asset, beyond) == []
+    monkeypatch.setattr(methods, "has_embree", lambda: False)
+    assert "its response is extrapolated" in outside_domain(asset, beyond)[0], "by the table of places"
 
 
 def test_groups_are_of_one_object_and_objects_without_surfels_are_not_offered(editable: Asset, black: Capture) -> None:
