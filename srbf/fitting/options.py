@@ -109,6 +109,7 @@ def check_settings(method: str | None, settings: dict[str, Any]) -> str:
     if name == AUTO:
         _check_known(AUTO, settings, (*BUDGET_SETTINGS, *_shared_settings()))
         check_budget(settings.get("budget"), settings.get("psnr"), settings.get("error"))
+        _check_values(settings)
     else:
         _check_known(name, settings, method_named(name).settings())
         chosen = method_named(name)
@@ -145,6 +146,15 @@ def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool =
     asset = method.encode(capture, replace(run, stitch=Stitch.of(capture) if stitch else None))
     asset.probes = capture.probes()
     return asset
+
+
+def _check_values(settings: dict[str, Any]) -> None:
+    """InputError on a value that no method takes."""
+    for method in all_methods():
+        for entry in fields(method):  # type: ignore[arg-type]
+            check = entry.metadata.get("check")
+            if check is not None and entry.name in settings:
+                check(settings[entry.name])
 
 
 def _shared_settings() -> set[str]:
