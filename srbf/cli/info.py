@@ -12,6 +12,7 @@ from srbf.cli.terminal import print_json
 from srbf.info import describe
 
 MOST_NAMES = 8  # in a line
+COLUMN = 18  # characters of a name, at least
 
 
 def info(
@@ -23,8 +24,9 @@ def info(
     if json:
         print_json(facts)
         return
+    width = max(COLUMN, *(len(name) + 1 for name in facts))
     for name, value in facts.items():
-        typer.echo(f"{name.replace('_', ' '):<18}{_shown(value)}")
+        typer.echo(f"{name.replace('_', ' '):<{width}}{_shown(value)}")
 
 
 def _shown(value: object) -> str:

@@ -65,7 +65,7 @@ def asset(made: Path, tmp_path: Path) -> Path:
     return shutil.copytree(made / "asset", tmp_path / "asset")
 
 
-def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
+def test_fit_evaluate_and_info(capture: Capture, asset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     opened = Asset.open(asset)
     assert opened.k == 9 and set(opened.manifest["error"]) == {"train", "holdout"}
     result = json.loads(ok("evaluate", asset, capture.folder, "--json"))
@@ -76,6 +76,9 @@ def test_fit_evaluate_and_info(capture: Capture, asset: Path) -> None:
     assert json.loads(ok("info", asset, "--json"))["bytes_per_texel"]["point"] == 72
     assert json.loads(ok("info", capture.folder, "--json"))["lights"]["train"] == 60
     assert "holdout" in ok("evaluate", asset, capture.folder)
+    monkeypatch.setattr("srbf.cli.info.describe", lambda path: {"format": "srbf-asset", "receiver_visibility": {"points": 517}})
+    assert ok("info", asset).splitlines() == ["format              srbf-asset", "receiver visibility points 517"]
+    monkeypatch.undo()
     shown = dict(line.split(maxsplit=1) for line in ok("info", asset).splitlines())
     assert [shown[name] for name in ("format", "method", "k", "width", "height")] == ["srbf-asset", "relighting-map", "9", "14", "10"]
 
