@@ -18,6 +18,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.bake.light_sets import PLACES, PlacedLight
 from srbf.bake.point_lights import Box, parse_box
+from srbf.bake.surface_checks import warn_of_empty
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
@@ -146,6 +147,7 @@ class GatherSet:
     def with_facts(self, facts: dict[str, Any], say: Callable[[str], None]) -> GatherSet:
         """The set with the facts of the scene."""
         found = FoundSurfaces.of_facts(facts)
+        warn_of_empty(Fragments(found.corners, found.albedo), say)
         x0, y0, z0, x1, y1, z1 = found.box.tolist()
         say(f"{len(found.corners)} fragments of surfaces; lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m")
         return replace(self, found=found)

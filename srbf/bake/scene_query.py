@@ -19,7 +19,7 @@ from srbf.bake.light_sets import LIGHT_SET_FILE, MOST_NAMES, MOST_SURFELS, SURFE
 from srbf.bake.probes import facts_line, grid_of
 from srbf.bake.run import Bake, require_scene
 from srbf.bake.settings import LARGEST_SIDE, BakeSettings, LightSet
-from srbf.bake.surface_checks import require_surfels, warn_of_surfaces
+from srbf.bake.surface_checks import require_surfels, warn_of_fewer, warn_of_surfaces
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError, ManifestError
 from srbf.io import files
@@ -216,6 +216,8 @@ def _with_places(light_set: CloudSet, found: dict[str, Any], seed: int, say: Cal
             most = int(np.clip(surfaces.areas.sum() / SURFEL_SIZE**2, most, MOST_SURFELS))
         surfels = surfels_of(surfaces, objects, occluders, free, light_set.spacing, most, emission)
         require_surfels(surfels)
+        if light_set.spacing is not None:
+            warn_of_fewer(surfels, light_set.spacing, most, say)
         patches = unemitting(parts_of(surfels))
     else:
         patches = patches_of(Fragments(arrays["corners"], arrays["albedo"]), occluders, free, light_set.patch_count, seed)

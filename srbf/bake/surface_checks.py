@@ -18,11 +18,16 @@ MOST_SURFELS = 16_000  # form factors between them are kept as 16-bit numbers, a
 BLIND = 0.2  # share of the receivers that see no surfel, from which on it is said
 
 
-def warn_of_surfaces(surfaces: Fragments, say: Callable[[str], None]) -> None:
-    """A line for triangles without area, and one for a great many."""
+def warn_of_empty(surfaces: Fragments, say: Callable[[str], None]) -> None:
+    """A line for triangles without area."""
     empty = int((surfaces.areas <= 0).sum())
     if empty:
         say(f"{empty} of {len(surfaces.corners)} triangles of the surfaces have no area and are left out")
+
+
+def warn_of_surfaces(surfaces: Fragments, say: Callable[[str], None]) -> None:
+    """A line for triangles without area, and one for a great many."""
+    warn_of_empty(surfaces, say)
     if len(surfaces.corners) > MANY:
         say(
             f"the surfaces have {len(surfaces.corners):,} triangles: surfels of more than {MANY:,} take minutes and gigabytes of memory; "
@@ -41,6 +46,16 @@ def require_surfels(surfels: Surfels) -> None:
         raise InputError(
             f"expected at most {MOST_SURFELS} surfels, found {surfels.count}: the surfaces are of very many small pieces; hide them from "
             "renders or join them, or bake `light_set=patches`"
+        )
+
+
+def warn_of_fewer(surfels: Surfels, spacing: float, most: int, say: Callable[[str], None]) -> None:
+    """A line where surfels `spacing` meters apart would be more than `most`."""
+    area = float(surfels.cells.areas.sum())
+    if area / spacing**2 > most:
+        say(
+            f"`surfels_per_m2={spacing**-2:.6g}` asks for about {area / spacing**2:,.0f} surfels, more than the {most:,} that are made "
+            f"at most: there are {surfels.count / area:.3g} per square meter"
         )
 
 

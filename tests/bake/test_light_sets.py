@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from made_places import BOX, places_of
 
-from srbf.bake.light_sets import CloudSet, NamedSet, parse_light_set
+from srbf.bake.light_sets import MOST_SURFELS, CloudSet, NamedSet, parse_light_set
 from srbf.bake.settings import BakeSettings, Receiver, plan_lights
 from srbf.errors import InputError
 
@@ -15,7 +15,7 @@ LIGHTMAP = Receiver("lightmap", "Floor")
 
 
 def test_flags_mean_a_set() -> None:
-    assert parse_light_set("surfels", (), 400, None, None, None, 25.0) == CloudSet("surfels", 8000, 0.2)
+    assert parse_light_set("surfels", (), 400, None, None, None, 25.0) == CloudSet("surfels", MOST_SURFELS, 0.2)
     assert parse_light_set("surfels", (), 400, 64, None, None, None, "cycles") == CloudSet("patches", 64)
     assert parse_light_set("named", ["Hall"], 400, None, None, None) == NamedSet(("Hall",))
     assert parse_light_set("cloud", (), 512, None, 0.5, "0,0,0,2,2,2") == CloudSet("cloud", 512, 0.5, BOX)

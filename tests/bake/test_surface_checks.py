@@ -87,6 +87,17 @@ def test_triangles_without_area_are_left_out_with_a_line() -> None:
     assert any(line.startswith("3 of ") and "no area" in line for line in said)
     assert found.found is not None and found.found.surfels is not None
     assert np.isfinite(found.found.surfels.cells.normals).all() and (found.found.surfels.cells.areas > 0).all()
+    GatherSet().with_facts(gathered(corners=np.concatenate([BOX.corners, flat])), said.append)
+    assert said[-2] == said[0] and "fragments of surfaces" in said[-1]
+
+
+def test_fewer_surfels_than_were_asked_for_are_said() -> None:
+    said: list[str] = []
+    _with_places(CloudSet("surfels", 200, 0.01), facts(), 0, said.append)
+    assert said[0].startswith("`surfels_per_m2=10000` asks for about 165,000 surfels, more than the 200 that are made at most: there are ")
+    said.clear()
+    _with_places(CloudSet("surfels", 200, 0.5), facts(), 0, said.append)
+    assert len(said) == 1
 
 
 def test_an_open_scene_is_said() -> None:
