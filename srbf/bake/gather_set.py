@@ -18,7 +18,7 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.bake.light_sets import PLACES, PlacedLight
 from srbf.bake.point_lights import Box, parse_box
-from srbf.bake.surface_checks import warn_of_empty
+from srbf.bake.surface_checks import warn_of_dark_view, warn_of_empty
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
@@ -181,10 +181,11 @@ class GatherSet:
                 return replace(self, found=FoundSurfaces.of_arrays(stored))
         return self
 
-    def trace(self, receivers: Capture, seed: int, progress: Progress) -> None:
+    def trace(self, receivers: Capture, seed: int, progress: Progress, say: Callable[[str], None] = lambda line: None) -> None:
         """Pool and links into the folder of `receivers`, a capture without lights; nothing where they are there already.
 
-        InputError where the view shows no surface, or no surface that it gathers from reflects light.
+        `say` gets a line where light reaches almost nothing that the view shows. InputError where it shows no surface, or no surface that
+        it gathers from reflects light.
         """
         found = self._known
         key = f"{found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
@@ -197,6 +198,7 @@ class GatherSet:
         if not len(pixels.points):
             raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
         surfaces = Fragments(found.corners, found.albedo)
+        warn_of_dark_view(pixels.points, pixels.normals, surfaces, occluders, found.free, seed, say)
         backs = None if found.transmission is None else points_behind(view)
         looks = [pixels] if backs is None else [pixels, backs]
         points, normals = np.concatenate([own.points for own in looks]), np.concatenate([own.normals for own in looks])

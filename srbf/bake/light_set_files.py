@@ -53,13 +53,13 @@ def trace_operator(
 
     Of a cubemap all that it holds of its lights. Returns keys of capture.json that only the traced rays tell.
 
-    `say` gets a line where receivers see no surface; InputError where none of them does.
+    `say` gets a line where receivers see no surface that light reaches; InputError where none of them does.
     """
     light_set = settings.light_set
     if isinstance(light_set, CubemapSet):
         return light_set.trace(receivers, (settings.validation, settings.holdout), settings.seed, progress, say)
     if isinstance(light_set, GatherSet):
-        light_set.trace(receivers, settings.seed, progress)
+        light_set.trace(receivers, settings.seed, progress, say)
     if not isinstance(light_set, CloudSet) or light_set.found is None or light_set.found.surfels is None:
         return {}
     key = f"{light_set.found.checksum} {settings.width}x{settings.height} {settings.seed}"

@@ -7,14 +7,19 @@ from collections.abc import Callable
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Bool, Float32
+from srbf.arrays import Bool, Float32, Float64
 from srbf.errors import InputError
-from srbf.visibility.surface_cells import DARK, Fragments
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.hemisphere import cosine_directions
+from srbf.visibility.surface_cells import DARK, OFFSET, Fragments, lit
 from srbf.visibility.surfels import Surfels
 from srbf.visibility.transfer_operator import TransferOperator
 
 MANY = 500_000  # triangles, from which on surfels take minutes
 MOST_SURFELS = 16_000  # form factors between them are kept as 16-bit numbers, and solved as a dense matrix
+VIEWED, VIEW_RAYS = 512, 16  # points of a view that are looked at, and rays from each
+WITNESSES = 64  # free places by which it is known what light reaches of what these rays meet
+DARK_VIEW = 0.8  # share of these points without light, from which on it is said
 BLIND = 0.2  # share of the receivers that see no surfel, from which on it is said
 
 
@@ -68,6 +73,35 @@ def warn_of_receivers(operator: TransferOperator, covered: Bool[ndarray, " P"], 
         raise InputError(f"expected receivers that see surfaces which light reaches, found none; {advice}")
     if share > BLIND:
         say(f"{share:.0%} of the receivers see no surface that light reaches and stay black; {advice}")
+
+
+def warn_of_dark_view(
+    points: Float64[ndarray, "P 3"],
+    normals: Float64[ndarray, "P 3"],
+    surfaces: Fragments,
+    occluders: EmbreeTriangles,
+    free: Float64[ndarray, "F 3"],
+    seed: int,
+    say: Callable[[str], None],
+) -> None:
+    """A line where lights at free places reach almost none of a view's points, nor of what these see."""
+    rng = np.random.default_rng(seed)
+    chosen = rng.permutation(len(points))[:VIEWED]
+    dark = chosen[~lit(points[chosen], normals[chosen], occluders, free).any(axis=1)]
+    if len(dark) <= DARK_VIEW * len(chosen):
+        return
+    lift = OFFSET * float(np.ptp(surfaces.corners.reshape(-1, 3), axis=0).max(initial=0))
+    directions = cosine_directions(normals[dark][:, None], VIEW_RAYS, rng)[:, 0].reshape(-1, 3)
+    origins = np.repeat(points[dark] + lift * normals[dark], VIEW_RAYS, axis=0)
+    triangle, distance, _ = EmbreeTriangles(surfaces.corners).first_hit(origins, directions)
+    met = np.flatnonzero(triangle >= 0)
+    facing = surfaces.normals[triangle[met]]
+    facing = facing * np.where(np.einsum("nk,nk->n", facing, directions[met]) > 0, -1.0, 1.0)[:, None]
+    hits = origins[met] + distance[met, None] * directions[met]
+    reached = np.zeros(len(origins), bool)
+    reached[met] = lit(hits, facing, occluders, free[:WITNESSES]).any(axis=1)
+    if (~reached.reshape(-1, VIEW_RAYS).any(axis=1)).sum() > DARK_VIEW * len(chosen):
+        say("the camera of the view sees almost nothing that light reaches: is it inside an object?")
 
 
 def warn_of_unlit(is_lit: Bool[ndarray, " R"], what: str, say: Callable[[str], None]) -> None:

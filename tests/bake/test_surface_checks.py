@@ -13,9 +13,11 @@ from srbf.bake import surface_checks
 from srbf.bake.gather_set import GatherSet
 from srbf.bake.light_sets import CloudSet
 from srbf.bake.scene_query import _with_places
-from srbf.bake.surface_checks import warn_of_receivers
+from srbf.bake.surface_checks import warn_of_dark_view, warn_of_receivers
 from srbf.errors import InputError, MissingLibraryError
 from srbf.methods.transfer import Transfer
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.surface_cells import Fragments
 from srbf.visibility.transfer_operator import TransferOperator
 
 pytest.importorskip("embreex")
@@ -132,6 +134,20 @@ def test_what_no_free_place_sees_is_refused() -> None:
     outside["arrays"] = {name: np.asarray(array, np.float32) for name, array in outside["arrays"].items()}
     with pytest.raises(InputError, match="choose another `light_bounds`"):
         _with_places(CloudSet("surfels", 200), outside, 0, lambda line: None)
+
+
+def test_a_view_from_inside_an_object_is_said() -> None:
+    """Of a block that stands in the room: its faces, seen from inside; from outside they are lit."""
+    block = Room.box((0.4, 0.4, 0.4), 0.1)
+    free = BOX.free[(BOX.free > 0.5).any(axis=1)]
+    corners = np.concatenate([BOX.corners, block.corners]).astype(np.float32)
+    surfaces = Fragments(corners, np.full((len(corners), 3), 0.5, np.float32))
+    said: list[str] = []
+    places, normals = block.places.astype(np.float64), block.normals.astype(np.float64)
+    warn_of_dark_view(places, normals, surfaces, EmbreeTriangles(corners), free, 0, said.append)
+    assert said == ["the camera of the view sees almost nothing that light reaches: is it inside an object?"]
+    warn_of_dark_view(BOX.places, BOX.normals, surfaces, EmbreeTriangles(corners), free, 0, said.append)
+    assert len(said) == 1
 
 
 def test_receivers_that_see_nothing_are_said_and_refused_when_they_are_all(tmp_path) -> None:
