@@ -32,6 +32,7 @@ SOURCES = {  # of train lights, by light set
     "cubemap": "directions of a cubemap in place of train lights, by rays",
     "surfels": "form factors of surfels in place of train lights",
 }
+TRACED = {"gather": "links by rays", "surfels": "form factors by rays"}  # what comes on top of the lights
 
 
 def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list[str]:
@@ -98,8 +99,16 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
         f"lights     {train} train at {at}, {roles['validation']} validation and "
         f"{roles['holdout']} holdout at {settings.holdout_samples}, {train_from}",
         f"disk       about {disk / 1e6:.0f} MB ({free / 1e9:.1f} GB free)",
-        f"time       about {_duration(time)} {'per sample of all lights ' if bake.is_open_ended else ''}on this machine as loaded now",
+        f"time       {_time(bake, time, bool(lights))}",
     ]
+
+
+def _time(bake: Bake, seconds: float, has_lights: bool) -> str:
+    traced = TRACED.get(bake.settings.light_set.kind) if bake.settings.light_set is not None else None
+    if traced is not None and not has_lights:
+        return f"that of {traced}, which is not estimated"
+    rendered = f"about {_duration(seconds)} {'per sample of all lights ' if bake.is_open_ended else ''}on this machine as loaded now"
+    return rendered if traced is None else f"{rendered}, and that of {traced}, which is not estimated"
 
 
 def _samples(bake: Bake) -> str:

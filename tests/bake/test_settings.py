@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 import typer
 
+from srbf.bake.estimate import _time
 from srbf.bake.folder import STATE
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.job import base_job
+from srbf.bake.light_sets import CloudSet
 from srbf.bake.openjd import arguments
 from srbf.bake.run import Bake
 from srbf.bake.scene_query import size_of_begun, with_frame
@@ -67,6 +70,15 @@ def test_captures_of_one_bake_have_folders_of_their_own() -> None:
     folders = folder_names([Receiver("view", name) for name in names])
     assert folders == ["Eye", "_up", "eye~2", "a_b", "view", "Üben 1.5"]
     assert folder_names([Receiver("view", "."), Receiver("view", None), Receiver("view", "view")]) == ["view", "view~2", "view~3"]
+
+
+def test_a_dry_run_tells_of_rays_that_come_on_top(tmp_path: Path) -> None:
+    surfels = BakeSettings(Receiver("lightmap", "A"), transport="indirect", light_set=CloudSet("surfels", 100))
+    gather = BakeSettings(Receiver("view"), transport="indirect", quantity="radiance", light_set=GatherSet())
+    plain, traced, linked = (Bake(tmp_path, tmp_path, own) for own in (BakeSettings(Receiver("view")), surfels, gather))
+    assert _time(plain, 5, True) == "about 5 s on this machine as loaded now"
+    assert _time(traced, 5, True) == "about 5 s on this machine as loaded now, and that of form factors by rays, which is not estimated"
+    assert _time(linked, 0, False) == "that of links by rays, which is not estimated"
 
 
 def test_what_was_recorded_before_there_was_a_choice_stays() -> None:
