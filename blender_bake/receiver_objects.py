@@ -113,6 +113,12 @@ def _place_exactly(obj: bpy.types.Object, places: list[tuple[bpy.types.ID | None
             beside.place_at(obj, place)
 
 
+def require_object(scene: bpy.types.Scene, name: str) -> None:
+    """WorkerError where the scene has no object `name`, nor an empty that shows it as EMPTY/OBJECT."""
+    if scene.objects.get(name) is None and scene.objects.get(name.partition("/")[0]) is None:
+        find_mesh_object(scene, name)
+
+
 def find_mesh_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The object `name` of the scene, made local and visible; WorkerError says what else there is."""
     obj = scene.objects.get(name)

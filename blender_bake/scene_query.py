@@ -14,7 +14,8 @@ from blender_bake import free_places, point_grid, probe_places, surfaces, unwrap
 from blender_bake.frame import Frame
 from blender_bake.ipc import Events, hand_over
 from blender_bake.named_lights import NamedLights
-from blender_bake.receiver_objects import meshes_of, prepare, world_area
+from blender_bake.receiver_objects import meshes_of, prepare, require_object, world_area
+from blender_bake.view import find_camera
 
 ROUNDS = 4  # of laying out a layer for the size that the one before needs: its gutter shrinks as the size grows
 
@@ -22,6 +23,7 @@ ROUNDS = 4  # of laying out a layer for the size that the one before needs: its 
 def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, frame: Frame, scratch: str) -> dict[str, Any]:
     """The facts for `question`, which may have several of these keys.
 
+    required: receiver            -> nothing; WorkerError where its object or camera is not there
     collections: names            -> `objects`: the receivers in them, in order of name
     vertices: receiver            -> `width`, `height`: of the image that lists the receiver's vertices
     texels_per_meter: density D, receiver -> `side`: texels per side, D sqrt(area in the world / area of the UV layer), not rounded;
@@ -39,6 +41,8 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
         `surface_objects`: their names by number; `bounces`: diffuse ones that the scene's settings allow
     """
     found: dict[str, Any] = {}
+    if question.get("required"):
+        _require(scene, question["required"])
     if question.get("collections"):
         found["objects"] = list(dict.fromkeys(name for c in question["collections"] for name in meshes_of(scene, c, events)))
     if question.get("vertices"):
@@ -61,6 +65,13 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     if question.get("surfaces"):  # the last: it hides all objects
         found |= _surfaces(scene, question["surfaces"], Path(scratch), events)
     return found
+
+
+def _require(scene: bpy.types.Scene, receiver: dict[str, Any]) -> None:
+    if receiver["kind"] == "view":
+        find_camera(scene, receiver["camera"])
+    for name in receiver.get("objects", ()):
+        require_object(scene, name)
 
 
 def _probes(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path) -> dict[str, Any]:

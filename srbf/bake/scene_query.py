@@ -177,7 +177,8 @@ def with_light_set(bake: Bake, say: Callable[[str], None] = lambda line: None) -
         kept = light_set.read(bake.folder / LIGHT_SET_FILE, key)
         if kept.is_known:
             return replace(bake, settings=replace(settings, light_set=kept))
-    found = _ask(bake, light_set.question(tested, settings.seed), say)
+    question = {"required": settings.receiver.job(), **light_set.question(tested, settings.seed)}
+    found = _ask(bake, question, say)
     known: LightSet
     if isinstance(light_set, NamedSet):
         entries = tuple((entry["name"], tuple(entry["objects"])) for entry in found["named"])

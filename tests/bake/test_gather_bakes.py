@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from building import SCENES
-from light_set_commands import done, refused, scenes_in
+from light_set_commands import done, refused, scenes_in, srbf
 
 from srbf.asset import Asset
 from srbf.capture import Capture
@@ -35,7 +35,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
 def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
     folder, asset = tmp_path / "capture", tmp_path / "asset"
     assert "pool of surfels" in done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0", "--dry-run").output
-    done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
+    said = done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0").stderr
+    assert "almost nothing" not in said and "in or near geometry" not in said
     made = (folder / GATHER_FILE).stat().st_mtime_ns
     done("bake", scene("unlit"), "-o", folder, *VIEW, "--holdout", "0")
     assert (folder / GATHER_FILE).stat().st_mtime_ns == made and not Capture.open(folder).lights
@@ -68,6 +69,24 @@ def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None
 def test_wrong_input_is_one_line(scene, tmp_path: Path, name: str, flags: list[str], status: int, words: str) -> None:
     assert words in refused(["bake", scene(name), "-o", tmp_path / "no", *VIEW, *flags, "--holdout", "0"], status)
     assert not (tmp_path / "no").exists()
+
+
+@pytest.mark.parametrize(
+    ("receiver", "light_set", "words"),
+    [("view:Nowhere", "gather", "a camera 'Nowhere'"), ("lightmap:Nothing", "surfels", "an object 'Nothing'")],
+)
+def test_a_missing_receiver_is_said_before_surfaces_are_looked_at(scene, tmp_path: Path, receiver: str, light_set: str, words: str) -> None:
+    flags = ["--receiver", receiver, "--size", "8", "--light-set", light_set, "--transport", "indirect"]
+    said = srbf("bake", scene("unlit"), "-o", tmp_path / "no", *flags).stderr.splitlines()
+    assert len(said) == 1 and f"expected {words}" in said[0]
+
+
+def test_a_camera_in_an_object_is_said(scene, tmp_path: Path) -> None:
+    boxed = "import bpy, sys; bpy.ops.wm.open_mainfile(filepath=sys.argv[1]); at = bpy.context.scene.camera.location; "
+    boxed += "bpy.ops.mesh.primitive_cube_add(size=0.3, location=at); bpy.ops.wm.save_as_mainfile(filepath=sys.argv[2])"
+    subprocess.run([sys.executable, "-c", boxed, str(scene("unlit")), str(tmp_path / "boxed.blend")], check=True, timeout=120)
+    said = done("bake", tmp_path / "boxed.blend", "-o", tmp_path / "capture", *VIEW, "--holdout", "0").stderr
+    assert "the camera of the view sees almost nothing that light reaches" in said
 
 
 def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
