@@ -125,7 +125,11 @@ def bake(
     if domain is not None and light_set is not None:
         raise typer.BadParameter(f"expected --light-set {light_set} without --domain, found both: it is of directions; leave it out")
     traced = inside is not None and inside.kind in ("surfels", "gather", "cubemap")
-    for name, value, is_unused in (("--lights", lights, traced or operator == "cycles"), ("--samples", samples, traced)):
+    for name, value, is_unused in (
+        ("--lights", lights, traced or operator == "cycles"),
+        ("--samples", samples, traced),
+        ("--time-limit", time_limit, isinstance(inside, CubemapSet)),
+    ):
         if value is not None and is_unused:
             raise typer.BadParameter(
                 f"expected --light-set {light_set} without {name}, found both: it has no train lights to render; leave it out"

@@ -43,6 +43,7 @@ from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size
         (["--dask", "tcp://a:1", "--workers", "2"], "--workers"),
         (["--light-set", "cubemap:4", "--lights", "400"], "expected --light-set cubemap:4 without --lights, found both"),
         (["--light-set", "cubemap:4", "--samples", "5"], "expected --light-set cubemap:4 without --samples, found both"),
+        (["--light-set", "cubemap:4", "--time-limit", "5m"], "expected --light-set cubemap:4 without --time-limit, found both"),
         (["--light-set", "cubemap:4", "--operator", "cycles"], "expected --light-set surfels with --operator cycles, found cubemap:4"),
         (["--light-set", "gather", "--operator", "cycles"], "expected --light-set surfels with --operator cycles, found gather"),
         (["--light-set", "gather", "--lights", "9"], "expected --light-set gather without --lights, found both"),
