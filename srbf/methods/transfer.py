@@ -69,7 +69,7 @@ class Transfer(LightsInsideMaps):
     surfels
         How many parts of the surfaces a light is measured by, at most 8000; `auto`: as few as leave out 0.3 % of pictures.
     rank
-        How many shapes; `auto`: as many as leave out 1 % of many lights' pictures, by norm, at most 640.
+        How many shapes; `auto`: as many as leave out 1.5 % of many lights' pictures, by norm, at most 640.
     clusters
         1 to 256: the index per texel is one byte.
     components

@@ -32,11 +32,8 @@ NEAR_RANGE = (0.03, 0.12)  # m from a surface
 CONE = (0.25, 0.7)  # rad, half-angles
 OVERSAMPLED = 0.5  # more mixtures than shapes, of these: faint rooms are in the last axes, which few mixtures find badly
 POWER_STEPS = 1
-RANK_ERROR = 0.01  # of the training lights' pictures, rms, that `auto` leaves out
+RANK_ERROR = 0.015  # of the training lights' pictures, rms, that `auto` leaves out
 MOST_RANK = 640
-EQUAL = (
-    0.5  # of lights' pictures: 0 counts errors as they are, by which dim places are lost, 1 each over its picture, and bright corners are
-)
 SUMS = 256  # random ones, by which norms are known to 4 %
 SAMPLE_TEXELS = 1 << 14  # about, whose pictures the shapes are made for
 JUDGES = 32  # random mixtures of lights by which the rank is chosen
@@ -124,7 +121,7 @@ def transfer_basis(
     emitted: Emitted | None = None,
     left_out: float = RANK_ERROR,
 ) -> TransferBasis:
-    """At most `rank` shapes of the pictures of V lights, dim ones nearly as important as bright ones.
+    """At most `rank` shapes of the pictures of V lights, each picture of unit norm.
 
     rank None: as many as leave out `left_out`, or `most_rank`.
     `exchanged`: of `exchange_of`. `emitted`: what objects emit, each of which counts as so many lights. The pictures are never formed:
@@ -139,10 +136,10 @@ def transfer_basis(
     in_turn = irradiance.shape[1] > IN_EVERY_COLOR
     radiosity = []
     for channel, one in enumerate(bounces):
-        own = _weighed(one.radiosity(irradiance[:, channel::3] if in_turn else irradiance), sums)
+        own = _of_unit_norm(one.radiosity(irradiance[:, channel::3] if in_turn else irradiance), sums)
         if emitted is not None:
             first = np.ascontiguousarray(emitted.radiosity[:, :, channel])
-            shining = _weighed(first + one.radiosity(np.asarray(exchange @ first, np.float32)), sums)
+            shining = _of_unit_norm(first + one.radiosity(np.asarray(exchange @ first, np.float32)), sums)
             counts = emitted.counts / (len(bounces) if in_turn else 1)  # as a light is in one color then
             own = np.concatenate([own, np.sqrt(counts).astype(np.float32) * shining], axis=1)
         radiosity.append(own)
@@ -190,11 +187,10 @@ def _sample(rows: csr_array, brightness: Float32[ndarray, " P"], rng: np.random.
     return found
 
 
-def _weighed(radiosity: Float32[ndarray, "S n"], sums: Float32[ndarray, "k S"]) -> Float32[ndarray, "S n"]:
-    """Lights whose pictures' norms are the power EQUAL of what they were, by random sums of receivers; next to nothing stays that."""
+def _of_unit_norm(radiosity: Float32[ndarray, "S n"], sums: Float32[ndarray, "k S"]) -> Float32[ndarray, "S n"]:
+    """Lights whose pictures have unit norm, by random sums of receivers; those that next to nothing arrives of stay dark."""
     norm = np.sqrt(((sums @ radiosity) ** 2).sum(axis=0))
-    norm = np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30))
-    return radiosity / ((norm / np.median(norm)) ** EQUAL).astype(np.float32)
+    return radiosity / np.maximum(norm, 1e-6 * max(float(norm.max(initial=0)), 1e-30)).astype(np.float32)
 
 
 def _enough(axes: Float32[ndarray, "P r"], pictures: ndarray, left_out: float) -> int:

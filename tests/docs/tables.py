@@ -86,6 +86,7 @@ NOT_RUN = {
     "python benchmarks/lights_inside.py *": "renders lights of five kinds twice: minutes",
     "python benchmarks/deep_framebuffer.py *": "the same for a view",
     "python benchmarks/deep_framebuffer_passes.py *": "wants an asset of a view: half a minute at its smallest",
+    "python benchmarks/transfer_frame.py *": "wants an asset of surfels: a minute at its smallest",
     "python benchmarks/transfer_paper.py *": "wants a capture of 40,000 surfels",
     "srbf bake SCENE -o C *": "stands for the scenes of a table; bakes of all light sets are run by tests/bake",
     "srbf fit C -o A *": "stands for the captures of a table; fits of them are run by tests/methods",
