@@ -64,7 +64,7 @@ class SurfelEffects:
         allowed = left_out
         for _ in range(TRIES):
             labels = self._merged(cells, owners, count, allowed)
-            lost = self.lost(cells, labels)
+            lost = self.lost(cells, labels) if left_out else 0.0
             if lost <= left_out or labels.max() + 1 == count:
                 break
             allowed *= SAFE * left_out / lost
