@@ -135,7 +135,7 @@ def bake(
                 f"expected --light-set {light_set} without {name}, found both: it has no train lights to render; leave it out"
             )
     if size is not None and not collection and all(one.kind in ("vertices", "probes") for one in named):
-        note(f"--size is not used: {named[0].kind} have a texel each")
+        note(f"--size is not used: it sets the texels of lightmaps and views, and the receivers are {named[0].kind}")
     workers_of = WorkerPoolSettings(workers, lights_per_worker, worker_timeout)
 
     def plan(one: Receiver, folder: Path) -> Bake:

@@ -149,12 +149,19 @@ def encode(method: Method, capture: Capture, run: FitRun = QUIET, stitch: bool =
 
 
 def _check_values(settings: dict[str, Any]) -> None:
-    """InputError on a value that no method takes."""
+    """InputError on values that no method takes which has all of these settings."""
+    own = {name: value for name, value in settings.items() if name not in BUDGET_SETTINGS}
+    refused = []
     for method in all_methods():
-        for entry in fields(method):  # type: ignore[arg-type]
-            check = entry.metadata.get("check")
-            if check is not None and entry.name in settings:
-                check(settings[entry.name])
+        if set(own) <= set(method.settings()):
+            try:
+                method(**own)
+            except InputError as error:
+                refused.append(error)
+            else:
+                return
+    if refused:
+        raise refused[0]
 
 
 def _shared_settings() -> set[str]:

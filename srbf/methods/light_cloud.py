@@ -19,7 +19,7 @@ from srbf.io.image import Encoding
 from srbf.light_domain.cloud import isotropic
 from srbf.light_domain.cloud_kernel import NEAREST, CloudKernel
 from srbf.lights import Light
-from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, coefficient_count, light_on_patches
+from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, stored_values
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, Moving, setting
@@ -104,7 +104,7 @@ class LightCloud(LightsInsideMaps):
     response_weight: Weight = setting("auto", "merge: weight of difference between lights, one over the unit of light.", words=("auto",))
     smooth: bool = setting(True, "Take the noise of few samples out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
-    visibility: str = setting("none", VISIBILITY_HELP, check=coefficient_count)
+    visibility: str = setting("none", VISIBILITY_HELP)
     receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
     seed: int = 0
 

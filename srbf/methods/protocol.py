@@ -36,20 +36,12 @@ Moving = Callable[[Sequence[Light], float], np.ndarray]
 MOST_POINT_LIGHTS = 8  # that srbfAssetLights takes at once
 
 
-def setting(
-    default: Any,
-    help: str,
-    *,
-    flag: str | None = None,
-    words: tuple[str, ...] = (),
-    duration: bool = False,
-    check: Callable[[Any], object] | None = None,
-) -> Any:
+def setting(default: Any, help: str, *, flag: str | None = None, words: tuple[str, ...] = (), duration: bool = False) -> Any:
     """A field of a method's settings that the command line offers: `help`, a `flag` that is not its name, `words` besides a number.
 
-    `duration`: seconds, which the command line takes as 90s or 30m, too. `check`: raises InputError on a value that no method takes.
+    `duration`: seconds, which the command line takes as 90s or 30m, too.
     """
-    return field(default=default, metadata={"help": help, "flag": flag, "words": words, "duration": duration, "check": check})
+    return field(default=default, metadata={"help": help, "flag": flag, "words": words, "duration": duration})
 
 
 def check_error(error: float | None) -> None:

@@ -28,7 +28,7 @@ from srbf.methods.environment_table import (
     has_environment_table,
     read_environment_table,
 )
-from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, coefficient_count, light_on_patches
+from srbf.methods.kept_visibility import RECEIVER_VISIBILITY_HELP, VISIBILITY_HELP, check_visibility, light_on_patches
 from srbf.methods.light_table_maps import check_table_settings, encode_table, pack_table
 from srbf.methods.lights_inside_maps import LightsInsideMaps
 from srbf.methods.protocol import QUIET, FitRun, check_error, setting
@@ -121,7 +121,7 @@ class Transfer(LightsInsideMaps):
     editable: bool = setting(False, "Keep what changed albedo and emission need, for `srbf relight --albedo` and `--emissive`.")
     smooth: bool = setting(False, "Take the noise of few rays out of the components.")
     encoding: Encoding = setting("uint8", "Of the layers on disk.")
-    visibility: str = setting("none", VISIBILITY_HELP, check=coefficient_count)
+    visibility: str = setting("none", VISIBILITY_HELP)
     receiver_visibility: bool = setting(False, RECEIVER_VISIBILITY_HELP)
     seed: int = 0
 

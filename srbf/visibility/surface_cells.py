@@ -102,7 +102,7 @@ class Cells:
 
 
 def exposed(fragments: Fragments, occluders: EmbreeTriangles, free: Float64[ndarray, "F 3"]) -> Bool[ndarray, " T"]:
-    """Which fragments are seen from any of the free places, on the side of their normal; of a million, from some of them."""
+    """Which fragments are seen from any of the free places, on the side of their normal; of many, from some of them."""
     found = np.zeros(len(fragments.corners), bool)
     for first, last in zip((0, *STAGES), (*STAGES, len(free)), strict=True):
         left = np.flatnonzero(~found)

@@ -168,7 +168,7 @@ def test_other_flags_are_refused_in_one_line(scene, tmp_path: Path, words: list[
 
 @pytest.mark.parametrize("name", ["plane", "block"])
 def test_a_convex_scene_has_direct_light_alone(scene, tmp_path: Path, name: str) -> None:
-    """A texel of a face of normal n gets n . l. No place within the bounds of these scenes is free."""
+    """Texels of a face of normal n get n . l. No place within the bounds of these scenes is free."""
     done("bake", scene(name), "-o", tmp_path / "capture", *CUBEMAP)
     capture = Capture.open(tmp_path / "capture")
     covered = capture.coverage() >= COVERED

@@ -76,6 +76,7 @@ def test_a_bake_without_a_receiver(tmp_path: Path) -> None:
         (["fit", "a", "-o", "x", "--method", "eigen-map", "--error", "5%"], "--error applies only to method auto or transfer"),
         (["fit", "a", "-o", "x", "--visibility", "foo"], "expected --visibility none or pca:COUNT with 1 to 256 coefficients, as pca:50"),
         (["fit", "a", "-o", "x", "--visibility", "pca:0", "--budget", "13"], "found 'pca:0'"),
+        (["fit", "a", "-o", "x", "--surfels", "9000", "--budget", "13"], "expected --surfels auto or 1 to 8000, found 9000"),
         (["relight", "a", "-o", "x.png", "--albedo", "Wall=2,2,2"], "expected --albedo OBJECT=R,G,B of 0 to 1, found 'Wall=2,2,2'"),
         (["relight", "a", "-o", "x.png", "--emissive", "Wall=-1,2,2"], "expected --emissive OBJECT=R,G,B of at least 0"),
         (["evaluate", "a", "b", "--samples", "0"], "--samples: expected a whole number of 1 or more"),

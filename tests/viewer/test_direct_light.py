@@ -130,7 +130,7 @@ def test_a_site_adds_it_too(chromium: Any, split: Asset, serve_static: Callable[
 
 
 def test_shadows_on_a_mesh_are_finer_than_the_lightmap(chromium: Any, split: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
-    """A texel is 8 cm wide. The edge of a shadow is narrower than 0.4 of that; at the lightmap's resolution it is as wide as a texel."""
+    """Texels are 8 cm wide. The edge of a shadow is narrower than 0.4 of that; at the lightmap's resolution it is as wide as a texel."""
     source = {**split.manifest.get("source", {}), "receiver": {"kind": "lightmap", "object": "Ground"}}
     replace(split, manifest={**split.manifest, "source": source}).save(tmp_path / "asset")
     light = {"kind": "point", "on": True, "color": "#ffffff", "intensity": 1.0, "position": [-0.4, 0.1, 2.5], "a0": 2.5}

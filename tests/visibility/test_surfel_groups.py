@@ -74,4 +74,5 @@ def test_things_apart_and_unlit_ones_join_as_well(near_the_left: tuple[Cells, np
     apart = Cells(np.round(cells.places * 2) * 9, cells.normals, cells.areas, cells.albedo, cells.patches)  # many at the same place
     found = effects(apart, 0 * light + 1e-9, 0 * effect + 1e-9).groups(apart, np.zeros(len(light), int), 2)
     assert set(found) <= {0, 1}
-    assert len(effects(apart, light, effect).groups(apart, np.arange(len(light)), 2)) == len(set(np.arange(len(light)))), "none may join"
+    alone = effects(apart, light, effect).groups(apart, np.arange(len(light)), 2)
+    assert len(set(alone)) == len(light), "of an owner each, none may join"

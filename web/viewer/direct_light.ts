@@ -34,7 +34,7 @@ export class DirectLight {
   private drawn = "";
   private cast = "";
 
-  /** On the asset's texels, or on a finer grid with `factor` texels along each side of a texel. @throws SrbfError where the GPU cannot blend floats. */
+  /** On the asset's texels, or on a grid that is `factor` times finer in both directions. @throws SrbfError where the GPU cannot blend floats. */
   static ofAsset(asset: Asset, inputs: DirectInputs, renderer: WebGLRenderer, factor = 1): DirectLight {
     const { width, height, direct } = asset.manifest;
     const { normal, coverage, scene } = inputs;
@@ -128,7 +128,7 @@ export function checkBlending({ extensions }: WebGLRenderer): void {
   throw new SrbfError("expected a GPU that blends floats for direct light, found one without: only the indirect light is shown");
 }
 
-/** 1, or albedo / pi, RGBA, on a grid with `factor` texels along each side of a texel. */
+/** 1, or albedo / pi, RGBA, on a grid that is `factor` times finer in both directions. */
 function reflectance(asset: Asset, albedo: FloatImage | undefined, factor: number): Float32Array {
   const { width, height, quantity } = asset.manifest;
   const [across, down] = [factor * width, factor * height];

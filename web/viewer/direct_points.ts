@@ -27,7 +27,7 @@ export interface DirectReceivers {
   bounds: Float32Array;
 }
 
-/** The points of a finer grid, `factor` texels along each side of a texel of `asset`: one point each, and the same bounds. */
+/** The points of a grid that is `factor` times finer than the asset's in both directions: one point for each texel, and the same bounds. */
 export function fineReceivers(asset: Asset, position: FloatImage, normal: FloatImage, coverage: FloatImage | undefined, factor: number): DirectReceivers {
   const { center, bounds } = directReceivers(asset, position, normal, coverage, 1);
   const { width, height } = asset.manifest;
