@@ -36,6 +36,7 @@ FEWER = 0.95  # surfels that are asked for again, where those behind translucent
 POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
+TRACED_BY = 2  # counts changes of what is traced: links of former versions are made once more
 Progress = Callable[[int, int, str], None]
 
 
@@ -188,7 +189,7 @@ class GatherSet:
         it gathers from reflects light.
         """
         found = self._known
-        key = f"{found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
+        key = f"{TRACED_BY} {found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
         if is_gathered(receivers.folder, key):
             return
         progress(0, 1, "surfels")

@@ -35,6 +35,19 @@ class LinkTextures:
         return {"links": unit, "rows": unit + 1, "rays": self.rays}
 
 
+@dataclass(frozen=True, eq=False)
+class Apart:
+    """Of light that bright surfels send in closed form, see `srbf.visibility.near_sources`: textures of a texel per surfel or cluster.
+
+    `second`: direct irradiance on surfels without its part on the bright ones, and what these lay on the others; `taken`: what these
+    reflect of it, which lobes gather along links all the same; `clusters`: what these lay on view clusters.
+    """
+
+    second: moderngl.Texture
+    taken: moderngl.Texture
+    clusters: moderngl.Texture
+
+
 class LinkPasses:
     """Indirect light of one deep framebuffer from direct irradiance on its surfels, on the GPU.
 
@@ -63,7 +76,7 @@ class LinkPasses:
         self._reflectance = textures.kept(reflectance.astype(np.float32))
         size = self._albedo.size
         self._radiosity = [programs.target(size), programs.target(size)]
-        own = -(-told["clusters"] // WIDTH)
+        self.view_rows = own = -(-told["clusters"] // WIDTH)
         self._spans = [(self._view, 0, own)]  # links, and the rows of the target that they fill
         self._further: list[tuple[moderngl.TextureArray, int, moderngl.Texture]] = []  # neighbors of pixels, how many, and reflectance
         if "gloss_links" in tables:
@@ -85,33 +98,59 @@ class LinkPasses:
         over_pi = (reflectance / np.float32(np.pi)).astype(np.float32)
         self._further.append((self._textures.kept_layers(layers), len(layers), self._textures.kept(over_pi)))
 
-    def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer) -> None:
+    def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer, apart: Apart | None = None) -> None:
         """Draw the irradiance of all view clusters, and behind it what lobes gather, into `target`, of `cluster_size`.
 
-        `direct`: irradiance on the surfels.
+        `direct`: irradiance on the surfels; `apart`: what bright surfels add to it.
         """
         if self._terms == 0:
             target.clear()
             return
-        self.bounced(direct).use(2)
+        bounced = self.bounced(direct, None if apart is None else apart.second)
         for links, first, count in self._spans:
+            if links is not self._view and apart is not None:
+                bounced = self._added(bounced, apart.taken)
+            bounced.use(2)
             target.viewport = (0, first, WIDTH, count)
             target.use()
             self._programs.run("deep_framebuffer_clusters.frag", {}, {**links.uniforms(0), "light": 2})
+        if apart is not None:
+            gl: Any = self._programs.context
+            target.viewport = (0, 0, WIDTH, self.view_rows)
+            target.use()
+            gl.enable_only(gl.BLEND)
+            gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
+            apart.clusters.use(0)
+            self._programs.run("add.frag", {}, {"light": 0})
+            gl.enable_only(gl.NOTHING)
         target.viewport = (0, 0, *self.cluster_size)
 
-    def bounced(self, direct: moderngl.Texture) -> moderngl.Texture:
-        """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of one texel per surfel."""
+    def bounced(self, direct: moderngl.Texture, second: moderngl.Texture | None = None) -> moderngl.Texture:
+        """What the surfels reflect, B = rho (E + F B), after all bounces, as a texture of one texel per surfel.
+
+        `second`: E with light that has been reflected once already, which is reflected once less.
+        """
         (light, light_target), (other, other_target) = self._radiosity
         direct.use(3)
         self._albedo.use(4)
         for term in range(self._terms):
+            if term == 1 and second is not None:
+                second.use(3)
             light_target.use()
             other.use(2)
             values = {**self._exchange.uniforms(0), "light": 2, "direct": 3, "albedo": 4, "first": int(term == 0)}
             self._programs.run("deep_framebuffer_bounce.frag", {}, values)
             (light, light_target), (other, other_target) = (other, other_target), (light, light_target)
         return other
+
+    def _added(self, one: moderngl.Texture, other: moderngl.Texture) -> moderngl.Texture:
+        """The sum of two textures of surfels, in the one of `bounced` that is free."""
+        texture, target = next(pair for pair in self._radiosity if pair[0] is not one)
+        target.use()
+        one.use(0)
+        other.use(1)
+        self._programs.run("deep_framebuffer_sum.frag", {}, {"former": 0, "light": 1, "color": (1.0, 1.0, 1.0)})
+        return texture
 
     def pixels(self, light: moderngl.Texture) -> None:
         """Draw the pixels into the target in use, from the irradiance of the clusters."""

@@ -18,10 +18,12 @@ from srbf.channels import GLOSS, THROUGH
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
-from srbf.lights import Light, PointLight, refuse_named
+from srbf.lights import WHITE, Light, PointLight, refuse_named
 from srbf.methods.carried import carried_images, carried_scene, common_manifest
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
+from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GatherOperator
+from srbf.visibility.near_sources import NearSources
 from srbf.visibility.packed_links import COLUMNS, LINK_BYTES, link_count, packed, share_within, unpacked
 from srbf.visibility.received import ReceivedLight, occluders_of
 from srbf.visibility.sparse_links import SparseLinks, radiosity_of
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
 MEGABYTE = 1e6
 MOST_NEAREST = 10
 LEAST_SHARE = 1 / 32  # of the rays, that a budget leaves
+POINT_BYTES = 24  # of a view cluster: place and normal
 NEIGHBOR_BYTES = 3  # of a pixel, for each of its clusters
 POOL_FILE, VIEW = "pool.exr", "view_links"
 FILES = {
@@ -44,7 +47,7 @@ FILES = {
     "exchange_links": "exchange_links.png",
     "exchange_rows": "exchange_rows.png",
 }
-BEHIND = "behind_neighbors"
+BEHIND, POINTS = "behind_neighbors", "view_points"
 GLOSSY_FILES = {"gloss_links": "gloss_links.png", "gloss_rows": "gloss_rows.png", "gloss_neighbors": "gloss_neighbors.png"}
 KEPT = 2  # assets whose links are ready
 
@@ -169,6 +172,9 @@ class DeepFramebuffer(Method):
             tables["gloss_neighbors"] = layers.reshape(-1, capture.width, 3)
             manifest |= {name: {"file": file} for name, file in GLOSSY_FILES.items()}
             manifest["gather"] |= {"lobes": gloss.links.rows, "gloss_rays": gloss.links.rays}
+        if operator.points is not None:
+            tables[POINTS] = operator.points
+            manifest |= {POINTS: {"file": f"{POINTS}.exr"}}
         if operator.behind is not None:
             tables[BEHIND] = _neighbors(*operator.behind).reshape(-1, capture.width, 3)
             manifest |= {BEHIND: {"file": f"{BEHIND}.png"}}
@@ -178,7 +184,12 @@ class DeepFramebuffer(Method):
         """The view's links within the budget."""
         if self.budget is None:
             return operator.view
-        fixed = 48 * len(operator.cells.places) + NEIGHBOR_BYTES * nearest * pixels + LINK_BYTES * link_count(operator.exchange)
+        fixed = (
+            POINT_BYTES * (0 if operator.points is None else operator.view.rows)
+            + 48 * len(operator.cells.places)
+            + NEIGHBOR_BYTES * nearest * pixels
+            + LINK_BYTES * link_count(operator.exchange)
+        )
         share = share_within(operator.view, (self.budget * MEGABYTE - fixed) / LINK_BYTES)
         if share < LEAST_SHARE:
             least = int(np.ceil((fixed + LINK_BYTES * link_count(operator.view, LEAST_SHARE)) / MEGABYTE))
@@ -203,6 +214,8 @@ class DeepFramebuffer(Method):
                 if pixels.shape[1] != COLUMNS:
                     raise ImageError(f"expected {COLUMNS} columns of {name}_{part} in {reader.folder}, found {pixels.shape[1]}; fit again")
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
+        if POINTS in reader.manifest:
+            tables[POINTS] = reader.table(POINTS, (2, told["clusters"]), 3)
         for name, what in (("gloss_neighbors", "lobes"), (BEHIND, "clusters behind")):
             if name not in reader.manifest:
                 continue
@@ -228,11 +241,7 @@ class DeepFramebuffer(Method):
         refuse_named(lights, cls.name)
         if not lights:
             return np.zeros((asset.manifest["gather"]["clusters"] + asset.manifest["gather"].get("lobes", 0), 3))
-        ready = _ready(asset)
-        irradiance = np.sum([ready.received.irradiance(light) for light in lights], axis=0).astype(np.float32)
-        bounced = radiosity_of(ready.exchange, ready.albedo, irradiance, asset.manifest["gather"].get("bounces"))
-        found = [links @ bounced for links in (ready.view, ready.gloss) if links is not None]
-        return np.concatenate(found).astype(np.float64)
+        return _ready(asset).under(lights, asset.manifest["gather"].get("bounces"))
 
     @classmethod
     def weighted(cls, asset: Asset, weights: Float64[ndarray, "b C 3"]) -> Float32[ndarray, "b H W 3"]:
@@ -298,8 +307,34 @@ class _Ready:
     view: csr_array
     exchange: csr_array
     gloss: csr_array | None
-    albedo: Float32[ndarray, "S 3"]
+    cells: Cells
     received: ReceivedLight
+    points: Float32[ndarray, "2 R 3"] | None
+    occluders: EmbreeTriangles
+
+    def under(self, lights: Sequence[Light], bounces: int | None) -> Float64[ndarray, "C 3"]:
+        """What view clusters and lobes gather under lights, whose brightest surfels light the clusters and other surfels in closed form."""
+        albedo = self.cells.albedo
+        direct, taken = np.zeros((2, *albedo.shape), np.float32)
+        near = np.zeros((0 if self.points is None else self.points.shape[1], 3), np.float32)
+        for light in lights:
+            color = np.array(light.color, np.float32)
+            irradiance = self.received.irradiance(replace(light, color=WHITE)).astype(np.float32)
+            if self.points is not None and bounces != 0:
+                first = albedo * irradiance
+                bright = NearSources.of(self.cells, first, light)
+                if bright.count:
+                    near += color * bright.irradiance(self.cells, first, self.points[0], self.points[1], self.occluders)
+                    taken[bright.surfels] += color * bright.parts[:, None] * first[bright.surfels]
+                    irradiance[bright.surfels] *= 1 - bright.parts[:, None]
+            direct += color * irradiance
+        clusters = self.view.shape[0]
+        radiosity = radiosity_of(self.exchange, albedo, direct, bounces)
+        if near.any():
+            radiosity += radiosity_of(self.exchange, albedo, near[clusters:], None if bounces is None else bounces - 1)
+        found = (self.view @ radiosity).astype(np.float64)
+        found[: len(near[:clusters])] += near[:clusters]
+        return found if self.gloss is None else np.concatenate([found, self.gloss @ (radiosity + taken)])
 
 
 _kept: OrderedDict[tuple[int, int], _Ready] = OrderedDict()
@@ -322,9 +357,13 @@ def _ready(asset: Asset) -> _Ready:
             )
         except ValueError as error:
             raise ImageError(f"{error}; fit again") from error
-        found = _Ready(
-            tables, asset.scene, view, exchange, gloss[0] if gloss else None, cells.albedo, ReceivedLight(cells, occluders_of(asset.scene))
-        )
+        occluders = occluders_of(asset.scene)
+        points = None
+        if POINTS in tables:
+            own = np.stack([cells.places, cells.normals]).astype(np.float32)
+            points = np.concatenate([tables[POINTS][:2], own], axis=1)
+        lobes = gloss[0] if gloss else None
+        found = _Ready(tables, asset.scene, view, exchange, lobes, cells, ReceivedLight(cells, occluders), points, occluders)
         _kept[key] = found
         while len(_kept) > KEPT:
             _kept.popitem(last=False)

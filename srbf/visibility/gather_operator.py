@@ -44,6 +44,7 @@ class GatherOperator:
 
     Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
     lobes gather, where there are any. `behind`: as `nearest` and `weights`, of what falls on the backs of pixels that let light through.
+    `points`: places (m) and normals of the clusters, None of captures that have them not.
     """
 
     cells: Cells
@@ -53,6 +54,7 @@ class GatherOperator:
     weights: Float32[ndarray, "P K"]
     gloss: GlossyGather | None = None
     behind: tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]] | None = None
+    points: Float32[ndarray, "2 C 3"] | None = None
 
     @staticmethod
     def traced(
@@ -72,24 +74,25 @@ class GatherOperator:
         extent = float(np.ptp(pool.cells.places, axis=0).max(initial=0))
         passing, behind = Behind.of(pool), None
         of_backs = 0 if backs is None else max(1, int(clusters * len(np.unique(backs.pixels)) / len(np.unique(pixels.pixels))))
-        found = ViewClusters.of_points(pixels.points, pixels.normals, min(clusters, MOST_CLUSTERS - of_backs), extent)
-        nearest, weights = pixels.gathered(*found.mixed(pixels.points, pixels.normals, occluders))
+        found = ViewClusters.of_pixels(pixels, min(clusters, MOST_CLUSTERS - of_backs), extent)
+        nearest, weights = found.of_each(pixels, occluders)
         if backs is not None:
-            own = ViewClusters.of_points(backs.points, backs.normals, of_backs, extent)
-            back_nearest, back_weights = backs.gathered(*own.mixed(backs.points, backs.normals, occluders))
+            own = ViewClusters.of_pixels(backs, of_backs, extent)
+            back_nearest, back_weights = own.of_each(backs, occluders)
             behind = np.where(back_weights > 0, back_nearest + len(found.places), 0), back_weights
             found = ViewClusters(np.concatenate([found.places, own.places]), np.concatenate([found.normals, own.normals]), found.scale)
         total = len(found.places) + pool.count + len(passing.surfels)
         rays = int(np.clip(VIEW_RAYS * DEFAULT_CLUSTERS // max(1, len(found.places)), VIEW_RAYS, MOST_VIEW_RAYS))
         origins = RayOrigins.even(found.places[:, None], found.normals[:, None])
         view = _traced(pool, passing, origins, rays, seed, lambda n: progress(n, total))
-        points, normals = pool.spread(SURFEL_POINTS, seed)
-        points, normals = (np.concatenate([every, sign * every[passing.surfels]]) for every, sign in ((points, 1), (normals, -1)))
+        spread, facing = pool.spread(SURFEL_POINTS, seed)
+        spread, facing = (np.concatenate([every, sign * every[passing.surfels]]) for every, sign in ((spread, 1), (facing, -1)))
         exchange = _traced(
-            pool, passing, RayOrigins.even(points, normals), SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total)
+            pool, passing, RayOrigins.even(spread, facing), SURFEL_RAYS, seed + 1, lambda n: progress(len(found.places) + n, total)
         )
         gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2, passing=passing)
-        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind)
+        points = np.stack([found.places, found.normals]).astype(np.float32)
+        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points)
 
     def write(self, folder: Path, key: str) -> None:
         """pool.exr, three rows (x, y, z, area), (normal, 0), (albedo, 0), and gather.npz; `key` tells what they are of."""
@@ -101,6 +104,7 @@ class GatherOperator:
             "nearest": self.nearest.astype(np.uint16),
             "weights": self.weights.astype(np.float16),
             **({} if self.gloss is None else self.gloss.arrays()),
+            **({} if self.points is None else {"points": self.points}),
             **({} if self.behind is None else {BEHIND[0]: self.behind[0].astype(np.uint16), BEHIND[1]: self.behind[1].astype(np.float16)}),
         }
         with files.atomic_path(folder / GATHER_FILE) as temporary, open(temporary, "wb") as file:
@@ -130,7 +134,10 @@ class GatherOperator:
         except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as error:
             raise ImageError(f"expected links of a view in {path}, found none to read; bake again with `force=True`") from error
         cells = replace(Cells.of_image(image[:2]), albedo=np.ascontiguousarray(image[2, :, :3]))
-        return GatherOperator(cells, view, own, nearest, weights, gloss, behind)
+        points = arrays.get("points")
+        if points is not None and points.shape != (2, view.rows, 3):
+            raise ImageError(f"expected places of {view.rows} clusters in {path}, found {points.shape}; bake again with `force=True`")
+        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points)
 
 
 def is_gathered(folder: Path, key: str) -> bool:

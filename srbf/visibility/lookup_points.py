@@ -11,7 +11,6 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.visibility.embree import EmbreeTriangles, has_embree
 from srbf.visibility.lightmap_points import LightmapPoints, Points
-from srbf.visibility.outlines import outlines
 from srbf.visibility.pixel_points import several_surfaces
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers
@@ -72,12 +71,11 @@ class LookupPoints:
 
 def _of_view(receivers: Receivers, tracer: RayTracer, grid: Float64[ndarray, "g 2"]) -> LookupPoints:
     size = receivers.width * receivers.height
-    position, normal = receivers.images["position"], receivers.images["normal"]
+    position, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
     coverage = receivers.images.get("coverage")
     covered = np.flatnonzero(np.ones(size, bool) if coverage is None else coverage.ravel() > 0)
-    has_center = np.linalg.norm(normal.reshape(-1, 3), axis=1) > 0.5
-    beside = np.flatnonzero(outlines(position, normal).ravel())
-    edges = np.union1d(several_surfaces(tracer, covered, position.reshape(-1, 3), has_center), np.intersect1d(beside, covered))
+    has_center = np.linalg.norm(normal, axis=1) > 0.5
+    edges = np.union1d(several_surfaces(tracer, covered, position, has_center), np.intersect1d(tracer.edges(), covered))
     found = [tracer.samples_at(np.arange(size), np.broadcast_to(place, (size, 2))) for place in grid]
     plain = np.zeros(size, bool)
     plain[covered] = True

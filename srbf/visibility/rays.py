@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64, Int
+from srbf.arrays import Float, Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
@@ -19,6 +20,7 @@ from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
 from srbf.visibility.environment_rays import EnvironmentSampler
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
+from srbf.visibility.material_albedo import MaterialAlbedo, nearest_pure
 from srbf.visibility.outlines import outlines
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
 from srbf.visibility.shadow import rounded_share
@@ -27,6 +29,7 @@ from srbf.visibility.surface import surface_at
 from srbf.visibility.texel_sums import TexelSums
 
 FIRST_SAMPLES = 4  # of every texel
+FIRST_IN_VIEW, FINE_VIEW = 16, 1 << 18  # of every pixel, where shadows of thin things fall between few; of views of at most so many pixels
 SAMPLES = 32  # of a texel whose first samples differ
 MAX_SAMPLES = 512  # of a texel whose samples still differ, mostly at shadow edges
 EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
@@ -38,7 +41,8 @@ ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environme
 ENVIRONMENT_BATCH = 1 << 18  # such rays at a time
 LEAST_BUMP, LEAST_BUMP_COS, SAME_PLACE = 1e-2, 0.2, 1e-2  # change of a normal; its cosine; off the place, over the distance to the eye
 SAME_NORMAL = 0.9  # cosine between the smooth normals of samples that a pixel's bump map turns as it does its center's
-NEIGHBOR_STEPS = ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1))  # of a pixel, the nearest first
+GOLDEN = (math.sqrt(5) - 1) / 2
+MATERIAL_SAMPLES = 64  # of a pixel that shows several materials
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,8 @@ class RayTracer:
 
     def __init__(self, receivers: Receivers, samples: int = SAMPLES) -> None:
         self._receivers = receivers
-        self._count = max(samples, FIRST_SAMPLES)
+        self._few = FIRST_IN_VIEW if receivers.camera is not None and receivers.width * receivers.height <= FINE_VIEW else FIRST_SAMPLES
+        self._count = max(samples, self._few)
         triangles = receivers.triangles
         self._all = EmbreeTriangles(triangles.corners)
         self._shadow_rays = ShadowRays(triangles)
@@ -73,16 +78,17 @@ class RayTracer:
         self._texels = np.flatnonzero(covered)
         self._nearest = None if coverage is None else nearest_covered(coverage)
         self._kept: dict[int, Samples] = {}
-        self._pure: Int[ndarray, " P"] | None = None
-        if receivers.camera is not None and receivers.quantity == "radiance":
-            self._pure = self._materials_of_pixels()
+        self._materials: MaterialAlbedo | None = None
         self._bumps: tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None = None
         self._outlines = np.zeros(height * width, bool)
         if receivers.camera is None:
             self._lightmap = LightmapPoints(receivers, self._all.first_hit)
         else:
+            found = outlines(receivers.images["position"], receivers.images["normal"])
+            self._outlines = _most_beside(found.ravel(), height)  # pixels are filtered wider than one
             self._bumps = self._bumped()
-            self._outlines = outlines(receivers.images["position"], receivers.images["normal"]).ravel()
+            if receivers.quantity == "radiance":
+                self._materials = self._materials_of_pixels()
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
         """The direct light of `lights` in the receivers' quantity; named lights add nothing."""
@@ -99,6 +105,10 @@ class RayTracer:
         """`response` to a white light from each of many directions."""
         return np.stack([self.response([DirectionalLight((float(x), float(y), float(z)))]) for x, y, z in directions])
 
+    def edges(self) -> Int[ndarray, " e"]:
+        """The pixels of a view that show several materials, or are beside another surface."""
+        return np.flatnonzero(self._outlines)
+
     def samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
         """Points on surfaces: samples `numbers`, from 0, of the footprints of `texels`, ordered by sample."""
         step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
@@ -114,10 +124,12 @@ class RayTracer:
     def shown(self, texels: Int[ndarray, " e"], numbers: range) -> tuple[Samples, Int[ndarray, " n"]]:
         """`samples` of a view, and the pixel that shows the material of each alone, or its own."""
         found = self.samples(texels, numbers)
-        if self._pure is None:
+        if self._materials is None:
             return found, found.texel
-        hit, _, _ = self._all.first_hit(*self._looks(found.texel, self._squares(texels, numbers)))
-        return found, self._pure_pixel(found.texel, self._receivers.triangles.material[np.maximum(hit, 0)])
+        source = nearest_pure(
+            self._materials.pure, (self._receivers.height, self._receivers.width), found.texel, self._shown(texels, numbers).ravel()
+        )
+        return found, np.where(source >= 0, source, found.texel)
 
     def reaching(
         self, samples: Samples, chosen: Int[ndarray, " n"], direction: Float32[ndarray, "n 3"], distance: Float64[ndarray, " n"] | None
@@ -130,13 +142,14 @@ class RayTracer:
         weight = np.zeros(len(sums.total))
         for start in range(0, len(self._texels), TEXEL_BATCH):
             samples = self._first(start)
-            self._add(sums, samples, light, range(FIRST_SAMPLES))
+            self._add(sums, samples, light, range(self._few))
             weight += np.bincount(samples.texel, samples.weight, len(weight))
-        partly = (weight > 0) & (weight < FIRST_SAMPLES)
+        sums = sums.relative(self._texels, SOFT_STEPS if _has_size(light) else 1.0)
+        partly = (weight > 0) & (weight < self._few)
         refined = np.zeros(len(weight), bool)
-        for _ in range(SPREAD_ROUNDS if _has_size(light) else 1):
+        for _ in range(SPREAD_ROUNDS):
             new = self._texels[((sums.ragged() | partly | self._outlines) & ~refined)[self._texels]]
-            self._refine(sums, light, new, range(FIRST_SAMPLES, self._count))
+            self._refine(sums, light, new, range(self._few, self._count))
             refined[new] = True
         edges = np.flatnonzero(refined & sums.edges())
         most = min(self._most, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
@@ -181,7 +194,7 @@ class RayTracer:
         return (origin + face * offset[:, None]).astype(np.float32)
 
     def _scale(self, light: CastingLight) -> Float64[ndarray, " P"] | None:
-        """Every texel's unshadowed irradiance over the mean of those that have any; None for suns."""
+        """Every texel's unshadowed irradiance; None for suns."""
         if isinstance(light, DirectionalLight):
             return None
         if isinstance(light, SpotLight):
@@ -189,9 +202,7 @@ class RayTracer:
         position, normal = (self._receivers.images[name].reshape(-1, 3)[self._texels] for name in ("position", "normal"))
         scale = np.zeros(self._receivers.height * self._receivers.width)
         scale[self._texels] = irradiance_from(light, position, normal)
-        lit = scale > 0
-        fine = SOFT_STEPS if _has_size(light) else 1.0
-        return scale * fine / (scale[lit].mean() if lit.any() else 1.0)
+        return scale if self._receivers.camera is None else _most_beside(scale, self._receivers.height)
 
     def _refine(self, sums: TexelSums, light: CastingLight, texels: Int[ndarray, " e"], numbers: range) -> None:
         """Add samples `numbers` of `texels`."""
@@ -202,8 +213,9 @@ class RayTracer:
     def _first(self, start: int) -> Samples:
         if start in self._kept:
             return self._kept[start]
-        samples = self._samples(self._texels[start : start + TEXEL_BATCH], range(FIRST_SAMPLES))
-        if len(self._texels) * FIRST_SAMPLES <= CACHED_SAMPLES:
+        texels = self._texels[start : start + TEXEL_BATCH]
+        samples = self.samples_at(np.tile(texels, self._few), _balanced(self._turn[texels], self._few).reshape(-1, 2))
+        if len(self._texels) * self._few <= CACHED_SAMPLES:
             self._kept[start] = samples
         return samples
 
@@ -232,7 +244,7 @@ class RayTracer:
     def _squares(self, texels: Int[ndarray, " e"], numbers: range) -> Float64[ndarray, "n 2"]:
         square = (self._square[numbers.start : numbers.stop, None] + self._turn[None, texels, :2]) % 1  # (s, e, 2)
         if numbers.start == 0:
-            square[:FIRST_SAMPLES] = _balanced(self._turn[texels])[: len(numbers)]
+            square[:FIRST_SAMPLES] = _balanced(self._turn[texels], FIRST_SAMPLES)[: len(numbers)]
         return square.reshape(-1, 2)
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
@@ -255,7 +267,9 @@ class RayTracer:
             turned = normal + self._bump_at(bump, texel, square) * (np.einsum("nc,nc->n", normal, smooth[texel]) > SAME_NORMAL)[:, None]
             normal = turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-20)
         weight = real.astype(np.float32)
-        share = weight[:, None] * (1 if self._pure is None else self._albedo(texel, self._receivers.triangles.material[triangle]))
+        share = weight[:, None]
+        if self._materials is not None:
+            share = share * self._materials.at(texel, self._receivers.triangles.material[triangle])
         return Samples(texel, weight, point, normal, face * away, lift * away, share)
 
     def _bumped(self) -> tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None:
@@ -303,43 +317,50 @@ class RayTracer:
         direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
         return origin.astype(np.float32), direction.astype(np.float32)
 
-    def _materials_of_pixels(self) -> Int[ndarray, " P"]:
-        """The material of each pixel; -1 if its first samples hit several, or none."""
+    def _materials_of_pixels(self) -> MaterialAlbedo:
+        """What each pixel shows: by its first samples, and by MATERIAL_SAMPLES beside pixels that show several, which may be thin."""
         pure = np.full(self._receivers.height * self._receivers.width, -1)
         for start in range(0, len(self._texels), TEXEL_BATCH):
             texels = self._texels[start : start + TEXEL_BATCH]
-            square = (self._square[:FIRST_SAMPLES, None] + self._turn[None, texels, :2]) % 1
-            hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, FIRST_SAMPLES), square.reshape(-1, 2)))
-            shown = np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(FIRST_SAMPLES, -1)
+            shown = self._shown(texels, range(FIRST_SAMPLES))
             pure[texels] = np.where((shown == shown[0]).all(axis=0), shown[0], -1)
-        return pure
+        tested = np.zeros(len(pure), bool)
+        pixels, materials = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        while len(mixed := self._texels[(_most_beside((pure < 0) | self._outlines, self._receivers.height) & ~tested)[self._texels]]):
+            tested[mixed] = True
+            for start in range(0, len(mixed), TEXEL_BATCH):
+                texels = mixed[start : start + TEXEL_BATCH]
+                shown = self._shown(texels, range(MATERIAL_SAMPLES))
+                one = (shown == shown[0]).all(axis=0)
+                pure[texels] = np.where(one, shown[0], -1)
+                own = np.tile(texels, MATERIAL_SAMPLES)
+                real = np.flatnonzero((shown.ravel() >= 0) & ~np.tile(one, MATERIAL_SAMPLES))
+                pixels.append(own[real])
+                materials.append(shown.ravel()[real])
+        self._outlines |= pure < 0
+        return MaterialAlbedo.of(self._receivers.images["albedo"], pure, np.concatenate(pixels), np.concatenate(materials))
 
-    def _albedo(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Float32[ndarray, "n 3"]:
-        """The albedo of a material in its pixel, or in the nearest pixel with that material alone; else that of the mixture."""
-        return np.maximum(self._receivers.images["albedo"].reshape(-1, 3)[self._pure_pixel(texel, material)], 0)
+    def _shown(self, texels: Int[ndarray, " e"], numbers: range) -> Int[ndarray, "s e"]:
+        """The materials that samples of pixels hit, -1 for none."""
+        hit, _, _ = self._all.first_hit(*self._looks(np.tile(texels, len(numbers)), self._squares(texels, numbers)))
+        return np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(len(numbers), -1)
 
-    def _pure_pixel(self, texel: Int[ndarray, " n"], material: Int[ndarray, " n"]) -> Int[ndarray, " n"]:
-        """The nearest pixel that shows a material alone; the own where there is none beside it."""
-        assert self._pure is not None
-        width, height = self._receivers.width, self._receivers.height
-        source = texel.copy()
-        open_ = np.flatnonzero(self._pure[texel] != material)
-        for right, down in NEIGHBOR_STEPS:
-            if not len(open_):
-                break
-            column, row = texel[open_] % width + right, texel[open_] // width + down
-            beside = np.clip(row, 0, height - 1) * width + np.clip(column, 0, width - 1)
-            found = self._pure[beside] == material[open_]
-            source[open_[found]] = beside[found]
-            open_ = open_[~found]
-        return source
+
+def _most_beside(values: Float[ndarray, " P"], height: int) -> ndarray:
+    """The largest of each pixel and its neighbors."""
+    from scipy import ndimage
+
+    return ndimage.maximum_filter(values.reshape(height, -1), 3).ravel()
 
 
 def _has_size(light: CastingLight) -> bool:
     return isinstance(light, (AreaLight, SphereLight))
 
 
-def _balanced(turn: Float64[ndarray, "e 4"]) -> Float64[ndarray, "s e 2"]:
-    """FIRST_SAMPLES points of the unit square, one in each quarter and their mean in its middle: a slope over a texel makes no noise."""
-    one, two = turn[:, :2] / 2, turn[:, 2:] / 2 + [0.5, 0]
-    return np.stack([one, 1 - one, two, 1 - two])
+def _balanced(turn: Float64[ndarray, "e 4"], count: int) -> Float64[ndarray, "s e 2"]:
+    """4 or 16 points of the unit square, one in each cell of a grid and their mean in its middle: a slope over a texel makes no noise."""
+    side = math.isqrt(count)
+    cells = np.stack(np.divmod(np.arange(count // 2), side)[::-1], axis=-1)[:, None]
+    jitter = np.stack([turn[:, :2], turn[:, 2:]])[np.arange(count // 2) % 2]
+    half = (cells + (jitter + np.arange(count // 2)[:, None, None] // 2 * GOLDEN) % 1) / side
+    return np.concatenate([half, 1 - half])

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 
-REFINE_STEP = 0.02  # irradiance between samples of a texel, or between neighbors, from which a texel is refined
-NEIGHBOR_STEP = 0.2  # between neighbors: a shadow edge may cross a corner without samples
-EDGE_STEP = 0.03  # between samples of a texel, from which it is refined once more
-CLOSE, VERY_CLOSE = 0.1, 0.6  # of the brightest unshadowed sample per texel, the difference to the darkest: beside a light
+REFINE_STEP = 0.005  # over usual irradiance: between samples of a texel, or between neighbors, from which a texel is refined
+NEIGHBOR_STEP = 0.05  # between neighbors: a shadow edge may cross a corner without samples
+EDGE_STEP = 0.01  # between samples of a texel, from which it is refined once more
+SMOOTH, VERY_SMOOTH = 0.04, 0.1  # between samples of a texel, over the brightest: less is a slope, which few samples get right
 MIN_DIFFUSE = 1e-12  # share
 COUNTS = 1e-5  # least importance of a sample whose difference to others counts
 
@@ -21,9 +21,9 @@ COUNTS = 1e-5  # least importance of a sample whose difference to others counts
 class TexelSums:
     """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance for any mixture; minimum and maximum.
 
-    `scale` (P,): the irradiance that texels have unshadowed, relative to the light's usual one. Then differences are those of what is
-    visible of the light, times `scale`; with None, of a sun, those of its irradiance. `sized`, of a light with a size: samples have
-    weights of their own; a texel's light is the weighted mean of what is visible, times the mean unshadowed irradiance.
+    `scale` (P,): the irradiance that texels have unshadowed, at most, over the usual one, see `relative`; None, of a sun: 1. `sized`, of a
+    light with a size: samples have weights of their own; a texel's light is the weighted mean of what is visible, times the mean unshadowed
+    irradiance; minimum and maximum are those of what is visible, of other lights of their light.
     """
 
     height: int
@@ -36,8 +36,7 @@ class TexelSums:
     weight: Float64[ndarray, "P 3"]
     low: Float32[ndarray, "P 3"]
     high: Float32[ndarray, "P 3"]
-    darkest: Float64[ndarray, " P"]
-    brightest: Float64[ndarray, " P"]
+    usual: float = 1.0
 
     @staticmethod
     def empty(height: int, width: int, scale: Float64[ndarray, " P"] | None, sized: bool = False) -> TexelSums:
@@ -47,7 +46,19 @@ class TexelSums:
         seen = total if scale is None else np.zeros(shape)
         weight = np.zeros(shape) if sized else share
         low, high = np.full(shape, np.inf, np.float32), np.zeros(shape, np.float32)
-        return TexelSums(height, width, scale, sized, total, share, seen, weight, low, high, np.full(shape[0], np.inf), np.zeros(shape[0]))
+        return TexelSums(height, width, scale, sized, total, share, seen, weight, low, high)
+
+    def relative(self, texels: Int[ndarray, " T"], fine: float) -> TexelSums:
+        """The same with `scale` over the usual irradiance of `texels` by the samples so far, shadows included, times `fine`.
+
+        That is their root mean square, or the mean of those that are lit where it is less.
+        """
+        if self.scale is None:
+            return self
+        light = self._visible().max(axis=1)[texels] * self.scale[texels]
+        lit = light > 0
+        usual = min(float(np.sqrt((light**2).mean())), float(light[lit].mean())) if lit.any() else 1.0
+        return replace(self, scale=self.scale * (fine / usual), usual=usual)
 
     def add(
         self,
@@ -70,12 +81,9 @@ class TexelSums:
             if self.sized:
                 self._count(self.weight, channel, texel, own)
         real = weight.max(axis=1) > COUNTS
-        measured = light if self.scale is None else visible
+        measured = visible if self.sized else light
         np.minimum.at(self.low, texel[real], measured[real])
         np.maximum.at(self.high, texel[real], measured[real])
-        if self.scale is not None:
-            np.minimum.at(self.darkest, texel[real], irradiance[real])
-            np.maximum.at(self.brightest, texel[real], irradiance[real])
 
     def mean(self) -> Float64[ndarray, "P 3"]:
         """Mean light of every texel."""
@@ -91,21 +99,17 @@ class TexelSums:
 
     def ragged(self) -> Bool[ndarray, " P"]:
         """Texels whose samples differ, or that differ from a neighbor."""
-        return (self._steps() > REFINE_STEP) | (self._spread() > REFINE_STEP) | self._beside_light(CLOSE)
+        return self._differ(REFINE_STEP, SMOOTH) | (self._steps() > REFINE_STEP)
 
     def edges(self) -> Bool[ndarray, " P"]:
-        """Texels whose samples differ so much that a shadow's edge may cross them, or that lie right at a light."""
-        return (self._spread() > EDGE_STEP) | (self._steps() > NEIGHBOR_STEP) | self._beside_light(VERY_CLOSE)
+        """Texels whose samples differ so much that an edge of a shadow or of a surface may cross them, or that lie right at a light."""
+        return self._differ(EDGE_STEP, VERY_SMOOTH) | (self._steps() > NEIGHBOR_STEP)
 
-    def _beside_light(self, share: float) -> Bool[ndarray, " P"]:
-        """Bright texels that are large against their distance from the light."""
-        if self.scale is None:
-            return np.zeros(len(self.total), bool)
-        return (self.scale > 1) & (self.brightest - self.darkest > share * self.brightest)
-
-    def _spread(self) -> Float[ndarray, " P"]:
-        spread = np.maximum((self.high - self.low).max(axis=1), 0)  # 0 without samples
-        return spread if self.scale is None else spread * self.scale
+    def _differ(self, step: float, smooth: float) -> Bool[ndarray, " P"]:
+        spread, high = np.maximum((self.high - self.low).max(axis=1), 0), self.high.max(axis=1)  # 0 without samples
+        if self.sized:
+            return spread * (1 if self.scale is None else self.scale) > step
+        return (spread > step * self.usual) & (spread > smooth * high)
 
     def _steps(self) -> Float64[ndarray, " P"]:
         """Largest difference of each texel to a neighbor."""

@@ -10,10 +10,11 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.solve.splitting import split_clusters
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.pixel_points import PixelPoints
 
 MOST_CLUSTERS = 65_536  # indices are 16 bits
 NORMAL_WEIGHT = 0.04  # of the scene's longest side, beside places
-NEAREST = 10
+NEAREST, NEAREST_OF_SEVERAL = 10, 4  # of a point, and of one of several in a pixel
 REACH = 1.1  # of the distance to the last of the nearest: where its weight would be 0
 ONE_WAY = 0.3  # cosine of a member's normal to the mean one, below which the member's own is taken
 LIFT = 0.25  # of the distance between a point and a cluster: how far off the surfaces it is tested whether they see each other
@@ -27,6 +28,11 @@ class ViewClusters:
     places: Float64[ndarray, "C 3"]
     normals: Float64[ndarray, "C 3"]
     scale: float
+
+    @staticmethod
+    def of_pixels(pixels: PixelPoints, count: int, extent: float) -> ViewClusters:
+        """`of_points`, of those of a view's pixels."""
+        return ViewClusters.of_points(pixels.points[: pixels.clustered], pixels.normals[: pixels.clustered], count, extent)
 
     @staticmethod
     def of_points(points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], count: int, extent: float) -> ViewClusters:
@@ -46,17 +52,32 @@ class ViewClusters:
         agrees = np.einsum("nk,nk->n", own, normal) >= ONE_WAY
         return ViewClusters(np.asarray(points, np.float64)[nearest], np.where(agrees[:, None], normal, own), scale)
 
+    def of_each(self, pixels: PixelPoints, occluders: EmbreeTriangles) -> tuple[Int[ndarray, "P M"], Float32[ndarray, "P M"]]:
+        """(clusters, weights) of every pixel: `mixed` at its point, or at each of several, by fewer clusters."""
+        parts = []
+        for part, nearest in ((slice(None, pixels.plain), NEAREST), (slice(pixels.plain, None), NEAREST_OF_SEVERAL)):
+            parts.append(self.mixed(pixels.points[part], pixels.normals[part], occluders, nearest))
+        width = max(clusters.shape[1] for clusters, _ in parts)
+        padded = [[np.pad(array, ((0, 0), (0, width - array.shape[1]))) for array in arrays] for arrays in parts]
+        clusters, weights = (np.concatenate(arrays) for arrays in zip(*padded, strict=True))
+        return pixels.gathered(clusters, weights, _features(self.places, self.normals, self.scale))
+
     def mixed(
-        self, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], occluders: EmbreeTriangles | None = None
+        self,
+        points: Float[ndarray, "P 3"],
+        normals: Float[ndarray, "P 3"],
+        occluders: EmbreeTriangles | None = None,
+        most: int = NEAREST,
     ) -> tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]]:
         """(the K nearest clusters of each point, their weights, which sum to 1): (1 - d / 1.1 d_K)^2 of the distance d in place and normal.
 
-        A cluster that does not see the point weighs 0, unless none does: light does not pass under a wall.
+        K is `most`, or how many clusters there are. A cluster that does not see the point weighs 0, unless none does: light does not pass
+        under a wall.
         """
         from scipy.spatial import cKDTree
 
         tree = cKDTree(_features(self.places, self.normals, self.scale))
-        nearest = min(NEAREST, len(self.places))
+        nearest = min(most, len(self.places))
         clusters = np.zeros((len(points), nearest), np.int64)
         weights = np.zeros((len(points), nearest), np.float32)
         for start in range(0, len(points), BATCH):

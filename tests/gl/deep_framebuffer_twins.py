@@ -6,8 +6,10 @@ import numpy as np
 from twins import SUM, Evaluate, twin, vec4
 
 from srbf.gl.deep_framebuffer import folded, rows_image
+from srbf.visibility.near_sources import disc_factors
 from srbf.visibility.packed_links import packed
 from srbf.visibility.sparse_links import SparseLinks
+from srbf.visibility.surface_cells import Cells
 
 
 @twin("surfels/linked_light.glsl")
@@ -56,6 +58,30 @@ def _(evaluate: Evaluate) -> None:
                 },
             )[at, 0]
             np.testing.assert_allclose(found, expected, atol=2e-4 * width)
+
+
+@twin("surfels/disc_factor.glsl")
+def _(evaluate: Evaluate) -> None:
+    """Of discs on all sides, also behind the receiver or turned away."""
+    rng = np.random.default_rng(83)
+    toward, normals, facing = rng.normal(size=(3, 200, 3)).astype(np.float32)
+    normals, facing = (own / np.linalg.norm(own, axis=1, keepdims=True) for own in (normals, facing))
+    areas = rng.uniform(1e-4, 1, 200).astype(np.float32)
+    found = evaluate(
+        "surfels/disc_factor.glsl", "vec4(srbfDiscFactor(a.xyz, b.xyz, c.xyz, a.w))", vec4(toward, areas), vec4(normals), vec4(facing)
+    )
+    expected = np.concatenate(
+        [
+            disc_factors(
+                np.zeros((1, 3), np.float32),
+                normals[i : i + 1],
+                Cells(toward[i : i + 1], facing[i : i + 1], areas[i : i + 1], normals, normals),
+            )[0]
+            for i in range(200)
+        ]
+    )
+    assert 20 < (expected > 0).sum() < 180
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-4, atol=1e-7)
 
 
 @twin("methods/deep_framebuffer.glsl")

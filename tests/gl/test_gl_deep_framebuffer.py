@@ -105,6 +105,21 @@ def test_walls_shade_surfels_as_rays_say(divided: Asset, context: Any, kind: str
         np.testing.assert_allclose(relighter.relight([light]), relit, atol=SHADOWED * relit.max())
 
 
+def test_bright_surfels_light_as_in_numpy(context: Any, tmp_path: Path) -> None:
+    """A light 3 cm off a wall of many surfels, behind a wall with a door, with lobes: less than all is seen of the bright ones."""
+    room = Room.box((3, 2, 2), 0.25, 0.6, wall=(1.5, 0.6, 1.4), lid=False)
+    asset = with_lobes(DeepFramebuffer().encode(view_of_room(tmp_path / "capture", room, 8000, 150, tested=0)))
+    light = PointLight((0.03, 1.1, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
+    linked = {name: table for name, table in asset.tables.items() if name != "view_points"}
+    bare = replace(asset, tables=linked | {"view_links": asset.tables["view_links"].copy()})
+    for bounces in (1, 12):
+        limited = replace(asset, manifest={**asset.manifest, "gather": {**asset.manifest["gather"], "bounces": bounces}})
+        expected = methods.relight(limited, [light])
+        with Relighter(limited, context=context) as relighter:
+            np.testing.assert_allclose(relighter.relight([light]), expected, atol=TOLERANCE * expected.max())
+    assert np.abs(methods.relight(bare, [light]) - expected).max() > 20 * TOLERANCE * expected.max()
+
+
 def test_lights_add_up_and_direct_light_joins_them(asset: Asset, relighter: Relighter) -> None:
     lights = [*LIGHTS.values(), LIGHTS["point"]]
     direct = np.random.default_rng(4).uniform(0, 0.1, (asset.height, asset.width, 3)).astype(np.float32)

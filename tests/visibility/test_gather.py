@@ -147,3 +147,18 @@ def test_pixels_of_several_points_mix_their_clusters() -> None:
     found, weights = pixels.gathered(np.array([[0, 1], [1, 2], [2, 3]]), np.array([[0.5, 0.5], [0.5, 0.5], [1.0, 0.0]]))
     assert found[0, 0] == 2 and weights[0, 0] == 1 and not weights[2].any()
     assert dict(zip(found[1].tolist(), weights[1].tolist(), strict=True)) == pytest.approx({1: 0.5, 2: 0.375, 0: 0.0})
+
+
+def test_what_little_a_pixel_shows_of_a_far_surface_stays() -> None:
+    """A tenth of it, spread over as many clusters as the rest, which are all close to each other: they are merged among themselves."""
+    near, far = np.arange(12), np.arange(12, 24)
+    features = np.zeros((24, 6))
+    features[near, 0], features[far, 0] = 0.01 * near, 5 + 0.01 * far
+    clusters = np.stack([near, far])
+    weights = np.stack([np.full(12, 1 / 12), np.full(12, 1 / 12)])
+    pixels = PixelPoints(np.zeros((2, 3)), np.zeros((2, 3)), np.array([0, 0]), np.array([0.9, 0.1], np.float32), 1)
+    found, amount = pixels.gathered(clusters, weights, features)
+    assert found.shape == (1, 10) and amount.sum() == pytest.approx(1)
+    assert amount[0][found[0] >= 12].sum() == pytest.approx(0.1)
+    dropped, heaviest = pixels.gathered(clusters, weights)
+    assert not heaviest[0][dropped[0] >= 12].any()

@@ -1,0 +1,134 @@
+"""Bright surfels that light in closed form: which they are, how much they give, and that pictures are nearer to the truth by them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_rooms import Room
+from made_views import view_of_room
+
+from srbf.asset import Asset
+from srbf.lights import PointLight, SphereLight
+from srbf.methods import linear_response
+from srbf.methods.deep_framebuffer import POINTS, DeepFramebuffer
+from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.near_sources import NearSources, disc_factors
+from srbf.visibility.received import ReceivedLight
+from srbf.visibility.surface_cells import Cells
+
+pytest.importorskip("embreex")
+
+ROOM = Room.box((3, 2, 2), 0.05, 0.6)  # 12,800 cells
+CELLS = Cells(ROOM.places, ROOM.normals, ROOM.areas, ROOM.albedo.astype(np.float32), np.arange(len(ROOM.places)))
+NEAR = PointLight((0.06, 1.2, 0.8), falloff="inverse-square")
+EVEN = 0.06
+WHOLE = 0.03  # a disc's form factor is not that of a square right beside it
+
+
+def first_reflection(light: PointLight) -> np.ndarray:
+    return (ROOM.albedo * ReceivedLight(CELLS, EmbreeTriangles(ROOM.corners)).irradiance(light)).astype(np.float32)
+
+
+def test_all_around_a_point_shares_sum_to_one() -> None:
+    receivers = ROOM.free[:20].astype(np.float32)
+    normals = np.random.default_rng(1).normal(size=receivers.shape).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    np.testing.assert_allclose(disc_factors(receivers, normals, CELLS).sum(axis=1), 1, atol=WHOLE)
+
+
+def test_light_from_all_sides_alike_has_no_bright_surfels() -> None:
+    assert not NearSources.of(CELLS, np.ones((len(CELLS.places), 3), np.float32), NEAR).count
+    assert not NearSources.of(CELLS, first_reflection(PointLight((1.5, 1.0, 1.0), falloff="inverse-square")), NEAR).count
+    assert not NearSources.of(CELLS, np.zeros((len(CELLS.places), 3), np.float32), NEAR).count
+
+
+def test_beside_a_wall_they_are_the_cells_next_to_the_light() -> None:
+    near = NearSources.of(CELLS, first_reflection(NEAR), NEAR)
+    away = np.linalg.norm(CELLS.places[near.surfels] - np.array(NEAR.position), axis=1)
+    assert near.count > 10 and away.max() < 0.6
+    assert (near.parts > 0).all() and (near.parts <= 1).all() and near.parts.max() == 1
+    assert len(near.places) <= 4 and (near.places[:, 0] > 0).all() and (near.places[:, 0] < NEAR.position[0]).all()
+
+
+def test_a_moving_light_takes_out_its_surfels_gradually() -> None:
+    """No surfel goes from nothing to whole within a millimeter."""
+    parts = []
+    for step in (0, 1e-3):
+        light: Any = replace(NEAR, position=(0.2 + step, 1.2, 0.8))
+        near = NearSources.of(CELLS, first_reflection(light), light)
+        every = np.zeros(len(CELLS.places))
+        every[near.surfels] = near.parts
+        parts.append(every)
+    assert parts[0].any() and np.abs(parts[1] - parts[0]).max() < 0.1
+
+
+def test_what_stands_between_shadows_them() -> None:
+    """Behind a wall with a door there is less, above the wall all."""
+    first = first_reflection(NEAR)
+    near = NearSources.of(CELLS, first, NEAR)
+    points, normals = np.array([[2.9, 1.2, 0.8], [2.9, 0.3, 1.8]]), np.array([[-1.0, 0, 0]] * 2)
+    wall = np.array([[[1.5, 0.0, 0.0], [1.5, 4.0, 0.0], [1.5, 0.0, 4.0]], [[1.5, 4.0, 0.0], [1.5, 4.0, 4.0], [1.5, 0.0, 4.0]]], np.float32)
+    aside = wall + np.array([0, 0, 1.25], np.float32)
+    open_, hidden, above = (
+        near.irradiance(CELLS, first, points, normals, EmbreeTriangles(corners)) for corners in (ROOM.corners, wall, aside)
+    )
+    assert (open_ > 0).all() and not hidden.any()
+    assert (above[0] == open_[0]).all() and not above[1].any()
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    """Of coarse cells, whose light from a few surfels few rays meet."""
+    return DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("near") / "capture", Room.box((3, 2, 2), 0.25, 0.6), 8000, 400))
+
+
+def test_pictures_have_no_blotches(lit: Asset) -> None:
+    """Light 3 cm off a wall on the one across: even, where links alone scatter."""
+    light = PointLight((0.03, 1.1, 0.9), falloff="inverse-square")
+    linked = replace(
+        lit, tables={name: table for name, table in lit.tables.items() if name != POINTS} | {"view_links": lit.tables["view_links"].copy()}
+    )
+    covered = (lit.images["coverage"] > 0.5) & (lit.images["normal"][:, :, 0] < -0.5)
+    place = lit.images["position"][covered]
+    features = np.column_stack([np.ones(len(place)), place[:, 1:], place[:, 1:] ** 2, place[:, 1] * place[:, 2]])
+    rough = []
+    for asset in (linked, lit):
+        values = linear_response(asset, [light])[covered][:, 0]
+        slope = features @ np.linalg.lstsq(features, values, rcond=None)[0]
+        rough.append(float(np.sqrt(((values - slope) ** 2).mean()) / values.mean()))
+    assert rough[1] < 0.4 * rough[0]
+
+
+def test_lights_still_add_up_in_their_colors(lit: Asset) -> None:
+    one, other = (
+        PointLight((0.03, 1.1, 0.9), (1, 0.5, 0.2), falloff="inverse-square"),
+        SphereLight((2.5, 0.1, 0.4), (0.1, 0.3, 1), size=0.05),
+    )
+    both = linear_response(lit, [one, other])
+    np.testing.assert_allclose(both, linear_response(lit, [one]) + linear_response(lit, [other]), rtol=1e-4, atol=1e-6 * both.max())
+    white = linear_response(lit, [replace(one, color=(1.0, 1.0, 1.0))])
+    np.testing.assert_allclose(linear_response(lit, [one]), white * np.array(one.color), rtol=1e-4, atol=1e-6 * white.max())
+
+
+@pytest.mark.parametrize("bounces", [0, 1, 2])
+def test_light_is_reflected_as_often_as_by_links(lit: Asset, bounces: int) -> None:
+    """In the sum over all pixels, where blotches of links even out; a bounce adds much more than the tolerance."""
+    light = PointLight((0.03, 1.1, 0.9), falloff="inverse-square")
+    limited = replace(lit, manifest={**lit.manifest, "gather": {**lit.manifest["gather"], "bounces": bounces}})
+    linked = replace(
+        limited,
+        tables={name: table for name, table in lit.tables.items() if name != POINTS} | {"view_links": lit.tables["view_links"].copy()},
+    )
+    found, expected = linear_response(limited, [light]).sum(), linear_response(linked, [light]).sum()
+    assert found == pytest.approx(expected, rel=EVEN)
+    assert bounces == 0 or found < 0.8 * linear_response(lit, [light]).sum()
+
+
+def test_an_asset_keeps_the_places(lit: Asset, tmp_path: Path) -> None:
+    lit.save(tmp_path / "asset")
+    light = [PointLight((0.03, 1.1, 0.9), falloff="inverse-square")]
+    np.testing.assert_allclose(linear_response(Asset.open(tmp_path / "asset"), light), linear_response(lit, light), rtol=1e-4)
