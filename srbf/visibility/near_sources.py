@@ -15,13 +15,14 @@ from srbf.arrays import Float, Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.surface_cells import Cells
+from srbf.visibility.surface_cells import Cells, frames
 
 BRIGHT = 32.0  # of the mean radiosity, from which a surfel's light is taken out in part; from twice as much on, the whole
 MOST = 256  # surfels, the brightest
 GROUPS = 4  # parts of the bright surfels, each seen or not as one
 FACING = 0.2  # m, that a unit of the normal counts where surfels are grouped
 OFF = 0.25  # of a group's size, how far from its surface it is seen
+CLOSE, PARTS = 8.0, 4  # sides of a surfel, closer than which to a receiver it counts as so many parts a side
 LIFT = 1e-3  # of the extent of receivers
 ROWS = 1 << 12  # receivers at a time
 
@@ -102,15 +103,37 @@ def lift_above(points: Float[ndarray, "R 3"]) -> float:
     return LIFT * float(np.ptp(points, axis=0).max(initial=0))
 
 
-def disc_factors(points: Float32[ndarray, "R 3"], normals: Float32[ndarray, "R 3"], sources: Cells) -> Float32[ndarray, "R n"]:
-    """The share of the light at each receiver that comes from each source, taken as a disc: cos cos A / (pi d^2 + A)."""
-    place, facing = sources.places.astype(np.float32), sources.normals.astype(np.float32)
-    areas = sources.areas.astype(np.float32)
-    vector = place[None] - points[:, None]
+def disc_factors(points: Float32[ndarray, "R 3"], normals: Float32[ndarray, "R 3"], sources: Cells) -> Float32[ndarray, "R m"]:
+    """The share of the light at each receiver that comes from each source, nothing between: cos cos A / (pi d^2 + A), as of a disc.
+
+    A source closer to it than CLOSE of its sides is taken as a square of PARTS x PARTS discs.
+    """
+    facing, areas = sources.normals.astype(np.float32), sources.areas.astype(np.float32)
+    vector = sources.places.astype(np.float32)[None] - points[:, None]
     squared = np.einsum("rnk,rnk->rn", vector, vector)
     near, far = np.einsum("rnk,rk->rn", vector, normals), -np.einsum("rnk,nk->rn", vector, facing)
-    factors = np.maximum(near, 0) * np.maximum(far, 0) * areas / (np.maximum(squared, 1e-12) * (np.float32(np.pi) * squared + areas))
-    return factors.astype(np.float32)
+    factors = _discs(near, far, squared, areas)
+    reach = np.float32(np.sqrt(0.5)) * np.sqrt(areas)
+    receiver, source = np.nonzero((squared < CLOSE**2 * areas) & (near > -reach) & (far > 0))
+    if len(receiver):
+        tangent, bitangent = (axis.astype(np.float32)[source] for axis in frames(facing))
+        side, own, total = np.sqrt(areas)[source, None], vector[receiver, source], np.zeros(len(receiver), np.float32)
+        steps = ((np.arange(PARTS) + 0.5) / PARTS - 0.5).astype(np.float32)
+        for s in steps:
+            for t in steps:
+                part = own + side * (s * tangent + t * bitangent)
+                height = np.einsum("nk,nk->n", part, normals[receiver])
+                total += _discs(height, far[receiver, source], np.einsum("nk,nk->n", part, part), areas[source] / PARTS**2)
+        factors[receiver, source] = total
+    return factors
+
+
+def _discs(
+    near: Float32[ndarray, "*n"], far: Float32[ndarray, "*n"], squared: Float32[ndarray, "*n"], areas: Float32[ndarray, "*n"]
+) -> ndarray:
+    """From the distances along the normals of receivers and sources, the square of the whole, and areas."""
+    squared = np.maximum(squared, np.float32(1e-12))
+    return np.maximum(near, 0) * np.maximum(far, 0) * areas / (squared * (np.float32(np.pi) * squared + areas))
 
 
 def _toward(light: Light, place: Float64[ndarray, " 3"], normal: Float64[ndarray, " 3"]) -> tuple[Float64[ndarray, " 3"], float]:
