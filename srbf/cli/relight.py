@@ -43,6 +43,7 @@ from srbf.relighting import probe_light
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
+from srbf.relighting.scene_lights import lines_of, scene_lights
 from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
@@ -119,6 +120,10 @@ def relight(
         ),
     ] = None,
     lights: Annotated[Path | None, typer.Option(metavar="FRAMES.json", help="A folder of images, one a frame.", show_default=False)] = None,
+    own_lights: Annotated[
+        bool,
+        typer.Option("--scene-lights", help="The lights of the scene that a deep framebuffer was baked from, as they are set there."),
+    ] = False,
     fade: Annotated[
         float | None,
         typer.Option(
@@ -198,14 +203,16 @@ def relight(
     has_light = bool(placed or environment)
     if lights is not None and has_light:
         raise typer.BadParameter("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
+    if own_lights and (has_light or lights is not None or ambient_only):
+        raise typer.BadParameter("expected --scene-lights without other lights, found both; leave one out")
     if ambient_only and (has_light or lights is not None):
         raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
     if ambient_only and not ambient:
         raise typer.BadParameter("expected --ambient-only or --no-ambient, found both; leave one out")
-    if not (has_light or ambient_only or lights is not None):
+    if not (has_light or ambient_only or own_lights or lights is not None):
         raise typer.BadParameter(
-            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment "
-            "or --ambient-only"
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment, "
+            "--scene-lights or --ambient-only"
         )
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
@@ -225,12 +232,16 @@ def relight(
     placed += map(read_environment, environment or [])
     check_image_output(output, force)
     opened = _opened(asset, painted, ambient)
+    if own_lights:
+        placed += scene_lights(opened).values()
+        for line in lines_of(opened):
+            note(line)
     if emissive:
         _check_emissive(opened)
     places = None if at is None else read_places(at)
     if harmonics or places is not None:
         probe_light.grid_of(opened)
-    if falloff is None:
+    if falloff is None and not own_lights:
         placed = with_falloff(placed, domain_of_asset(opened.manifest).falloff)
     opacity = alpha_of(opened)
     for line in outside_domain(opened, placed):
