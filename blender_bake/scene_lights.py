@@ -17,7 +17,7 @@ from blender_bake.scene_file import show_as_rendered
 DIGITS = 7  # significant ones: Blender's numbers are single floats
 SMALL = 1e-6  # m: a size up to which a light is a point
 UNEVEN = 1e-3  # relative difference of an object's scales from which a spot's cone is elliptical
-ANGLE = 1e-4  # rad: difference of two suns' angles that is told
+ANGLE = 1e-4  # rad: difference of two suns' angles that a note tells
 FULL_SPREAD = math.pi - 1e-3  # rad: of an area light that is diffuse
 ROUND_SIDE = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diameter 1
 

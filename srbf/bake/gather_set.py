@@ -77,7 +77,7 @@ class FoundSurfaces:
     @staticmethod
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
-        known = {entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored}
+        known: dict[str, Any] = {entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored}
         return FoundSurfaces(**(known | {"lights": str(known.get("lights", NO_LIGHTS))}))
 
     @property
@@ -105,7 +105,7 @@ class FoundSurfaces:
             np.array(places["box"], np.float64),
             np.array(facts["bounces"]),
             passed,
-            json.dumps(facts["scene_lights"]),
+            json.dumps(facts["scene_lights"]) if "scene_lights" in facts else NO_LIGHTS,
         )
 
 

@@ -35,7 +35,7 @@ class StoppedError(BakeError):
 
 @dataclass(frozen=True)
 class GivenReference:
-    """What Cycles renders: `image` (H, W, 3) in the asset's quantity with `samples` samples a pixel; `seconds` with opening the scene,
+    """What Cycles renders: `image` (H, W, 3) in the asset's quantity with `samples` samples per pixel; `seconds` with opening the scene,
     `render_seconds` without."""
 
     image: Float32[ndarray, "H W 3"]
