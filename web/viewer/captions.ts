@@ -17,8 +17,8 @@ export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): vo
   place.replaceChildren(name, line);
 }
 
-/** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks. */
-export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number): void {
+/** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks; `missing`: lights of the scene that are not shown. */
+export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number, missing = ""): void {
   const { asset, facts, hasDirect } = subject;
   const { compared, error } = comparison;
   const parts = [
@@ -31,6 +31,10 @@ export function statusLine(place: HTMLElement, subject: Subject, comparison: Com
     else if (shining.some((light) => light.kind === "environment")) parts.push("environments: indirect light only");
   }
   place.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
+  if (!missing) return;
+  const told = document.createElement("span"); // names are the scene's: text, not markup
+  told.textContent = missing;
+  place.append(told);
 }
 
 /** A directional light's azimuth and elevation; `inside`: whether it lies in the captured domain. */

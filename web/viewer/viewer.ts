@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, SrbfError, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, outsideLine } from "./asset_lights";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesigned } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -115,8 +115,13 @@ export class Viewer {
         savePng(`${facts.title}.png`, this.stage.pixels(this.shining));
         changed();
       },
-      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]]),
-      saveRig: () => saveRig("lights.py", this.state.lights),
+      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]], this.subject.asset.manifest.scene_lights),
+      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.asset.manifest.scene_lights),
+      redesign: () => {
+        this.state.lights = redesigned(this.subject.asset, this.state.lights);
+        this.state.selected = Math.min(Math.max(this.state.selected, 0), this.state.lights.length - 1);
+        changed({ lights: true, panel: true });
+      },
       undo: () => this.step(this.history.undo()),
       redo: () => this.step(this.history.redo()),
       loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
@@ -166,6 +171,8 @@ export class Viewer {
       bounds: this.receivers.bounds,
       named: this.named,
       hasFrames: this.keyframes !== undefined,
+      designed: (this.subject.asset.manifest.scene_lights ?? []).length > 0,
+      hasDisc: lightDomainOf(this.subject.asset.manifest) === "directions",
       ...surfaceFacts(this.subject.asset),
       room: this.ball && roomOf(this.loaded.probes as Asset),
     };
@@ -388,7 +395,7 @@ export class Viewer {
 
   private status(): void {
     const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
-    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace);
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset));
   }
 
   private events(changed: Changed): void {
@@ -495,6 +502,6 @@ export class Viewer {
 
   private savePath(): void {
     const frames = this.state.path === "frames" && this.keyframes ? this.keyframes.frames : this.playback.frames(FRAMES_PER_SECOND);
-    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]));
+    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]), this.subject.asset.manifest.scene_lights);
   }
 }
