@@ -16,6 +16,9 @@ export interface Actions {
   savePng(): void;
   saveFrames(): void;
   saveRig(): void;
+  /** Let Cycles render the lights as they stand, and end that. */
+  renderReference(): void;
+  stopReference(): void;
   /** Set the scene's lights as they were designed. */
   redesign(): void;
   undo(): void;
@@ -46,6 +49,8 @@ export interface PanelFacts {
   hasFrames: boolean;
   /** Whether the asset lists lights of its scene, which can be set again as they were designed. */
   designed: boolean;
+  /** Renders by Cycles, where the page may ask for them, and whether one can be compared with. */
+  cycles?: { samples: number; rendering: boolean };
   /** Whether a disc shows where directional lights are. */
   hasDisc: boolean;
   /** Objects that can emit, and whether they can be repainted. */
@@ -97,7 +102,7 @@ export class Panel {
     if (objects.length) surfaceControls(this.gui, this.state, objects, paintable, this.actions.changed);
     if (this.facts.room) this.ball(this.facts.room);
     this.picture();
-    if (this.facts.hasCapture) this.compare();
+    if (this.facts.hasCapture || this.facts.cycles) this.compare();
     this.path();
     this.save();
     this.gui.folders.forEach((folder) => folder.open(this.open.get(folder._title) ?? folder._title !== "Path"));
@@ -358,8 +363,14 @@ export class Panel {
   private compare(): void {
     const folder = (this.gui as GUI).addFolder("Compare");
     const names = { Off: COMPARES[0], "Slider: reference | relit": COMPARES[1], Difference: COMPARES[2], Reference: COMPARES[3] };
-    folder.add(this.state, "compare", names).name("With the capture").onChange(this.relight);
-    folder.add(this.state, "errors").name("Error of each light").onChange(this.redraw);
+    const { cycles, hasCapture } = this.facts;
+    if (cycles) {
+      folder.add(cycles, "samples", 1, 4096, 1).name("Samples");
+      if (cycles.rendering) folder.add(this.actions, "stopReference").name("Stop the render");
+      else folder.add(this.actions, "renderReference").name("Render with Cycles");
+    }
+    folder.add(this.state, "compare", names).name(cycles ? "With the render" : "With the capture").onChange(this.relight);
+    if (hasCapture) folder.add(this.state, "errors").name("Error of each light").onChange(this.redraw);
   }
 
   private path(): void {

@@ -10,6 +10,7 @@ import { firstBall, roomOf } from "./ball_state";
 import { bearing, legend, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
+import { Cycles } from "./cycles";
 import { type Environment, readEnvironment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
@@ -52,6 +53,7 @@ export class Viewer {
   private readonly panel: Panel;
   private readonly copy: Copy;
   private readonly comparison: Comparison;
+  private readonly cycles?: Cycles;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
   private outside = "";
@@ -95,6 +97,18 @@ export class Viewer {
       changed: () => this.changed({ lights: true }),
       measured: () => this.status(),
     });
+    if (facts.cycles) {
+      this.cycles = new Cycles(facts.cycles, asset.ambient, {
+        wait: () => this.wait(),
+        done: () => this.done(),
+        shown: () => {
+          if (this.state.compare === "off") this.state.compare = "slider";
+          this.changed({ lights: true, panel: true });
+        },
+        switched: () => this.panel.rebuild(),
+        told: () => this.status(),
+      });
+    }
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
@@ -117,6 +131,8 @@ export class Viewer {
       },
       saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]], this.subject.asset.manifest.scene_lights),
       saveRig: () => saveRig("lights.py", this.state.lights, this.subject.asset.manifest.scene_lights),
+      renderReference: () => void this.cycles?.render(this.state.lights),
+      stopReference: () => this.cycles?.stop(),
       redesign: () => {
         this.state.lights = redesigned(this.subject.asset, this.state.lights);
         this.state.selected = Math.min(Math.max(this.state.selected, 0), this.state.lights.length - 1);
@@ -171,6 +187,7 @@ export class Viewer {
       bounds: this.receivers.bounds,
       named: this.named,
       hasFrames: this.keyframes !== undefined,
+      cycles: this.cycles,
       designed: (this.subject.asset.manifest.scene_lights ?? []).length > 0,
       hasDisc: lightDomainOf(this.subject.asset.manifest) === "directions",
       ...surfaceFacts(this.subject.asset),
@@ -222,7 +239,7 @@ export class Viewer {
       const state = decodeState(hash, plain);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
       state.map = Math.min(state.map, this.subject.maps - 1);
-      if (!this.loaded.references) Object.assign(state, { compare: "off", errors: false });
+      if (!this.loaded.references && !this.cycles?.rendered) Object.assign(state, { compare: "off", errors: false });
       Object.assign(this.state, { eye: undefined }, state);
       for (const light of state.lights) {
         if (light.kind === "environment" && !this.environments.has(light.file)) say(`drop ${light.file} on the page again: an address holds no images`, "hint");
@@ -302,14 +319,20 @@ export class Viewer {
     const comparing = this.comparing();
     this.shining = this.lights();
     paint(this.subject.asset, comparing ? [] : this.state.surfaces);
-    const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
+    const terms = this.besideCycles ? "both" : comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
     if (this.state.show === "negative" && !comparing) {
       this.subject.relight(negated(this.shining), terms, this.renderer);
       this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
     }
     const { ball } = this.state;
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
+    const began = performance.now();
     this.subject.relight(this.shining, terms, this.renderer, shown, this.showsFine());
+    if (this.besideCycles && this.cycles) {
+      const pixels = this.copy.read(this.renderer, this.subject.lightmap); // waits for the GPU
+      this.cycles.relitIn = performance.now() - began;
+      this.cycles.measure(pixels, (texel) => this.receivers.covered(texel));
+    }
     this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
@@ -329,8 +352,14 @@ export class Viewer {
     return this.stage.hasMesh && this.state.show === "picture" && !this.comparing();
   }
 
+  /** Whether a render by Cycles is beside the picture. */
+  private get besideCycles(): boolean {
+    return this.state.compare !== "off" && this.cycles?.rendered === true;
+  }
+
+  /** Whether the capture is beside the picture. */
   private comparing(): boolean {
-    return this.state.compare !== "off" && this.comparison.possible && this.comparable() !== undefined;
+    return !this.besideCycles && this.state.compare !== "off" && this.comparison.possible && this.comparable() !== undefined;
   }
 
   /** The lights, or while comparing the baked light nearest to the selected one, in its color. */
@@ -339,7 +368,7 @@ export class Viewer {
     if (!compared || !this.comparing()) {
       this.comparison.off();
       this.directions.marked = -1;
-      if (this.state.compare !== "off") say(`comparing needs a ${this.inCloud ? "point" : "directional"} light: add one`, "hint");
+      if (this.state.compare !== "off" && !this.besideCycles) say(this.loaded.references ? `comparing needs a ${this.inCloud ? "point" : "directional"} light: add one` : "nothing to compare with yet: let Cycles render", "hint");
       return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
@@ -367,7 +396,11 @@ export class Viewer {
 
   private present(): void {
     const { state, uniforms } = this;
-    const comparing = state.compare !== "off" && this.comparison.compared >= 0;
+    const comparing = this.besideCycles || (state.compare !== "off" && this.comparison.compared >= 0);
+    if (this.besideCycles && this.cycles?.texture) {
+      uniforms.reference.value = this.cycles.texture;
+      uniforms.referenceColor.value = [1, 1, 1];
+    }
     const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
     uniforms.value.value = VALUES[value as keyof typeof VALUES];
     const signed = value === "difference" || value === "map";
@@ -395,7 +428,7 @@ export class Viewer {
 
   private status(): void {
     const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
-    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset));
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset), this.cycles && { line: this.cycles.line, error: this.besideCycles ? this.cycles.error : undefined, relitIn: this.cycles.relitIn, isOld: this.cycles.rendered && !this.cycles.isOf(this.state.lights) });
   }
 
   private events(changed: Changed): void {
@@ -423,7 +456,7 @@ export class Viewer {
       redo: () => this.step(this.history.redo()),
       help: () => (help.open ? help.close() : help.showModal()),
       nextCompare: () => {
-        if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
+        if (this.loaded.references || this.cycles?.rendered) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
         if (this.subject.asset.tables.gather) return;

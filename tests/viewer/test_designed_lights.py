@@ -19,6 +19,7 @@ from test_shot import EXPOSURE, shows
 
 from srbf.asset import Asset
 from srbf.cli.light_arguments import read_frames
+from srbf.lights import AreaLight, PointLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.scene_lights import scene_lights
 
@@ -149,8 +150,9 @@ def test_frames_have_their_names_and_exact_colors(chromium: Any, asset: Asset, p
     assert [light["color"] for light in frame["lights"]] == [one["light"]["color"] for one in LIGHTS[:3]]
     (read,) = read_frames(path)
     for found, own in zip(read, list(scene_lights(asset).values())[:3], strict=True):
-        np.testing.assert_allclose(found.color, own.color)
+        assert isinstance(found, PointLight | AreaLight) and isinstance(own, PointLight | AreaLight)
         np.testing.assert_allclose(found.position, own.position, atol=1e-5)
+        np.testing.assert_allclose(found.color, own.color)
 
 
 @pytest.mark.slow
