@@ -85,7 +85,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._action(start=False)
 
     def _action(self, start: bool) -> None:
-        """Begin or end a render. A page of another origin cannot send JSON here: its browser asks first, and is not answered."""
+        """Begin or end a render. The browser of a page elsewhere would ask first whether it may send JSON, and get no leave."""
         port, renders = self.server.server_port, self.server.renders
         self.close_connection = True  # the body may be unread
         hosts = (f"{HOST}:{port}", f"localhost:{port}")

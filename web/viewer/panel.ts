@@ -16,7 +16,7 @@ export interface Actions {
   savePng(): void;
   saveFrames(): void;
   saveRig(): void;
-  /** Let Cycles render the lights as they stand, and end that. */
+  /** Let Cycles render the lights of now, and end that. */
   renderReference(): void;
   stopReference(): void;
   /** Set the scene's lights as they were designed. */
