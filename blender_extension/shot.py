@@ -27,7 +27,7 @@ def commands(scene: bpy.types.Scene, folder: Path, blender: str) -> list[tuple[s
     """(what, arguments of `srbf`) one after the other; the last, the page's server, runs on."""
     copy, capture, asset = (str(folder / name) for name in (settings.SCENE_COPY, "capture", "asset"))
     state = settings.state_of(folder / "capture")
-    bake = ["bake", copy, "--output", capture, "--receiver", f"view:{scene.camera.name}", "--size", str(scene.srbf.shot_size)]
+    bake = ["bake", copy, "--output", capture, "--receiver", f"view:{scene.camera.name}", "--size", _size(scene)]
     bake += ["--light-set", "gather", "--holdout", "0", "--scene", scene.name, "--json-progress"]
     if state != "nothing":
         bake.append("--force" if state == "done" else "--restart")
@@ -91,6 +91,14 @@ class SRBF_OT_take_lights(bpy.types.Operator):
             self.report({"WARNING"}, note)
         self.report({"INFO"}, f"{count} lights set")
         return {"FINISHED"} if count else {"CANCELLED"}
+
+
+def _size(scene: bpy.types.Scene) -> str:
+    """WxH in the shape of the camera's frame."""
+    render, longer = scene.render, scene.srbf.shot_size
+    width, height = render.resolution_x * render.pixel_aspect_x, render.resolution_y * render.pixel_aspect_y
+    scale = longer / max(width, height)
+    return f"{max(1, round(width * scale))}x{max(1, round(height * scale))}"
 
 
 CLASSES = (SRBF_OT_light_shot, SRBF_OT_take_lights)

@@ -7,7 +7,18 @@ from typing import Any
 
 from srbf import schemas
 from srbf.errors import InputError
-from srbf.lights import AreaLight, DirectionalLight, Falloff, Light, NamedLight, PointLight, SphereLight, SpotLight, Triple
+from srbf.lights import (
+    AreaLight,
+    DirectionalLight,
+    EnvironmentLight,
+    Falloff,
+    Light,
+    NamedLight,
+    PointLight,
+    SphereLight,
+    SpotLight,
+    Triple,
+)
 
 KINDS: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight, "sphere": SphereLight, "area": AreaLight}
 
@@ -25,6 +36,15 @@ def light_of(entry: dict[str, Any], falloff: Falloff = "linear") -> Light:
     if entry["kind"] in ("point", "spot"):
         fields.setdefault("falloff", falloff)
     return KINDS[entry["kind"]](**fields)
+
+
+def entry_of(light: Light) -> dict[str, Any]:
+    """The entry of a light; InputError for an environment, whose image is no entry's."""
+    if isinstance(light, EnvironmentLight):
+        raise InputError("expected lights that Blender has, found an environment")
+    fields = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(light).items()}
+    kind = next((kind for kind, made in KINDS.items() if type(light) is made), "named")
+    return {"kind": kind, **fields}
 
 
 def lights_of(entries: Sequence[dict[str, Any]], where: str, falloff: Falloff = "inverse-square") -> list[Light]:

@@ -12,6 +12,8 @@ import typer
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.bake.given_reference import MOST_SAMPLES
+from srbf.cli.beside_cycles import compare, path_beside
 from srbf.cli.flags import flags_alone
 from srbf.cli.light_arguments import (
     parse_area,
@@ -26,7 +28,7 @@ from srbf.cli.light_arguments import (
     read_frames,
     with_falloff,
 )
-from srbf.cli.parameters import AssetFolder, Force
+from srbf.cli.parameters import AssetFolder, Blender, Force
 from srbf.cli.probe_arguments import read_places, write_places
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
@@ -173,6 +175,18 @@ def relight(
             show_default=False,
         ),
     ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SHOT.blend",
+            help="Of a deep framebuffer: render the same lights by Cycles, too, into OUT_cycles.exr, and print the error and FLIP.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(metavar="N", parser=Number(whole=True, low=1, high=MOST_SAMPLES), help="With --reference: of Cycles.")
+    ] = 64,
+    blender: Blender = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
     alpha: Annotated[
@@ -214,6 +228,8 @@ def relight(
             "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment, "
             "--scene-lights or --ambient-only"
         )
+    if reference is not None and (lights is not None or at is not None or harmonics or not ambient):
+        raise typer.BadParameter("expected --reference without --lights, --at, --harmonics and --no-ambient, found both; leave one out")
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
     if fade is not None and (lights is None or renderer == "gl" or viewer is not None):
@@ -230,7 +246,8 @@ def relight(
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
     placed += map(read_environment, environment or [])
-    check_image_output(output, force)
+    for written in [output] if reference is None else [output, path_beside(output)]:
+        check_image_output(written, force)
     opened = _opened(asset, painted, ambient)
     if own_lights:
         placed += scene_lights(opened).values()
@@ -260,6 +277,8 @@ def relight(
     else:
         write_image(output, with_alpha(image, opacity, alpha), "float")
     note(f"wrote {output}")
+    if reference is not None:
+        compare(opened, image, placed, reference, samples, output, blender, exposure)
 
 
 def _relight_frames(

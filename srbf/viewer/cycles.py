@@ -89,13 +89,11 @@ class CyclesRenders:
             return path.read_bytes()
 
     def _render(self, number: int, lights: list[dict[str, Any]], samples: int, halt: threading.Event) -> None:
-        said: list[str] = []
-
         def progress(done: int, total: int) -> None:
             self._tell(number, state="rendering", done=done, samples=total)
 
         try:
-            found = render_given(self._asset, self._scene, lights, samples, progress, said.append, self._blender, halt)
+            found = render_given(self._asset, self._scene, lights, samples, progress, blender=self._blender, stop=halt)
         except StoppedError:
             self._tell(number, state="stopped")
         except SrbfError as error:
@@ -104,7 +102,7 @@ class CyclesRenders:
             self._tell(number, state="failed", error=f"{type(error).__name__}: {error}")
         else:
             self._image = found
-            told = {"seconds": round(found.seconds, 2), "render_seconds": round(found.render_seconds, 2), "notes": said}
+            told = {"seconds": round(found.seconds, 2), "render_seconds": round(found.render_seconds, 2)}
             self._tell(number, state="done", done=samples, samples=samples, **told)
 
     def _tell(self, number: int, **status: Any) -> None:

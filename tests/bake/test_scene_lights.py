@@ -150,3 +150,14 @@ def test_a_render_can_be_stopped_and_a_changed_scene_is_told(shot: tuple[Path, s
         render_given(asset, scene("designed"), lights, 60_000, stop=stop)
     assert changed_line(asset, scene("designed")) is None
     assert "two different scenes" in str(changed_line(asset, scene("unlit")))
+
+
+def test_a_relit_picture_is_compared_with_cycles(shot: tuple[Path, str], scene: Callable[[str], Path], tmp_path: Path) -> None:
+    words = ["relight", shot[0] / "asset", "--scene-lights", "-o", tmp_path / "shot.exr", "--reference", scene("designed"), "--samples", 64]
+    said = done(*words).stderr
+    told = said.split("relative rmse ")[1]
+    made = read_image(tmp_path / "shot_cycles.exr")
+    relit = read_image(tmp_path / "shot.exr")[:, :, :3]
+    assert float(told.split("%")[0]) / 100 < 0.12 and "psnr" in told and made.shape == relit.shape
+    assert "two different scenes" not in said
+    assert "--reference without" in refused([*words, "--no-ambient"], 2)

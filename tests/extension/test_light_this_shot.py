@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,11 +53,11 @@ def test_bake_fit_and_page_follow_each_other(in_blender, tmp_path) -> None:
         "--receiver",
         "view:Shot: 1",
         "--size",
-        "24",
+        "24x14",
     ]
     assert bake[bake.index("--light-set") + 1] == "gather" and fit[:2] == ["fit", str(folder / "capture")]
     assert view[:4] == ["view", str(folder / "asset"), "--scene", str(folder / "scene.blend")]
-    commands = get_command(app).commands
+    commands: Any = vars(get_command(app))["commands"]
     for name, *words in (bake, fit, view):
         known = {flag for parameter in commands[name].params for flag in parameter.opts}
         assert {word for word in words if word.startswith("--")} <= known

@@ -1,4 +1,4 @@
-"""The page beside Cycles: a render of the lights as they stand, its error, one at a time, stopped, and asked for by this page alone."""
+"""The page beside Cycles: a render of the present lights, its error, one at a time, stopped, and asked for by this page alone."""
 
 from __future__ import annotations
 

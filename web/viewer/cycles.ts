@@ -1,4 +1,4 @@
-/** The lights as they stand, rendered by Cycles on this machine: asked for, waited for, and beside the relit picture. */
+/** The present lights, rendered by Cycles on this machine: asked for, waited for, and beside the relit picture. */
 import { DataTexture, FloatType, LinearFilter, NoColorSpace, RGBAFormat } from "three";
 import { type FloatImage, SrbfError } from "../src";
 import { decodeFloat } from "../src/exr";
@@ -24,7 +24,6 @@ interface Status {
   samples?: number;
   seconds?: number;
   render_seconds?: number;
-  notes?: string[];
   error?: string;
 }
 
@@ -70,7 +69,7 @@ export class Cycles {
     return `Cycles: ${samples} samples in ${alone} s (${seconds} s with opening the scene)`;
   }
 
-  /** Render the lights as they stand. */
+  /** Render the present lights. */
   async render(lights: readonly LightState[]): Promise<void> {
     if (this.rendering) return;
     this.rendering = true;
@@ -91,7 +90,6 @@ export class Cycles {
       const name = `${this.facts.place}/image.exr`;
       this.take(decodeFloat(await (await fetched(fetch.bind(window), name)).arrayBuffer(), name));
       this.of = of;
-      for (const note of this.status.notes ?? []) say(note, "hint");
       this.page.shown();
     } catch (error) {
       say(lineOf(error));
