@@ -89,10 +89,12 @@ class _Handler(BaseHTTPRequestHandler):
         port, renders = self.server.server_port, self.server.renders
         self.close_connection = True  # the body may be unread
         hosts = (f"{HOST}:{port}", f"localhost:{port}")
+        if renders is None:
+            return self._send(HTTPStatus.NOT_IMPLEMENTED, b"expected srbf view with --scene\n", ".txt", True)
         if self.headers.get("Host") not in hosts or self.headers.get("Origin") not in [f"http://{host}" for host in hosts]:
             return self._send(HTTPStatus.FORBIDDEN, b"expected a request of this page's own\n", ".txt", True)
-        if renders is None or self.path != f"/{PLACE}":
-            return self._send(HTTPStatus.NOT_FOUND, b"expected srbf view with --scene\n", ".txt", True)
+        if self.path != f"/{PLACE}":
+            return self._send(HTTPStatus.NOT_FOUND, b"expected the place of renders\n", ".txt", True)
         if not start:
             status, told = renders.stop()
         else:
