@@ -1,7 +1,7 @@
 /** Text beside the picture: title, status, the selected light's direction, and the legend of false colors. */
 import type { Light, Triple } from "../src";
 import type { Comparison } from "./comparison";
-import type { CyclesError } from "./cycles";
+import type { CyclesTold } from "./cycles";
 import type { Facts } from "./loading";
 import type { COLORS } from "./screen";
 import type { State } from "./state";
@@ -19,7 +19,7 @@ export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): vo
 }
 
 /** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks; `missing`: lights of the scene that are not shown. */
-export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number, missing = "", cycles?: { line: string; error?: CyclesError; relitIn: number; isOld: boolean }): void {
+export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number, missing = "", cycles?: CyclesTold): void {
   const { asset, facts, hasDirect } = subject;
   const { compared, error } = comparison;
   const parts = [

@@ -6,6 +6,7 @@ import { fetched } from "../src/files";
 import type { LightState } from "./light_state";
 import { lineOf, say } from "./messages";
 import { frameOf } from "./saving";
+import type { ScreenUniforms } from "./screen";
 
 const EVERY = 300; // milliseconds between looks at how far it is
 const QUANTILE = 0.999; // of the reference: the peak of the PSNR, as in srbf evaluate
@@ -33,15 +34,21 @@ export interface CyclesError {
   psnr: number;
 }
 
+/** What the status line says of it: the error of what is shown, milliseconds of the page's last picture, whether lights have changed since. */
+export interface CyclesTold {
+  line: string;
+  error?: CyclesError;
+  relitIn: number;
+  isOld: boolean;
+}
+
 export class Cycles {
   samples = 64;
   rendering = false;
   /** The last render, its ambient light taken off, for the shader that adds it. */
-  texture?: DataTexture;
-  /** Of what is shown now, once it is measured. */
-  error?: CyclesError;
-  /** Milliseconds in which the page relit it last. */
-  relitIn = 0;
+  private texture?: DataTexture;
+  private error?: CyclesError;
+  private relitIn = 0;
   private image?: FloatImage;
   private of = "";
   private status: Status = { state: "idle" };
@@ -56,13 +63,8 @@ export class Cycles {
     return this.image !== undefined;
   }
 
-  /** Whether the lights are still those of the render. */
-  isOf(lights: readonly LightState[]): boolean {
-    return this.of === asked(lights);
-  }
-
   /** What the status line says. */
-  get line(): string {
+  private get line(): string {
     const { state, done = 0, samples = 0, seconds, render_seconds: alone } = this.status;
     if (this.rendering) return state === "rendering" ? `Cycles: ${done} of ${samples} samples` : "Cycles: starting";
     if (!this.image) return "";
@@ -105,9 +107,21 @@ export class Cycles {
     if (this.rendering) this.ask("DELETE").catch((error) => say(lineOf(error)));
   }
 
-  /** Measure RGBA pixels of the relit picture, in rows from the top. */
-  measure(relit: Float32Array, covered: (texel: number) => boolean): void {
+  /** For the status line; `beside`: whether the render is. */
+  told(lights: readonly LightState[], beside: boolean): CyclesTold {
+    return { line: this.line, error: beside ? this.error : undefined, relitIn: this.relitIn, isOld: this.rendered && this.of !== asked(lights) };
+  }
+
+  /** Let the render be what the screen compares with. */
+  show(uniforms: ScreenUniforms): void {
+    if (this.texture) uniforms.reference.value = this.texture;
+    uniforms.referenceColor.value = [1, 1, 1];
+  }
+
+  /** Measure RGBA pixels of the relit picture, in rows from the top, made in `relitIn` ms. */
+  measure(relit: Float32Array, covered: (texel: number) => boolean, relitIn: number): void {
     const { image } = this;
+    this.relitIn = relitIn;
     if (!image) return;
     const values: number[] = [];
     let [squares, power] = [0, 0];

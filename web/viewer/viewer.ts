@@ -1,6 +1,6 @@
 /** The page: its state, lights, picture, comparison, and what it saves. */
 import { NoToneMapping, WebGLRenderer } from "three";
-import { type Asset, type Light, lightDomainOf, SrbfError, type Triple } from "../src";
+import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
 import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesigned } from "./asset_lights";
@@ -11,12 +11,13 @@ import { bearing, legend, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { Cycles } from "./cycles";
-import { type Environment, readEnvironment } from "./environment_file";
+import { droppedEnvironment, droppedFrames } from "./dropped";
+import type { Environment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
-import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
+import { type DirectionalState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
 import { listen, tabled } from "./keys";
-import { Keyframes, readFrames } from "./keyframes";
+import type { Keyframes } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange, showMap } from "./map_range";
 import { Measures } from "./measures";
@@ -97,18 +98,7 @@ export class Viewer {
       changed: () => this.changed({ lights: true }),
       measured: () => this.status(),
     });
-    if (facts.cycles) {
-      this.cycles = new Cycles(facts.cycles, asset.ambient, {
-        wait: () => this.wait(),
-        done: () => this.done(),
-        shown: () => {
-          if (this.state.compare === "off") this.state.compare = "slider";
-          this.changed({ lights: true, panel: true });
-        },
-        switched: () => this.panel.rebuild(),
-        told: () => this.status(),
-      });
-    }
+    if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { wait: () => this.wait(), done: () => this.done(), shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
@@ -228,6 +218,7 @@ export class Viewer {
     const { manifest } = this.subject.asset;
     const lights = firstLights(this.subject.asset, this.receivers.bounds);
     const state = firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
+    if (this.subject.asset.manifest.scene_lights?.length) state.exposure = 0; // as in Blender
     const { probes } = this.loaded;
     if (probes) state.ball = firstBall(probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
     return state;
@@ -328,11 +319,8 @@ export class Viewer {
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
     const began = performance.now();
     this.subject.relight(this.shining, terms, this.renderer, shown, this.showsFine());
-    if (this.besideCycles && this.cycles) {
-      const pixels = this.copy.read(this.renderer, this.subject.lightmap); // waits for the GPU
-      this.cycles.relitIn = performance.now() - began;
-      this.cycles.measure(pixels, (texel) => this.receivers.covered(texel));
-    }
+    // what reads the pixels waits for the GPU
+    if (this.besideCycles) this.cycles?.measure(this.copy.read(this.renderer, this.subject.lightmap), (texel) => this.receivers.covered(texel), performance.now() - began);
     this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
@@ -350,6 +338,11 @@ export class Viewer {
   /** Whether a mesh is shown, whose direct light may be finer than its lightmap. */
   private showsFine(): boolean {
     return this.stage.hasMesh && this.state.show === "picture" && !this.comparing();
+  }
+
+  private showReference(): void {
+    if (this.state.compare === "off") this.state.compare = "slider";
+    this.changed({ lights: true, panel: true });
   }
 
   /** Whether a render by Cycles is beside the picture. */
@@ -397,10 +390,7 @@ export class Viewer {
   private present(): void {
     const { state, uniforms } = this;
     const comparing = this.besideCycles || (state.compare !== "off" && this.comparison.compared >= 0);
-    if (this.besideCycles && this.cycles?.texture) {
-      uniforms.reference.value = this.cycles.texture;
-      uniforms.referenceColor.value = [1, 1, 1];
-    }
+    if (this.besideCycles) this.cycles?.show(uniforms);
     const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
     uniforms.value.value = VALUES[value as keyof typeof VALUES];
     const signed = value === "difference" || value === "map";
@@ -428,7 +418,7 @@ export class Viewer {
 
   private status(): void {
     const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
-    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset), this.cycles && { line: this.cycles.line, error: this.besideCycles ? this.cycles.error : undefined, relitIn: this.cycles.relitIn, isOld: this.cycles.rendered && !this.cycles.isOf(this.state.lights) });
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset), this.cycles?.told(this.state.lights, this.besideCycles));
   }
 
   private events(changed: Changed): void {
@@ -498,33 +488,22 @@ export class Viewer {
   }
 
   /** Play the frames of a file from now on. */
-  private async frames(file: File): Promise<void> {
-    this.wait();
-    try {
-      this.keyframes = new Keyframes(readFrames(await file.text(), file.name, this.inCloud ? "inverse-square" : "linear"), this.state);
-      this.keyframes.show(0);
-      const { frames } = this.keyframes;
-      Object.assign(this.state, { path: "frames", seconds: Math.max(0.1, frames.length / FRAMES_PER_SECOND), playing: frames.length > 1 });
+  private frames(file: File): Promise<void> {
+    return this.slowly(async () => {
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear");
       this.panel.setFacts(this.panelFacts());
-      this.changed({ lights: true, panel: true });
-    } catch (error) {
-      say(lineOf(error));
-    } finally {
-      this.done();
-    }
+    });
   }
 
-  /** Add a dropped environment map; the first one turns the other lights off. */
-  private async environment(file: File): Promise<void> {
+  private environment(file: File): Promise<void> {
+    return this.slowly(() => droppedEnvironment(file, this.state, this.environments, kindsOf(this.subject.asset).includes("environment") && !this.named));
+  }
+
+  /** Do what takes time and changes lights; an error is said. */
+  private async slowly(work: () => Promise<void>): Promise<void> {
     this.wait();
     try {
-      if (!kindsOf(this.subject.asset).includes("environment") || this.named) throw new SrbfError("expected an asset of distant lights for an environment, found one of other lights");
-      this.environments.set(file.name, await readEnvironment(file));
-      const { lights } = this.state;
-      const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);
-      if (known < 0 && lights.length >= MOST_LIGHTS) return say(`expected at most ${MOST_LIGHTS} lights; remove one first`);
-      if (known < 0 && !lights.some((light) => light.kind === "environment")) for (const light of lights) light.on = false;
-      this.state.selected = known < 0 ? lights.push(environmentState(file.name)) - 1 : known;
+      await work();
       this.changed({ lights: true, panel: true });
     } catch (error) {
       say(lineOf(error));
