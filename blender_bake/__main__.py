@@ -51,14 +51,15 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
     channels: names of the receiver's images to send first (see `channels`);
     ambient: a request without a light, or null; rendered only where the scene may emit;
     lit_by: {kind: own}, suns and point lights of ours; {kind: named, groups}, the scene's own lights; {kind: cloud | patches, file}, point
-    lights, and patches of the surfaces (see `emissive_patches`);
+    lights, and patches of the surfaces (see `emissive_patches`); {kind: given, lights, sun_angle}, all of these lights at once in every
+    image, with what the scene itself emits (and its lights and world where `keep_scene_lights`);
     direct_gloss: whether direct light includes what gloss reflects; needs a view;
     viewers: unit directions that radiance is rendered toward where a request asks for it, or null;
     requests, serve: requests (see `RenderRequest`) in the job, and whether more come on stdin;
     transmittances, probes: where `transport` is indirect, the transmittances of translucent materials, by name; if null, fitted under
     the lights `probes`, and sent with the scene's triangles.
     """
-    from blender_bake import emission, no_shadow, scene_file, scene_mesh, scene_query, translucency, without_triangles
+    from blender_bake import emission, given_lights, no_shadow, scene_file, scene_mesh, scene_query, translucency, without_triangles
     from blender_bake import scene as scenes
     from blender_bake.frame import Frame
     from blender_bake.light import SoleLight
@@ -107,7 +108,12 @@ def run(job: dict[str, Any], messages: Iterable[dict[str, Any]], events: Events)
             own_light.restore()
         send("ambient", ambient.render(receiver)["response"], started)
         own_light.off()
-    if named is None:
+    given = lit_by["kind"] == "given"
+    if given:
+        if job["keep_scene_lights"] and own_light is not None:
+            own_light.restore()
+        given_lights.make(scene, lit_by["lights"], lit_by["sun_angle"])
+    elif named is None:
         emission.switch_off()
     if ambient is not None:
         started = time.perf_counter()

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from blender_bake import free_places, point_grid, probe_places, surfaces, unwrap, vertices
+from blender_bake import free_places, point_grid, probe_places, scene_lights, surfaces, unwrap, vertices
 from blender_bake.frame import Frame
 from blender_bake.ipc import Events, hand_over
 from blender_bake.named_lights import NamedLights
@@ -33,6 +33,7 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     named: {groups}               -> `named`: [{name, objects}], see `NamedLights.entries`
     probes: {spacing, seed}       -> `probes`: {origin, spacing, counts, moved}, see `probe_places.places`; `files` in `scratch`:
         `probe_places` (N, 3), `probe_valid` (N,), and `occluders`
+    scene_lights: true            -> `scene_lights`: {lights, left_out, sun_angle}, see `scene_lights.values`
     places                        -> `places`: see `free_places.places`
     surfaces: {cells, spacing, gloss} -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), with gloss as if it were diffuse where
         `gloss` is true, or `caustics` and the scene has reflective ones, `transmission` (T, 3), what is let through diffusely,
@@ -54,6 +55,8 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
         found["frame"] = frame.record()
     if question.get("named"):
         found["named"] = NamedLights(scene, question["named"]["groups"]).entries()
+    if question.get("scene_lights"):
+        found["scene_lights"] = scene_lights.values(scene)
     if question.get("places"):
         found["places"] = free_places.places(scene, question["places"])
         for line in found["places"].pop("warnings"):

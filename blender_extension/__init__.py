@@ -7,9 +7,9 @@ from typing import Any
 
 import bpy
 
-from . import command, operators, panel, running, settings, show
+from . import command, operators, panel, running, settings, shot, show
 
-CLASSES = (settings.SrbfSettings, *operators.CLASSES, panel.SRBF_PT_panel)
+CLASSES = (settings.SrbfSettings, *operators.CLASSES, *shot.CLASSES, panel.SRBF_PT_panel)
 _commands: list[Any] = []
 
 

@@ -45,6 +45,14 @@ class SRBF_PT_panel(bpy.types.Panel):
         else:
             _draw_bake(layout, asked)
         _draw_asset(layout, asked)
+        _draw_shot(layout, context.scene)
+
+
+def _draw_shot(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    column = layout.box().column()
+    column.prop(scene.srbf, "shot_size")
+    column.operator("srbf.light_shot", icon="VIEW_CAMERA")
+    column.operator("srbf.take_lights", icon="IMPORT")
 
 
 def _draw_job(layout: bpy.types.UILayout, job: running.Job) -> None:

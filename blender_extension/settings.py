@@ -47,6 +47,9 @@ class SrbfSettings(bpy.types.PropertyGroup):
         subtype="DIR_PATH",
         description="Captures and assets go here, in one folder per receiver",
     )
+    shot_size: bpy.props.IntProperty(  # type: ignore[valid-type]
+        name="Shot Size", default=640, min=8, max=16384, subtype="PIXEL", description="Longer side of the shot that is lit, pixels"
+    )
     k: bpy.props.IntProperty(name="Maps", default=25, min=1, max=2048, description="Relighting maps to fit")  # type: ignore[valid-type]
     albedo: bpy.props.BoolProperty(  # type: ignore[valid-type]
         name="Albedo", default=True, description="Show irradiance times albedo / pi of the object's own materials, instead of unchanged"

@@ -18,6 +18,7 @@ from srbf.errors import ManifestError
 from srbf.io.image import size_of
 from srbf.light_domain import domain_of_asset
 from srbf.methods import method_of
+from srbf.methods.carried import OWN_LIGHTS
 from srbf.methods.kept_visibility import SETS
 
 UNFINISHED = "bake.json"  # beside the manifest of a bake that can be resumed
@@ -69,6 +70,7 @@ def _kinds(capture: Capture) -> dict[str, Any]:
         facts["names"] = names
     if "free_places" in manifest:
         facts["free_space"] = _box(manifest["free_places"])
+        facts |= _own_lights(manifest)
     elif capture.kind == "point":
         facts["fitted_by"] = "none of the methods: they fit directional lights, named ones, and point lights with free places"
     if "patches" in manifest:
@@ -123,6 +125,7 @@ def light_facts(asset: Asset) -> dict[str, Any]:
         facts["interpolation"] = manifest["interpolation"]["kind"]
     if manifest.get("free_places"):
         facts["free_space"] = _box(manifest["free_places"])
+    facts |= _own_lights(manifest)
     if "cells" in asset.tables:
         cells = asset.tables["cells"]  # (2, N, 4)
         facts |= {"patches": int(cells[1, :, 3].max(initial=-1)) + 1, "cells": cells.shape[1]}
@@ -139,6 +142,11 @@ def light_facts(asset: Asset) -> dict[str, Any]:
             size = sum(table.nbytes for name, table in asset.tables.items() if name.startswith(f"{kind}_"))
             facts[kind] = {**{key: told[key] for key in ("points", "coefficients", "clusters")}, "bytes": size}
     return facts
+
+
+def _own_lights(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Names of the scene's own lights, and of those left out."""
+    return {key: [one["name"] for one in manifest[key]] for key in OWN_LIGHTS if manifest.get(key)}
 
 
 def bytes_by_light(asset: Asset) -> dict[str, int | float]:

@@ -37,6 +37,8 @@ POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
 TRACED_BY = 2  # counts changes of what is traced: links of former versions are made once more
+SHOWN = 8  # names in a line
+NO_LIGHTS = '{"lights": [], "left_out": [], "sun_angle": null}'
 Progress = Callable[[int, int, str], None]
 
 
@@ -45,7 +47,8 @@ class FoundSurfaces:
     """What a scene has for a view's gather: opaque triangles (T, 3, 3) with albedo and object, what casts shadows, free places, m.
 
     `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow. `transmission`: what the triangles
-    let through diffusely, where any does.
+    let through diffusely, where any does. `lights`: the scene's own as JSON, {lights, left_out, sun_angle}, see
+    `blender_bake.scene_lights`.
     """
 
     corners: Float32[ndarray, "T 3 3"]
@@ -57,12 +60,13 @@ class FoundSurfaces:
     box: Float64[ndarray, " 6"]
     bounces: Int[ndarray, ""]
     transmission: Float32[ndarray, "T 3"] | None = None
+    lights: str = NO_LIGHTS
 
     @functools.cached_property
     def checksum(self) -> str:
-        """Of all arrays."""
+        """Of all arrays. The scene's own lights shine in no image."""
         digest = hashlib.sha256()
-        for array in self.arrays().values():
+        for array in [array for name, array in self.arrays().items() if name != "lights"]:
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
@@ -74,7 +78,13 @@ class FoundSurfaces:
     @staticmethod
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
-        return FoundSurfaces(**{entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored})
+        known: dict[str, Any] = {entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored}
+        return FoundSurfaces(**(known | {"lights": str(known.get("lights", NO_LIGHTS))}))
+
+    @property
+    def scene_lights(self) -> dict[str, Any]:
+        """The scene's own lights: {lights, left_out, sun_angle}."""
+        return json.loads(self.lights)
 
     @staticmethod
     def of_facts(facts: dict[str, Any]) -> FoundSurfaces:
@@ -96,6 +106,7 @@ class FoundSurfaces:
             np.array(places["box"], np.float64),
             np.array(facts["bounces"]),
             passed,
+            json.dumps(facts["scene_lights"]) if "scene_lights" in facts else NO_LIGHTS,
         )
 
 
@@ -142,6 +153,7 @@ class GatherSet:
         """What the scene is asked."""
         return {
             "places": {"box": self.box, "count": 0, "spacing": None, "random": tested, "places": PLACES, "seed": seed},
+            "scene_lights": True,
             "surfaces": {"cells": FRAGMENTS * self.count, "spacing": None, "gloss": "caustics"},
         }
 
@@ -151,6 +163,8 @@ class GatherSet:
         warn_of_empty(Fragments(found.corners, found.albedo), say)
         x0, y0, z0, x1, y1, z1 = found.box.tolist()
         say(f"{len(found.corners)} fragments of surfaces; lights in the box {x0:.4g},{y0:.4g},{z0:.4g} to {x1:.4g},{y1:.4g},{z1:.4g} m")
+        for line in _lines_of(found.scene_lights):
+            say(line)
         return replace(self, found=found)
 
     def record(self) -> dict[str, Any]:
@@ -164,7 +178,14 @@ class GatherSet:
         return {
             "gather": {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)},
             "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
+            "scene_lights": found.scene_lights["lights"],
+            **({"scene_lights_left_out": found.scene_lights["left_out"]} if found.scene_lights["left_out"] else {}),
         }
+
+    @property
+    def sun_angle(self) -> float | None:
+        """Angular diameter of the scene's brightest sun, rad; None where it has none."""
+        return self._known.scene_lights["sun_angle"]
 
     def key(self, scene_sha256: str, tested: int, seed: int, scene: str | None = None) -> str:
         """What the surfaces and places found depend on; `scene`: which one of the .blend."""
@@ -217,3 +238,11 @@ class GatherSet:
             pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes, backs
         )
         operator.write(receivers.folder, key)
+
+
+def _lines_of(told: dict[str, Any]) -> list[str]:
+    """What is said of the scene's own lights: their names, and which of them are left out."""
+    names = [repr(one["name"]) for one in told["lights"]]
+    lines = [f"{len(names)} lights of the scene's own: {', '.join(names[:SHOWN])}{', …' if len(names) > SHOWN else ''}"] if names else []
+    lines += [f"light {one['name']!r}: {one['note']}" for one in told["lights"] if "note" in one]
+    return lines + [f"light {one['name']!r} is left out of the scene's lights: {one['reason']}" for one in told["left_out"]]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import srbf
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.images import SCENE_FILE, SEAMS
 from srbf.bake.settings import BakeSettings, PlannedLight
 from srbf.channels import file_name, manifest_keys
@@ -35,6 +36,12 @@ def capture_manifest(
         source["validation_curve"] = curve
     traced = settings.light_set is not None and settings.light_set.kind == "cubemap"
     apart = settings.transport == "indirect" or traced
+    known = {} if settings.light_set is None else settings.light_set.manifest()
+    sun_angle = settings.sun_angle
+    if isinstance(settings.light_set, GatherSet):
+        sun_angle = settings.light_set.sun_angle or 0.0  # no image has a sun: the scene's own will shine at relighting
+        if settings.keep_scene_lights:  # they are in the ambient light
+            known = {key: value for key, value in known.items() if not key.startswith("scene_lights")}
     return {
         "format": "srbf-capture",
         "version": 1,
@@ -55,10 +62,10 @@ def capture_manifest(
             }
             for light, samples, noise in lights
         ],
-        **({"scene": SCENE_FILE, "direct": {"sun_angle": settings.sun_angle, **prepared["sampling"]}} if apart else {}),
+        **({"scene": SCENE_FILE, "direct": {"sun_angle": sun_angle, **prepared["sampling"]}} if apart else {}),
         **({} if settings.gloss is None else {"harmonics": {"order": settings.gloss}}),
         **manifest_keys(prepared["channels"]),
-        **({} if settings.light_set is None else settings.light_set.manifest()),
+        **known,
         **({SEAMS: file_name(SEAMS)} if prepared["seams"] else {}),
         "source": source,
     }

@@ -94,6 +94,10 @@ class Worker:
                     stream.close()
         self._log.close()
 
+    def kill(self) -> None:
+        """End the process now, from any thread: whoever awaits an event gets WorkerDiedError."""
+        self._process.kill()
+
     def ask(self, request: RenderRequest) -> None:
         """Send one more request to a job that serves; replies come in order, as events `rendered`."""
         self._send(request.message())

@@ -13,6 +13,7 @@ import numpy as np
 from srbf import schemas
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.light_entries import light_of, named
 from srbf.lights import (
     AreaLight,
     DirectionalLight,
@@ -81,7 +82,7 @@ def parse_named(text: str) -> NamedLight:
     if not (name and equals):
         raise InputError(f"expected {usage}, found {text!r}")
     n = _numbers(rest, (1, 4), usage, text)
-    return _named(name, n[0], _xyz(n, 1) if len(n) > 1 else (1.0, 1.0, 1.0))
+    return named(name, n[0], _xyz(n, 1) if len(n) > 1 else (1.0, 1.0, 1.0))
 
 
 def with_falloff(lights: Sequence[Light], falloff: Falloff) -> list[Light]:
@@ -114,28 +115,10 @@ def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
 
 
 def _light(entry: dict[str, Any], folder: Path, falloff: Falloff) -> Light:
+    if entry["kind"] != "environment":
+        return light_of(entry, falloff)
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
-    if entry["kind"] == "environment":
-        return EnvironmentLight(_environment(folder / fields.pop("file")), **fields)
-    if entry["kind"] == "named":
-        return _named(**fields)
-    if entry["kind"] in ("point", "spot"):
-        fields.setdefault("falloff", falloff)
-    kinds: dict[str, Any] = {
-        "directional": DirectionalLight,
-        "point": PointLight,
-        "spot": SpotLight,
-        "sphere": SphereLight,
-        "area": AreaLight,
-    }
-    return kinds[entry["kind"]](**fields)
-
-
-def _named(name: str, intensity: float = 1.0, color: Triple = (1.0, 1.0, 1.0)) -> NamedLight:
-    if intensity < 0:
-        raise InputError(f"expected an intensity of at least 0 for the light {name!r}, found {intensity:g}")
-    red, green, blue = color
-    return NamedLight(name, (intensity * red, intensity * green, intensity * blue))
+    return EnvironmentLight(_environment(folder / fields.pop("file")), **fields)
 
 
 def _environment(path: Path) -> np.ndarray:

@@ -12,6 +12,8 @@ import typer
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.bake.given_reference import MOST_SAMPLES
+from srbf.cli.beside_cycles import compare, path_beside
 from srbf.cli.flags import flags_alone
 from srbf.cli.light_arguments import (
     parse_area,
@@ -26,7 +28,7 @@ from srbf.cli.light_arguments import (
     read_frames,
     with_falloff,
 )
-from srbf.cli.parameters import AssetFolder, Force
+from srbf.cli.parameters import AssetFolder, Blender, Force
 from srbf.cli.probe_arguments import read_places, write_places
 from srbf.cli.terminal import note, progress_bar
 from srbf.cli.values import POSITIVE, Number
@@ -43,6 +45,7 @@ from srbf.relighting import probe_light
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
+from srbf.relighting.scene_lights import lines_of, scene_lights
 from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
@@ -119,6 +122,10 @@ def relight(
         ),
     ] = None,
     lights: Annotated[Path | None, typer.Option(metavar="FRAMES.json", help="A folder of images, one a frame.", show_default=False)] = None,
+    own_lights: Annotated[
+        bool,
+        typer.Option("--scene-lights", help="The lights of the scene that a deep framebuffer was baked from, as they are set there."),
+    ] = False,
     fade: Annotated[
         float | None,
         typer.Option(
@@ -168,6 +175,18 @@ def relight(
             show_default=False,
         ),
     ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SHOT.blend",
+            help="Of a deep framebuffer: render the same lights by Cycles, too, into OUT_cycles.exr, and print the error and FLIP.",
+            show_default=False,
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(metavar="N", parser=Number(whole=True, low=1, high=MOST_SAMPLES), help="With --reference: of Cycles.")
+    ] = 64,
+    blender: Blender = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
     alpha: Annotated[
@@ -198,15 +217,19 @@ def relight(
     has_light = bool(placed or environment)
     if lights is not None and has_light:
         raise typer.BadParameter("expected --lights FRAMES.json or light flags, found both; put all lights into the file")
+    if own_lights and (has_light or lights is not None or ambient_only):
+        raise typer.BadParameter("expected --scene-lights without other lights, found both; leave one out")
     if ambient_only and (has_light or lights is not None):
         raise typer.BadParameter("expected --ambient-only without a light, found both; leave one out")
     if ambient_only and not ambient:
         raise typer.BadParameter("expected --ambient-only or --no-ambient, found both; leave one out")
-    if not (has_light or ambient_only or lights is not None):
+    if not (has_light or ambient_only or own_lights or lights is not None):
         raise typer.BadParameter(
-            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment "
-            "or --ambient-only"
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment, "
+            "--scene-lights or --ambient-only"
         )
+    if reference is not None and (lights is not None or at is not None or harmonics or not ambient):
+        raise typer.BadParameter("expected --reference without --lights, --at, --harmonics and --no-ambient, found both; leave one out")
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
     if fade is not None and (lights is None or renderer == "gl" or viewer is not None):
@@ -223,14 +246,19 @@ def relight(
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
     placed += map(read_environment, environment or [])
-    check_image_output(output, force)
+    for written in [output] if reference is None else [output, path_beside(output)]:
+        check_image_output(written, force)
     opened = _opened(asset, painted, ambient)
+    if own_lights:
+        placed += scene_lights(opened).values()
+        for line in lines_of(opened):
+            note(line)
     if emissive:
         _check_emissive(opened)
     places = None if at is None else read_places(at)
     if harmonics or places is not None:
         probe_light.grid_of(opened)
-    if falloff is None:
+    if falloff is None and not own_lights:
         placed = with_falloff(placed, domain_of_asset(opened.manifest).falloff)
     opacity = alpha_of(opened)
     for line in outside_domain(opened, placed):
@@ -249,6 +277,8 @@ def relight(
     else:
         write_image(output, with_alpha(image, opacity, alpha), "float")
     note(f"wrote {output}")
+    if reference is not None:
+        compare(opened, image, placed, reference, samples, output, blender, exposure)
 
 
 def _relight_frames(

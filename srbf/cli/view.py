@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from srbf.cli.parameters import Force
+from srbf.cli.parameters import Blender, Force
 from srbf.cli.terminal import note
 from srbf.cli.values import Number
 from srbf.errors import OutputExistsError
@@ -15,6 +15,7 @@ from srbf.io.files import write_text
 
 if TYPE_CHECKING:
     from srbf.viewer.contents import Content
+    from srbf.viewer.cycles import CyclesRenders
 
 PORT = Number(whole=True, low=0, high=65535)
 
@@ -38,6 +39,13 @@ def view(
             metavar="FOLDER", help="An asset of probes under the same lights: a white sphere to move among them.", show_default=False
         ),
     ] = None,
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="SHOT.blend", help="Of a deep framebuffer: the page may render its lights by Cycles in this scene.", show_default=False
+        ),
+    ] = None,
+    blender: Blender = None,
     port: Annotated[int, typer.Option(metavar="NUMBER", parser=PORT, help="On 127.0.0.1; 0: any that is free.")] = 0,
     save: Annotated[
         Path | None,
@@ -57,19 +65,27 @@ def view(
             f"expected an asset or more, and at most one capture, found {len(assets)} and {len(captures)}; name them again"
         )
     capture = captures[0] if captures else None
+    renders = None
+    if scene is not None:
+        if save is not None:
+            raise typer.BadParameter("expected --scene without --save, found both: one file has no server that renders")
+        from srbf.asset import Asset
+        from srbf.viewer.cycles import CyclesRenders
+
+        renders = CyclesRenders(Asset.open(assets[0]), scene, blender)
     if save is not None:
         _save(save, contents_of(assets, None, mesh, probes), capture, force)
         return
-    serve(contents_of(assets, capture, mesh, probes), port, browser)
+    serve(contents_of(assets, capture, mesh, probes, renders), port, browser, renders)
 
 
-def serve(contents: dict[str, Content], port: int = 0, browser: bool = True) -> None:
-    """Hand out `contents` until Ctrl-C, and open the page."""
+def serve(contents: dict[str, Content], port: int = 0, browser: bool = True, renders: CyclesRenders | None = None) -> None:
+    """Hand out `contents` until Ctrl-C, and open the page; `renders`: what it may ask Cycles for."""
     from threading import Thread
 
     from srbf.viewer.server import ViewerServer
 
-    server = ViewerServer(contents, port)
+    server = ViewerServer(contents, port, renders)
     try:
         typer.echo(server.url)
         if browser:

@@ -14,6 +14,8 @@ from srbf.capture import Capture
 from srbf.encode.dilation import dilate
 from srbf.light_domain import LightDomain
 
+OWN_LIGHTS = ("scene_lights", "scene_lights_left_out")  # keys of capture.json and asset.json
+
 
 def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dict[str, ndarray]:
     """The receivers' images that go along with an asset, dilated as its layers are."""
@@ -36,6 +38,7 @@ def common_manifest(
 ) -> dict[str, Any]:
     """The keys of asset.json that all methods write."""
     made = capture.manifest.get("source", {})
+    bake = {key: made["settings"][key] for key in ("scene", "keep_scene_lights") if made.get("settings", {}).get(key)}
     return {
         "format": "srbf-asset",
         "version": 1,
@@ -45,7 +48,7 @@ def common_manifest(
         "width": capture.width,
         "height": capture.height,
         **domain.manifest(),
-        **{key: capture.manifest[key] for key in ("receiver", "receivers") if key in capture.manifest},
+        **{key: capture.manifest[key] for key in ("receiver", "receivers", *OWN_LIGHTS) if key in capture.manifest},
         **{name: f"{name}.exr" for name in images},
         **_kept_apart(capture),
         "row_origin": "top",
@@ -54,6 +57,7 @@ def common_manifest(
         "source": {
             "srbf": srbf.__version__,
             **{key: made[key] for key in ("scene_sha256",) if key in made},
+            **({"bake": bake} if bake else {}),
             "settings": settings,
             "fit": {
                 "train_lights": len(capture.indices("train")),

@@ -15,6 +15,7 @@ from srbf.light_domain import domain_of_asset
 from srbf.methods import method_of
 from srbf.viewer import page_manifest
 from srbf.viewer.built_page import page_files
+from srbf.viewer.cycles import PLACE, CyclesRenders
 from srbf.viewer.measures import Measures
 from srbf.viewer.references import References
 from srbf.viewer.site import shown_mesh
@@ -33,9 +34,15 @@ def read(content: Content) -> bytes:
 
 
 def contents_of(
-    folders: Sequence[Path], capture: Path | None = None, mesh: Path | None = None, probes: Path | None = None
+    folders: Sequence[Path],
+    capture: Path | None = None,
+    mesh: Path | None = None,
+    probes: Path | None = None,
+    renders: CyclesRenders | None = None,
 ) -> dict[str, Content]:
     """All content that the page may request of the assets in `folders`; it shows the first one first, and a sphere lit by `probes`.
+
+    `renders`: what the page may ask Cycles for.
 
     InputError if they, or the capture, belong to different scenes, or the probes to other lights; also the errors of `Asset.open`,
     `Capture.open` and `page_files`.
@@ -59,6 +66,8 @@ def contents_of(
         notes.append("the page shows what surfaces reflect diffusely: `srbf relight` adds what gloss reflects")
     if any("behind_neighbors" in asset.tables for asset in assets):
         notes.append("the page shows translucent surfaces by what they reflect: `srbf relight` adds what they let through")
+    if renders is not None and renders.changed:
+        notes.append(renders.changed)
     shown = shown_mesh(assets[0], mesh, notes)
     probed = None if probes is None else _probes_beside(assets[0], Asset.open(probes), probes)
     measures = Measures(assets, references.capture if references else None)
@@ -90,7 +99,10 @@ def contents_of(
         CAPTURE if compared else None,
         tuple(notes),
         PROBES if probed else None,
+        None if renders is None else renders.facts(),
     )
+    if renders is not None:
+        contents |= {f"{PLACE}/status.json": renders.status, f"{PLACE}/image.exr": renders.image}
     contents[page_manifest.NAME] = json.dumps(page_facts).encode()
     return contents
 

@@ -23,9 +23,10 @@ def facts(
     capture: str | None = None,
     notes: tuple[str, ...] = (),
     probes: str | None = None,
+    cycles: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Of the first asset's receivers; `assets` as `described`; `capture`: where the page finds lights.json, as it would follow a link;
-    `probes`: the folder of an asset of probes."""
+    `probes`: the folder of an asset of probes; `cycles`: `CyclesRenders.facts`."""
     view = asset.receiver_kind == "view"
     camera = fitted_camera(asset) if view else None
     return {
@@ -35,6 +36,7 @@ def facts(
         "mesh": MESH if mesh else None,
         "capture": capture,
         "probes": probes,
+        "cycles": cycles,
         "camera": None
         if camera is None
         else {"position": camera.position.tolist(), "rotation": camera.rotation.tolist(), "lens": camera.lens.tolist()},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -10,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 from srbf.errors import InputError, SrbfError
 from srbf.viewer.contents import Content, read
+from srbf.viewer.cycles import MOST_BYTES, PLACE, CyclesRenders
 
 HOST = "127.0.0.1"
 TYPES = {
@@ -34,17 +36,27 @@ HEADERS = {
 
 
 class ViewerServer(ThreadingHTTPServer):
-    """Serves `contents`: name to bytes, a file, or a function that makes the bytes. Requests for other hosts are refused."""
+    """Serves `contents`: name to bytes, a file, or a function that makes the bytes. Requests for other hosts are refused.
+
+    POST and DELETE of `cycles` begin and end a render, if there are any: of this page's own origin alone.
+    """
 
     daemon_threads = True
 
-    def __init__(self, contents: dict[str, Content], port: int = 0) -> None:
-        """InputError if the port is not available."""
+    def __init__(self, contents: dict[str, Content], port: int = 0, renders: CyclesRenders | None = None) -> None:
+        """`renders`: what the page may start and stop. InputError if the port is not available."""
         try:
+            self.renders = renders
             super().__init__((HOST, port), _Handler)
         except (OSError, OverflowError) as error:
             raise InputError(f"expected a free port, found {port} unavailable ({error}); choose another `port`, or 0") from error
         self.contents = contents
+
+    def server_close(self) -> None:
+        """No render outlives the server."""
+        if self.renders is not None:
+            self.renders.stop()
+        super().server_close()
 
     @property
     def url(self) -> str:
@@ -65,6 +77,33 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_HEAD(self) -> None:
         self._response(body=False)
+
+    def do_POST(self) -> None:
+        self._action(start=True)
+
+    def do_DELETE(self) -> None:
+        self._action(start=False)
+
+    def _action(self, start: bool) -> None:
+        """Begin or end a render. The browser of a page elsewhere would ask first whether it may send JSON, and get no leave."""
+        port, renders = self.server.server_port, self.server.renders
+        self.close_connection = True  # the body may be unread
+        hosts = (f"{HOST}:{port}", f"localhost:{port}")
+        if renders is None:
+            return self._send(HTTPStatus.NOT_IMPLEMENTED, b"expected srbf view with --scene\n", ".txt", True)
+        if self.headers.get("Host") not in hosts or self.headers.get("Origin") not in [f"http://{host}" for host in hosts]:
+            return self._send(HTTPStatus.FORBIDDEN, b"expected a request of this page's own\n", ".txt", True)
+        if self.path != f"/{PLACE}":
+            return self._send(HTTPStatus.NOT_FOUND, b"expected the place of renders\n", ".txt", True)
+        if not start:
+            status, told = renders.stop()
+        else:
+            length = self.headers.get("Content-Length", "")
+            size = int(length) if length.isdecimal() else -1
+            if self.headers.get("Content-Type") != "application/json" or not 0 < size <= MOST_BYTES:
+                return self._send(HTTPStatus.BAD_REQUEST, b"expected JSON of a megabyte or less\n", ".txt", True)
+            status, told = renders.start(self.rfile.read(size))
+        return self._send(status, json.dumps(told).encode(), ".json", True)
 
     def _response(self, body: bool) -> None:
         if self.headers.get("Host") not in (f"{HOST}:{self.server.server_port}", f"localhost:{self.server.server_port}"):

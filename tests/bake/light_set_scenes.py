@@ -119,6 +119,38 @@ def unlit() -> None:
     walls()
 
 
+def designed() -> None:
+    """The room under a light of every kind, none of them simple: a spot with a blend in nodes, a turned panel, a disk, a sun; and others
+    that have no counterpart."""
+    walls()
+    bpy.data.objects.remove(bpy.data.objects["Walls"])
+    places = corners_of((0, 0, 0), (3, 2, 2))
+    mesh("Walls", places, [FACES[name] for name in ("West", "North", "South")], gray())  # a sun shines in from the east and above
+    light("Bulb", "POINT", (0.6, 1.4, 1.2), 14, color=(1, 0.8, 0.5), shadow_soft_size=0)
+    light("Globe", "POINT", (2.2, 0.5, 1.4), 9, color=(0.5, 0.8, 1), shadow_soft_size=0.08, use_soft_falloff=False)
+    spot = light("Spot", "SPOT", (1.4, 1.6, 1.8), 20, exposure=1, spot_size=1.1, spot_blend=0.4, shadow_soft_size=0)
+    spot.rotation_euler = (-0.35, 0.2, 0)
+    spot.data.use_nodes = True
+    emission = next(node for node in spot.data.node_tree.nodes if node.type == "EMISSION")
+    emission.inputs["Strength"].default_value, emission.inputs["Color"].default_value = 1.5, (0.4, 1, 0.4, 1)
+    panel = light("Panel", "AREA", (0.4, 0.6, 1.5), 7, shape="RECTANGLE", size=0.4, size_y=0.6)
+    panel.rotation_euler, panel.scale = (0.2, 0.5, 0.3), (0.5, 1, 1)
+    disk = light("Disk", "AREA", (2.2, 1.2, 1.6), 5, shape="DISK", size=0.3)
+    disk.rotation_euler = (-0.6, 0, 0)
+    sun = light("Sun", "SUN", (0, 0, 5), 1.2, color=(1, 0.9, 0.7), angle=0.02)
+    sun.rotation_euler = (0.25, 0.6, 0)
+    light("Off", "POINT", (1, 1, 1), 0)
+    light("Hidden", "POINT", (1, 1, 1), 10).hide_render = True
+    light("Portal", "AREA", (1, 1, 3), 10).data.cycles.is_portal = True
+    light("Narrow", "AREA", (1, 1, 1.9), 0.001, spread=0.5)
+    profile = light("Profile", "POINT", (1, 1, 1), 0.001)
+    profile.data.use_nodes = True
+    nodes = profile.data.node_tree.nodes
+    shader = next(node for node in nodes if node.type == "EMISSION")
+    profile.data.node_tree.links.new(nodes.new("ShaderNodeTexIES").outputs["Fac"], shader.inputs["Strength"])
+    light("Shadowless", "POINT", (1, 1, 1), 0.001, use_shadow=False)
+
+
 def removed() -> None:
     """The room without one of its lights."""
     room()
@@ -191,7 +223,8 @@ def white_world() -> None:
 
 
 SCENES: dict[str, Callable[[], None]] = {
-    scene.__name__: scene for scene in (room, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
+    scene.__name__: scene
+    for scene in (room, designed, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
 }
 
 if __name__ == "__main__":

@@ -255,8 +255,8 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
         (["--exposure", "bright"], "--exposure: expected a number from -100 to 100, found 'bright'"),
         (
             [],
-            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment "
-            "or --ambient-only",
+            "expected a light, found none; add --directional, --point, --spot, --sphere, --area, --light, --emissive, --environment, "
+            "--scene-lights or --ambient-only",
         ),
         (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
         (["--ambient-only", "--no-ambient"], "expected --ambient-only or --no-ambient"),

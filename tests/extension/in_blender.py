@@ -192,6 +192,77 @@ def bake(case: dict) -> dict:
     }
 
 
+def light_shot(case: dict) -> dict:
+    """Press Light This Shot with `case.host` in the library's place, and listen until the page's server runs."""
+    from blender_extension import process
+
+    if "host" in case:
+        process.HOST = Path(case["host"])
+    if "scene" in case:
+        bpy.ops.wm.open_mainfile(filepath=case["scene"])
+    scene = bpy.context.scene
+    scene.srbf.folder, scene.srbf.shot_size = case["folder"], 24
+    if "scene" not in case:
+        refused = not bpy.ops.srbf.light_shot.poll()
+        scene.camera = bpy.data.objects.new("Shot: 1", bpy.data.cameras.new("Lens"))
+        scene.collection.objects.link(scene.camera)
+    else:
+        refused = True
+    results = [sorted(bpy.ops.srbf.light_shot())]
+    deadline, page, told = time.monotonic() + 50, None, ""
+    while time.monotonic() < deadline and (page is None or not told) and not (running.job() is None and running.last() and page is None):
+        running.listen()
+        page = running.page()
+        log = folder_of_page(case) / "page.progress"
+        told = log.read_text() if page is not None and log.is_file() else ""
+        time.sleep(0.05)
+    found = {"results": results, "refused": refused, "last": running.last(), "page": page is not None, "told": told}
+    running.close_page()
+    return found
+
+
+def folder_of_page(case: dict) -> Path:
+    from blender_extension import shot
+
+    return shot.folder_of(bpy.context.scene)
+
+
+def take_lights(case: dict) -> dict:
+    """Lights of every kind, set by the file `case.rig`; their values before, after, and after undo."""
+    for name, kind in (
+        ("Key", "POINT"),
+        ("Globe", "POINT"),
+        ("Spot", "SPOT"),
+        ("Panel", "AREA"),
+        ("Disk", "AREA"),
+        ("Sun", "SUN"),
+        ("Fill", "POINT"),
+    ):
+        point_light(kind, name, 7, [1, 1, 1], [0, 0, 3])
+    bpy.data.objects["Globe"].data = bpy.data.objects["Key"].data  # shared
+    bpy.data.objects["Disk"].data.shape = "DISK"
+    bpy.data.objects["Spot"].data.exposure = 2
+    bpy.data.objects["Panel"].scale = (2, 3, 1)
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+
+    def told() -> dict:
+        bpy.context.view_layer.update()
+        names = ("energy", "color", "shadow_soft_size", "spot_size", "spot_blend", "shape", "size", "size_y", "exposure")
+        values = {}
+        for obj in bpy.data.objects:
+            own = {name: getattr(obj.data, name) for name in names if hasattr(obj.data, name)}
+            own = {name: list(value) if name == "color" else value for name, value in own.items()}
+            values[obj.name] = {**own, "matrix": [list(row) for row in obj.matrix_world], "hidden": obj.hide_render}
+        return values
+
+    before = told()
+    result = bpy.ops.srbf.take_lights("EXEC_DEFAULT", True, filepath=case["rig"])
+    after = told()
+    bpy.ops.ed.undo()
+    return {"before": before, "after": after, "undone": told(), "result": sorted(result)}
+
+
 def command(case: dict) -> dict:
     """`srbf` as Blender's command, with the file at case.scene open."""
     from blender_extension import command

@@ -52,6 +52,9 @@ export interface Manifest {
   /** The .glb of what casts, of indirect assets. */
   scene?: string;
   direct?: { sun_angle?: number; footprint?: number };
+  /** The scene's own lights, as FRAMES.json writes lights, and those that it has no light for. */
+  scene_lights?: { name: string; light: Record<string, unknown>; note?: string }[];
+  scene_lights_left_out?: { name: string; reason: string }[];
   asset_from_world?: Matrix4;
   sha256?: Record<string, string>;
   /** How the asset was made. Nothing depends on it but `receiverKind`, for assets that lack the key `receiver`. */

@@ -1,7 +1,9 @@
 /** Which lights an asset can be relit by, and where those inside its scene may be. */
 import { type Asset, lightDomainOf, type Triple } from "../src";
 import { ends, heat } from "./direction_widget";
-import { isPlaced, type LightState, namedState, type PlacedState, pointState } from "./light_state";
+import { isPlaced, type LightState, linearColor, namedState, type PlacedState, pointState } from "./light_state";
+import { stateOf } from "./keyframes";
+import { MOST_LIGHTS } from "./state";
 import type { BakedLight } from "./reference";
 import type { Bounds } from "./receivers";
 
@@ -16,14 +18,40 @@ export const inside = ({ manifest }: Asset): boolean => ["cloud", "surfels", "po
 
 /** Kinds of lights that one can add. */
 export function kindsOf(asset: Asset): readonly AddedKind[] {
+  if (asset.tables.gather) return ["point", "spot", "sphere", "area", "directional"];
   if (inside(asset)) return ["point", "spot", "sphere", "area"];
   return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
 }
+
+/** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
+export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square"), name }) as LightState);
+
+/** The scene's own lights as asset.json has them. */
+export type Designed = readonly { name: string; light: Record<string, unknown> }[];
+
+/** The linear color of a light: that of asset.json where it is as designed, since the page rounds colors to bytes. */
+export function exactColor(light: LightState, designed: Designed): Triple {
+  const own = light.name === undefined || light.kind === "named" ? undefined : designed.find(({ name }) => name === light.name);
+  const before = own && stateOf(own.light, own.name, "inverse-square");
+  return own && before?.color === light.color && before.intensity === light.intensity ? (own.light.color as Triple) : linearColor(light);
+}
+
+/** What the page does not show of the scene's lights, in one line; empty where it shows all of them. */
+export function missingLine({ manifest }: Asset): string {
+  const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
+  const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
+  return [beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "", left.length ? `lights left out: ${left.join(", ")}` : ""].filter(Boolean).join("; ");
+}
+
+/** Lights as designed, in place of those of the scene; of the others as many stay as there is room for. */
+export const redesigned = (asset: Asset, lights: readonly LightState[]): LightState[] => [...designedLights(asset), ...lights.filter(({ name }) => name === undefined)].slice(0, MOST_LIGHTS);
 
 /** The scene's own lights, or one inside it; undefined: a sun. */
 export function firstLights(asset: Asset, { center, radius }: Bounds): LightState[] | undefined {
   const { names } = asset.tables;
   if (names) return names.map(namedState);
+  const designed = designedLights(asset).slice(0, MOST_LIGHTS);
+  if (designed.length) return designed;
   return inside(asset) ? [pointState(middleOf(asset) ?? [center[0], center[1], center[2] + 0.5 * radius], REACH * radius)] : undefined;
 }
 

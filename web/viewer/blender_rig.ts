@@ -2,18 +2,25 @@
 import type { Triple } from "../src";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
-import { aim, levelSides, type LightState, linearColor, shiningOf, sides } from "./light_state";
+import { type Designed, exactColor } from "./asset_lights";
+import { aim, levelSides, type LightState, shiningOf, sides } from "./light_state";
 
 const TYPES = { directional: "SUN", point: "POINT", sphere: "POINT", spot: "SPOT", area: "AREA" } as const;
 
-/** The text of the script; environments and the scene's own lights, which Blender has already, are left out. */
-export function blenderRig(lights: readonly LightState[]): string {
+/**
+ * The text of the script; environments and named lights are left out. A light with a name sets the scene's light of that name where there is one; all others are made.
+ * `designed`: the scene's own lights; those that the page no longer has are hidden.
+ */
+export function blenderRig(lights: readonly LightState[], designed: Designed = []): string {
   const shining = new Set(shiningOf(lights));
   const told = lights.flatMap((light, i) => {
     if (light.kind === "environment" || light.kind === "named") return [];
-    return [{ name: `srbf ${light.kind} ${i + 1}`, type: TYPES[light.kind], ...colored(linearColor(light), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
+    const name = light.name ?? `srbf ${light.kind} ${i + 1}`;
+    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
   });
-  return `"""Lights of srbf view. In Blender: Scripting, Open, Run; or blender SCENE.blend --python lights.py. Run again, it replaces its lights."""
+  const kept = new Set(lights.map(({ name }) => name));
+  const removed = designed.flatMap(({ name }) => (kept.has(name) ? [] : [name]));
+  return `"""Lights of srbf view. In Blender: Scripting, Open, Run; or blender SCENE.blend --python lights.py. Lights of the scene are set, the others made; run again, it replaces those that it made."""
 
 import json
 
@@ -23,7 +30,9 @@ from mathutils import Matrix
 LIGHTS = json.loads(r"""
 ${JSON.stringify(told, undefined, 1)}
 """)
+REMOVED = json.loads(r"""${JSON.stringify(removed)}""")
 COLLECTION = "srbf lights"
+ROUND = 0.8862269254527579  # side of a square of the area of a disk of diameter 1
 
 collection = bpy.data.collections.get(COLLECTION)
 if collection is None:
@@ -31,14 +40,57 @@ if collection is None:
     bpy.context.scene.collection.children.link(collection)
 for old in list(collection.objects):
     bpy.data.objects.remove(old)
-for told in LIGHTS:
-    data = bpy.data.lights.new(told["name"], told["type"])
-    data.energy, data.color = told["energy"], told["color"]
-    for name, value in told["settings"].items():
-        setattr(data, name, value)
-    light = bpy.data.objects.new(told["name"], data)
-    light.matrix_world = Matrix(told["matrix"])
+
+
+def own(name, kind):
+    """The scene's light of that name, its data shared with no other; None where there is none of that kind."""
+    light = bpy.context.scene.objects.get(name)
+    if light is None or light.type != "LIGHT" or light.data.type != kind or light.library or light.data.library:
+        return None
+    if light.data.users > 1:
+        light.data = light.data.copy()
+    return light
+
+
+def set_own(light, told):
+    """Set what the page shows of a light: its angle, a spot's size and a disk's shape stay."""
+    data, settings = light.data, dict(told["settings"])
+    data.use_nodes = False
+    for name, plain in (("exposure", 0), ("use_temperature", False), ("normalize", True)):
+        if hasattr(data, name):
+            setattr(data, name, plain)
+    if data.type in {"SPOT", "SUN"}:
+        settings.pop("shadow_soft_size", None)
+        settings.pop("angle", None)
+    if data.type == "AREA" and data.shape in {"DISK", "ELLIPSE"}:
+        data.shape = "ELLIPSE" if data.shape == "ELLIPSE" or abs(settings["size"] - settings["size_y"]) > 1e-5 else "DISK"
+        settings = {"size": settings["size"] / ROUND, "size_y": settings["size_y"] / ROUND}
+    fill(light, told, settings)
+
+
+def fill(light, told, settings):
+    light.data.energy, light.data.color = told["energy"], told["color"]
+    for name, value in settings.items():
+        setattr(light.data, name, value)
+    place = Matrix(told["matrix"])
+    if light.data.type == "SUN":  # it may stand anywhere
+        place.translation = light.matrix_world.translation
+    light.matrix_world = place
     light.hide_render = light.hide_viewport = told["hidden"]
+
+
+for name in REMOVED:
+    light = bpy.context.scene.objects.get(name)
+    if light is not None and light.type == "LIGHT":
+        light.hide_render = light.hide_viewport = True
+for told in LIGHTS:
+    light = own(told["name"], told["type"]) if told["own"] else None
+    if light is not None:
+        set_own(light, told)
+        continue
+    data = bpy.data.lights.new(told["name"], told["type"])
+    light = bpy.data.objects.new(told["name"], data)
+    fill(light, told, told["settings"])
     collection.objects.link(light)
 `;
 }

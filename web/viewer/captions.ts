@@ -1,6 +1,7 @@
 /** Text beside the picture: title, status, the selected light's direction, and the legend of false colors. */
 import type { Light, Triple } from "../src";
 import type { Comparison } from "./comparison";
+import type { CyclesTold } from "./cycles";
 import type { Facts } from "./loading";
 import type { COLORS } from "./screen";
 import type { State } from "./state";
@@ -17,8 +18,8 @@ export function titles(place: HTMLElement, facts: Facts, { asset }: Subject): vo
   place.replaceChildren(name, line);
 }
 
-/** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks. */
-export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number): void {
+/** Frame time (`pace`, ms, once it is known), memory, what is compared, and which light the picture lacks; `missing`: lights of the scene that are not shown. */
+export function statusLine(place: HTMLElement, subject: Subject, comparison: Comparison, shining: readonly Light[], { terms }: State, pace?: number, missing = "", cycles?: CyclesTold): void {
   const { asset, facts, hasDirect } = subject;
   const { compared, error } = comparison;
   const parts = [
@@ -26,11 +27,18 @@ export function statusLine(place: HTMLElement, subject: Subject, comparison: Com
     `<b>${(facts.resident_bytes / 2 ** 20).toFixed(1)}</b> MiB of asset on the GPU, <b>${facts.bytes_per_texel}</b> bytes per texel`,
   ];
   if (compared >= 0) parts.push(`baked light <b>${compared}</b> (${comparison.role})${error ? `, rmse <b>${error}</b>` : ""}`);
+  if (cycles?.line) parts.push(cycles.line);
+  if (cycles?.isOld) parts.push("lights have changed since: render again");
+  else if (cycles?.error) parts.push(`relative rmse <b>${(100 * cycles.error.relative).toPrecision(3)} %</b>, psnr <b>${cycles.error.psnr.toFixed(1)}</b> dB, page <b>${cycles.relitIn.toFixed(0)}</b> ms`);
   if (asset.manifest.transport === "indirect") {
     if (!hasDirect || compared >= 0 || terms === "indirect") parts.push("indirect light only");
     else if (shining.some((light) => light.kind === "environment")) parts.push("environments: indirect light only");
   }
   place.innerHTML = parts.map((part) => `<span>${part}</span>`).join("");
+  if (!missing) return;
+  const told = document.createElement("span"); // names are the scene's: text, not markup
+  told.textContent = missing;
+  place.append(told);
 }
 
 /** A directional light's azimuth and elevation; `inside`: whether it lies in the captured domain. */

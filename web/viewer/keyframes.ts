@@ -69,7 +69,8 @@ export class Keyframes {
   }
 }
 
-function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square"): LightState {
+/** The state of a light of FRAMES.json. @throws SrbfError that names `where`. */
+export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square"): LightState {
   const bad = (expected: string, found: unknown): never => {
     throw new SrbfError(`expected ${expected} in ${where}, found ${JSON.stringify(found) ?? "none"}`);
   };
@@ -87,7 +88,8 @@ function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square"
   if (color.some((x) => x < 0)) bad("colors of 0 or more", color);
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
   if (intensity < 0) bad("an intensity of 0 or more", intensity);
-  const common = { on: true, ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
+  const own = typeof entry.name === "string" && entry.kind !== "named" ? { name: entry.name } : {};
+  const common = { on: true, ...own, ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
   if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")) };
   if (entry.kind === "area") return areaOf(triple("position"), triple("u"), triple("v"), round(number("a0", 1)), common);

@@ -14,6 +14,8 @@ interface Common {
   solo?: boolean;
   /** The temperature that gave the color, K. */
   kelvin?: number;
+  /** Which of the scene's lights it is. */
+  name?: string;
 }
 
 interface PointLight extends Common {
@@ -198,6 +200,7 @@ export function checkLight(value: unknown): LightState {
   if (typeof light.color !== "string" || !/^#[0-9a-f]{6}$/.test(light.color)) bad("#rrggbb of color");
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
   if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
+  if (light.name !== undefined && (typeof light.name !== "string" || light.name === "")) bad("a text of name");
   if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
   if (light.kind === "directional") triple("direction");
   else if (light.kind === "environment") {

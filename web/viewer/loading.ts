@@ -5,6 +5,7 @@ import { type Asset, type FloatImage, lightDomainOf, loadAsset, SrbfError } from
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { insidePath } from "../src/manifest";
+import type { CyclesFacts } from "./cycles";
 import type { DirectInputs } from "./direct_light";
 import type { FittedCamera } from "./frames";
 import { References } from "./reference";
@@ -29,6 +30,8 @@ export interface Facts {
   /** Folder of an asset of probes. */
   probes: string | null;
   camera: FittedCamera | null;
+  /** Where the page may ask for renders. */
+  cycles?: CyclesFacts | null;
   notes: string[];
 }
 

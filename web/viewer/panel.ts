@@ -1,7 +1,7 @@
 /** The controls beside the picture: a chip per light, and folders of settings. */
 import { GUI } from "three/addons/libs/lil-gui.module.min.js";
 import type { Triple } from "../src";
-import { areaState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
+import { areaState, type DirectionalState, directionalState, isAimed, isPlaced, type LightState, type PlacedState, pointState, rounded, shiningOf, sphereState, spotState } from "./light_state";
 import type { AddedKind } from "./asset_lights";
 import type { Box } from "./ball_state";
 import type { Bounds } from "./receivers";
@@ -16,6 +16,11 @@ export interface Actions {
   savePng(): void;
   saveFrames(): void;
   saveRig(): void;
+  /** Let Cycles render the lights of now, and end that. */
+  renderReference(): void;
+  stopReference(): void;
+  /** Set the scene's lights as they were designed. */
+  redesign(): void;
   undo(): void;
   redo(): void;
   loadFrames(): void;
@@ -42,6 +47,12 @@ export interface PanelFacts {
   /** Whether its lights are the scene's own, by name. */
   named: boolean;
   hasFrames: boolean;
+  /** Whether the asset lists lights of its scene, which can be set again as they were designed. */
+  designed: boolean;
+  /** Renders by Cycles, where the page may ask for them, and whether one can be compared with. */
+  cycles?: { samples: number; rendering: boolean };
+  /** Whether a disc shows where directional lights are. */
+  hasDisc: boolean;
   /** Objects that can emit, and whether they can be repainted. */
   objects: readonly string[];
   paintable: boolean;
@@ -84,13 +95,14 @@ export class Panel {
     this.gui = new GUI({ container: this.controls, title: "", autoPlace: false });
     this.lights();
     if (!this.facts.named) this.light();
+    if (this.facts.designed) this.gui.add(this.actions, "redesign").name("As designed");
     this.gui.add(this.actions, "undo").name("Undo");
     this.gui.add(this.actions, "redo").name("Redo");
     const { objects, paintable } = this.facts;
     if (objects.length) surfaceControls(this.gui, this.state, objects, paintable, this.actions.changed);
     if (this.facts.room) this.ball(this.facts.room);
     this.picture();
-    if (this.facts.hasCapture) this.compare();
+    if (this.facts.hasCapture || this.facts.cycles) this.compare();
     this.path();
     this.save();
     this.gui.folders.forEach((folder) => folder.open(this.open.get(folder._title) ?? folder._title !== "Path"));
@@ -118,19 +130,20 @@ export class Panel {
   private drawChips(always = false): void {
     const { lights, selected } = this.state;
     const shining = new Set(shiningOf(lights));
-    const drawn = JSON.stringify([selected, lights.map((light) => [light.kind, light.color, light.solo, shining.has(light)])]);
+    const drawn = JSON.stringify([selected, lights.map((light) => [light.kind, light.color, light.name, light.solo, shining.has(light)])]);
     if (!always && drawn === this.drawn) return; // replaced elements lose their focus
     this.drawn = drawn;
     const numbers = new Map<string, number>();
     const chips = lights.map((light, i) => {
       const number = (numbers.get(light.kind) ?? 0) + 1;
-      numbers.set(light.kind, number);
+      if (light.name === undefined) numbers.set(light.kind, number);
       const chip = document.createElement("button");
       chip.className = `chip${i === selected ? " selected" : ""}${shining.has(light) ? "" : " off"}${light.solo ? " solo" : ""}`;
       chip.dataset.kind = light.kind;
       const dot = document.createElement("i");
       dot.style.background = light.color;
-      chip.append(dot, `${KINDS[light.kind as keyof typeof KINDS]}${lights.filter((other) => other.kind === light.kind).length > 1 ? ` ${number}` : ""}`);
+      const many = lights.filter((other) => other.kind === light.kind && other.name === undefined).length > 1;
+      chip.append(dot, light.name ?? `${KINDS[light.kind as keyof typeof KINDS]}${many ? ` ${number}` : ""}`);
       chip.setAttribute("aria-pressed", String(i === selected));
       chip.onclick = () => {
         this.state.selected = i;
@@ -182,9 +195,10 @@ export class Panel {
         this.relight();
       });
     if (light.kind !== "environment") this.temperature(folder, light);
-    folder.add(light, "intensity", 0, 10, 0.01).name("Intensity").onChange(this.relight);
+    folder.add(light, "intensity", 0, Math.max(10, 4 * light.intensity), 0.01).name("Intensity").onChange(this.relight);
     if (light.kind === "environment") folder.add(light, "file").name("File").disable();
     if (isPlaced(light)) this.placed(folder, light);
+    if (light.kind === "directional" && !this.facts.hasDisc) this.turned(folder, light);
     const remove = {
       remove: () => {
         this.state.lights.splice(this.state.selected, 1);
@@ -218,6 +232,35 @@ export class Panel {
       },
     };
     folder.add(proxy, "kelvin", COLDEST, HOTTEST, 50).name("Temperature (K)").onChange(this.relight);
+  }
+
+  /** Where a directional light is, in degrees, where no disc shows it. */
+  private turned(folder: GUI, light: DirectionalState): void {
+    const degrees = 180 / Math.PI;
+    const angles = () => {
+      const [x, y, z] = light.direction;
+      return [Math.atan2(y, x) * degrees, Math.asin(Math.min(1, Math.max(-1, z / Math.hypot(x, y, z)))) * degrees];
+    };
+    const turn = (azimuth: number, elevation: number) => {
+      const level = Math.cos(elevation / degrees);
+      light.direction = rounded([level * Math.cos(azimuth / degrees), level * Math.sin(azimuth / degrees), Math.sin(elevation / degrees)]);
+    };
+    const proxy = {
+      get azimuth() {
+        return angles()[0];
+      },
+      set azimuth(value: number) {
+        turn(value, angles()[1]);
+      },
+      get elevation() {
+        return angles()[1];
+      },
+      set elevation(value: number) {
+        turn(angles()[0], value);
+      },
+    };
+    folder.add(proxy, "azimuth", -180, 180, 0.1).name("Azimuth (°)").onChange(this.relight);
+    folder.add(proxy, "elevation", -89.9, 89.9, 0.1).name("Elevation (°)").onChange(this.relight);
   }
 
   private placed(folder: GUI, light: PlacedState): void {
@@ -320,8 +363,14 @@ export class Panel {
   private compare(): void {
     const folder = (this.gui as GUI).addFolder("Compare");
     const names = { Off: COMPARES[0], "Slider: reference | relit": COMPARES[1], Difference: COMPARES[2], Reference: COMPARES[3] };
-    folder.add(this.state, "compare", names).name("With the capture").onChange(this.relight);
-    folder.add(this.state, "errors").name("Error of each light").onChange(this.redraw);
+    const { cycles, hasCapture } = this.facts;
+    if (cycles) {
+      folder.add(cycles, "samples", 1, 4096, 1).name("Samples");
+      if (cycles.rendering) folder.add(this.actions, "stopReference").name("Stop the render");
+      else folder.add(this.actions, "renderReference").name("Render with Cycles");
+    }
+    folder.add(this.state, "compare", names).name(cycles ? "With the render" : "With the capture").onChange(this.relight);
+    if (hasCapture) folder.add(this.state, "errors").name("Error of each light").onChange(this.redraw);
   }
 
   private path(): void {

@@ -1,7 +1,9 @@
 /** Files that the page saves: a PNG, FRAMES.json for `srbf relight --lights`, and a script for Blender. */
 import { encode } from "fast-png";
 import { blenderRig } from "./blender_rig";
-import { aim, type LightState, linearColor, shiningOf, sides } from "./light_state";
+import type { Triple } from "../src";
+import { type Designed, exactColor } from "./asset_lights";
+import { aim, type LightState, shiningOf, sides } from "./light_state";
 
 /** RGBA where anything is transparent, RGB otherwise. */
 export function savePng(name: string, image: { width: number; height: number; data: Uint8Array }): void {
@@ -11,19 +13,33 @@ export function savePng(name: string, image: { width: number; height: number; da
   download(name, new Blob([encode({ width, height, channels, data }) as BlobPart], { type: "image/png" }));
 }
 
-export function saveFrames(name: string, frames: readonly (readonly LightState[])[]): void {
-  const json = { frames: frames.map((lights) => ({ lights: shiningOf(lights).map(entry) })) };
+/** `designed`: the scene's own lights, whose colors are exact where they are as designed. Of a frame, `off` names those that do not shine. */
+export function saveFrames(name: string, frames: readonly (readonly LightState[])[], designed: Designed = []): void {
+  const json = { frames: frames.map((lights) => frameOf(lights, designed)) };
   download(name, new Blob([`${JSON.stringify(json, undefined, 1)}\n`], { type: "application/json" }));
 }
 
-/** A script that makes the lights in Blender. */
-export function saveRig(name: string, lights: readonly LightState[]): void {
-  download(name, new Blob([blenderRig(lights)], { type: "text/x-python" }));
+/** A script that makes the lights in Blender, or sets those that the scene has. */
+export function saveRig(name: string, lights: readonly LightState[], designed: Designed = []): void {
+  download(name, new Blob([blenderRig(lights, designed)], { type: "text/x-python" }));
 }
 
+/** A frame of FRAMES.json. */
+export function frameOf(lights: readonly LightState[], designed: Designed = []): { lights: Record<string, unknown>[]; off?: string[] } {
+  const shining = new Set(shiningOf(lights));
+  const shown = new Set([...shining].map(({ name }) => name));
+  const known = [...designed.map(({ name }) => name), ...lights.map((light) => (light.kind === "named" ? undefined : light.name))];
+  const off = [...new Set(known.filter((one): one is string => one !== undefined && !shown.has(one)))];
+  return { lights: [...shining].map((light) => entry(light, designed)), ...(off.length ? { off } : {}) };
+}
+
+
 /** A light as srbf/schemas/frames.schema.json has it; an environment's file must lie beside FRAMES.json. */
-function entry(light: LightState): Record<string, unknown> {
-  const color = linearColor(light);
+function entry(light: LightState, designed: Designed): Record<string, unknown> {
+  return { ...values(light, exactColor(light, designed)), ...(light.name === undefined ? {} : { name: light.name }) };
+}
+
+function values(light: LightState, color: Triple): Record<string, unknown> {
   if (light.kind === "directional") return { kind: "directional", direction: light.direction, color };
   if (light.kind === "environment") return { kind: "environment", file: light.file, color };
   if (light.kind === "named") return { kind: "named", name: light.name, color };

@@ -1,21 +1,23 @@
 /** The page: its state, lights, picture, comparison, and what it saves. */
 import { NoToneMapping, WebGLRenderer } from "three";
-import { type Asset, type Light, lightDomainOf, SrbfError, type Triple } from "../src";
+import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, outsideLine } from "./asset_lights";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesigned } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
 import { bearing, legend, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
-import { type Environment, readEnvironment } from "./environment_file";
+import { Cycles } from "./cycles";
+import { droppedEnvironment, droppedFrames } from "./dropped";
+import type { Environment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
-import { type DirectionalState, environmentState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
+import { type DirectionalState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
 import { listen, tabled } from "./keys";
-import { Keyframes, readFrames } from "./keyframes";
+import type { Keyframes } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
 import { mapRange, showMap } from "./map_range";
 import { Measures } from "./measures";
@@ -52,6 +54,7 @@ export class Viewer {
   private readonly panel: Panel;
   private readonly copy: Copy;
   private readonly comparison: Comparison;
+  private readonly cycles?: Cycles;
   private readonly ball?: Ball;
   private keyframes?: Keyframes;
   private outside = "";
@@ -95,6 +98,7 @@ export class Viewer {
       changed: () => this.changed({ lights: true }),
       measured: () => this.status(),
     });
+    if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { wait: () => this.wait(), done: () => this.done(), shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
@@ -115,8 +119,15 @@ export class Viewer {
         savePng(`${facts.title}.png`, this.stage.pixels(this.shining));
         changed();
       },
-      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]]),
-      saveRig: () => saveRig("lights.py", this.state.lights),
+      saveFrames: () => saveFrames("FRAMES.json", [[...this.state.lights, ...emittingStates(this.subject.asset, this.state.surfaces)]], this.subject.asset.manifest.scene_lights),
+      saveRig: () => saveRig("lights.py", this.state.lights, this.subject.asset.manifest.scene_lights),
+      renderReference: () => void this.cycles?.render(this.state.lights),
+      stopReference: () => this.cycles?.stop(),
+      redesign: () => {
+        this.state.lights = redesigned(this.subject.asset, this.state.lights);
+        this.state.selected = Math.min(Math.max(this.state.selected, 0), this.state.lights.length - 1);
+        changed({ lights: true, panel: true });
+      },
       undo: () => this.step(this.history.undo()),
       redo: () => this.step(this.history.redo()),
       loadFrames: () => pickFile(".json", (file) => void this.frames(file)),
@@ -166,6 +177,9 @@ export class Viewer {
       bounds: this.receivers.bounds,
       named: this.named,
       hasFrames: this.keyframes !== undefined,
+      cycles: this.cycles,
+      designed: (this.subject.asset.manifest.scene_lights ?? []).length > 0,
+      hasDisc: lightDomainOf(this.subject.asset.manifest) === "directions",
       ...surfaceFacts(this.subject.asset),
       room: this.ball && roomOf(this.loaded.probes as Asset),
     };
@@ -204,6 +218,7 @@ export class Viewer {
     const { manifest } = this.subject.asset;
     const lights = firstLights(this.subject.asset, this.receivers.bounds);
     const state = firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
+    if (this.subject.asset.manifest.scene_lights?.length) state.exposure = 0; // as in Blender
     const { probes } = this.loaded;
     if (probes) state.ball = firstBall(probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
     return state;
@@ -215,7 +230,7 @@ export class Viewer {
       const state = decodeState(hash, plain);
       state.asset = Math.min(state.asset, this.loaded.facts.assets.length - 1);
       state.map = Math.min(state.map, this.subject.maps - 1);
-      if (!this.loaded.references) Object.assign(state, { compare: "off", errors: false });
+      if (!this.loaded.references && !this.cycles?.rendered) Object.assign(state, { compare: "off", errors: false });
       Object.assign(this.state, { eye: undefined }, state);
       for (const light of state.lights) {
         if (light.kind === "environment" && !this.environments.has(light.file)) say(`drop ${light.file} on the page again: an address holds no images`, "hint");
@@ -295,14 +310,17 @@ export class Viewer {
     const comparing = this.comparing();
     this.shining = this.lights();
     paint(this.subject.asset, comparing ? [] : this.state.surfaces);
-    const terms = comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
+    const terms = this.besideCycles ? "both" : comparing ? "indirect" : this.state.terms; // captures of indirect light hold nothing else
     if (this.state.show === "negative" && !comparing) {
       this.subject.relight(negated(this.shining), terms, this.renderer);
       this.uniforms.negative.value = this.copy.draw(this.renderer, this.subject.lightmap);
     }
     const { ball } = this.state;
     const shown = this.ball && ball?.on && !comparing ? ball : undefined;
+    const began = performance.now();
     this.subject.relight(this.shining, terms, this.renderer, shown, this.showsFine());
+    // what reads the pixels waits for the GPU
+    if (this.besideCycles) this.cycles?.measure(this.copy.read(this.renderer, this.subject.lightmap), (texel) => this.receivers.covered(texel), performance.now() - began);
     this.uniforms.relit.value = this.subject.shown;
     if (shown) this.ball?.relight(this.shining, this.state.surfaces, terms, shown);
     this.tellOutside();
@@ -322,8 +340,19 @@ export class Viewer {
     return this.stage.hasMesh && this.state.show === "picture" && !this.comparing();
   }
 
+  private showReference(): void {
+    if (this.state.compare === "off") this.state.compare = "slider";
+    this.changed({ lights: true, panel: true });
+  }
+
+  /** Whether a render by Cycles is beside the picture. */
+  private get besideCycles(): boolean {
+    return this.state.compare !== "off" && this.cycles?.rendered === true;
+  }
+
+  /** Whether the capture is beside the picture. */
   private comparing(): boolean {
-    return this.state.compare !== "off" && this.comparison.possible && this.comparable() !== undefined;
+    return !this.besideCycles && this.state.compare !== "off" && this.comparison.possible && this.comparable() !== undefined;
   }
 
   /** The lights, or while comparing the baked light nearest to the selected one, in its color. */
@@ -332,7 +361,7 @@ export class Viewer {
     if (!compared || !this.comparing()) {
       this.comparison.off();
       this.directions.marked = -1;
-      if (this.state.compare !== "off") say(`comparing needs a ${this.inCloud ? "point" : "directional"} light: add one`, "hint");
+      if (this.state.compare !== "off" && !this.besideCycles) say(this.loaded.references ? `comparing needs a ${this.inCloud ? "point" : "directional"} light: add one` : "nothing to compare with yet: let Cycles render", "hint");
       return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
@@ -360,7 +389,8 @@ export class Viewer {
 
   private present(): void {
     const { state, uniforms } = this;
-    const comparing = state.compare !== "off" && this.comparison.compared >= 0;
+    const comparing = this.besideCycles || (state.compare !== "off" && this.comparison.compared >= 0);
+    if (this.besideCycles) this.cycles?.show(uniforms);
     const value = comparing && state.compare !== "slider" ? state.compare : state.show === "map" && !comparing ? "map" : "picture";
     uniforms.value.value = VALUES[value as keyof typeof VALUES];
     const signed = value === "difference" || value === "map";
@@ -388,7 +418,7 @@ export class Viewer {
 
   private status(): void {
     const pace = this.paces.length < PACES ? undefined : [...this.paces].sort((a, b) => a - b)[PACES >> 1];
-    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace);
+    statusLine(element("status"), this.subject, this.comparison, this.shining, this.state, pace, missingLine(this.subject.asset), this.cycles?.told(this.state.lights, this.besideCycles));
   }
 
   private events(changed: Changed): void {
@@ -416,7 +446,7 @@ export class Viewer {
       redo: () => this.step(this.history.redo()),
       help: () => (help.open ? help.close() : help.showModal()),
       nextCompare: () => {
-        if (this.loaded.references) this.state.compare = next(COMPARES, this.state.compare);
+        if (this.loaded.references || this.cycles?.rendered) this.state.compare = next(COMPARES, this.state.compare);
       },
       nextMap: () => {
         if (this.subject.asset.tables.gather) return;
@@ -458,33 +488,22 @@ export class Viewer {
   }
 
   /** Play the frames of a file from now on. */
-  private async frames(file: File): Promise<void> {
-    this.wait();
-    try {
-      this.keyframes = new Keyframes(readFrames(await file.text(), file.name, this.inCloud ? "inverse-square" : "linear"), this.state);
-      this.keyframes.show(0);
-      const { frames } = this.keyframes;
-      Object.assign(this.state, { path: "frames", seconds: Math.max(0.1, frames.length / FRAMES_PER_SECOND), playing: frames.length > 1 });
+  private frames(file: File): Promise<void> {
+    return this.slowly(async () => {
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear");
       this.panel.setFacts(this.panelFacts());
-      this.changed({ lights: true, panel: true });
-    } catch (error) {
-      say(lineOf(error));
-    } finally {
-      this.done();
-    }
+    });
   }
 
-  /** Add a dropped environment map; the first one turns the other lights off. */
-  private async environment(file: File): Promise<void> {
+  private environment(file: File): Promise<void> {
+    return this.slowly(() => droppedEnvironment(file, this.state, this.environments, kindsOf(this.subject.asset).includes("environment") && !this.named));
+  }
+
+  /** Do what takes time and changes lights; an error is said. */
+  private async slowly(work: () => Promise<void>): Promise<void> {
     this.wait();
     try {
-      if (!kindsOf(this.subject.asset).includes("environment") || this.named) throw new SrbfError("expected an asset of distant lights for an environment, found one of other lights");
-      this.environments.set(file.name, await readEnvironment(file));
-      const { lights } = this.state;
-      const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);
-      if (known < 0 && lights.length >= MOST_LIGHTS) return say(`expected at most ${MOST_LIGHTS} lights; remove one first`);
-      if (known < 0 && !lights.some((light) => light.kind === "environment")) for (const light of lights) light.on = false;
-      this.state.selected = known < 0 ? lights.push(environmentState(file.name)) - 1 : known;
+      await work();
       this.changed({ lights: true, panel: true });
     } catch (error) {
       say(lineOf(error));
@@ -495,6 +514,6 @@ export class Viewer {
 
   private savePath(): void {
     const frames = this.state.path === "frames" && this.keyframes ? this.keyframes.frames : this.playback.frames(FRAMES_PER_SECOND);
-    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]));
+    saveFrames("FRAMES.json", frames.map((lights) => [...lights, ...emittingStates(this.subject.asset, this.state.surfaces)]), this.subject.asset.manifest.scene_lights);
   }
 }

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights as a FRAMES.json writes them, made in Blender, all of them on: what the values of `scene_lights` are turned back into."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+from mathutils import Matrix, Vector
+
+from blender_bake.ipc import WorkerError
+from blender_bake.light import AREA_WATTS, POINT_WATTS
+
+TYPES = {"directional": "SUN", "point": "POINT", "sphere": "POINT", "spot": "SPOT", "area": "AREA"}
+
+
+def make(scene: bpy.types.Scene, lights: list[dict[str, Any]], sun_angle: float = 0.0) -> None:
+    """Add the lights to the scene; suns have the angular diameter `sun_angle`, rad. WorkerError for kinds that Blender lacks."""
+    for light in lights:
+        kind = light["kind"]
+        if kind not in TYPES:
+            raise WorkerError(f"expected lights of {', '.join(TYPES)}, found {kind}")
+        data = bpy.data.lights.new(f"srbf given {kind}", TYPES[kind])
+        color = [float(value) for value in light.get("color", (1, 1, 1))]
+        most = max(max(color), 0.0)
+        data.color = [value / most for value in color] if most else (0, 0, 0)
+        data.energy = most * _watts(light)
+        obj = bpy.data.objects.new(data.name, data)
+        obj.matrix_world = _placed(light, data, sun_angle)
+        if light.get("falloff") == "linear":
+            _by_distance(data)
+        scene.collection.objects.link(obj)
+
+
+def _watts(light: dict[str, Any]) -> float:
+    """Watts, or irradiance of a sun, of a light whose irradiance at a0 is 1."""
+    if light["kind"] == "directional":
+        return 1.0
+    a0 = light.get("a0", 1.0)
+    if light["kind"] == "area":
+        return AREA_WATTS * a0**2
+    return POINT_WATTS * (a0 if light.get("falloff") == "linear" else a0**2)
+
+
+def _placed(light: dict[str, Any], data: bpy.types.Light, sun_angle: float) -> Matrix:
+    """Sets what only its type has; where it is."""
+    kind = light["kind"]
+    if kind == "directional":
+        data.angle = sun_angle
+        return Vector(light["direction"]).to_track_quat("Z", "Y").to_matrix().to_4x4()
+    place = Matrix.Translation(light["position"])
+    if kind in ("point", "sphere"):
+        data.shadow_soft_size = light.get("size", 0.0)
+        return place
+    if kind == "spot":
+        edge = math.cos(light["outer"])
+        data.shadow_soft_size, data.spot_size = 0.0, 2 * light["outer"]
+        data.spot_blend = min(1.0, (math.cos(light["inner"]) - edge) / max(1 - edge, 1e-9))
+        return place @ Vector(light["direction"]).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+    u, v = Vector(light["u"]), Vector(light["v"])
+    data.shape, data.size, data.size_y = "RECTANGLE", u.length, v.length
+    axes = (u.normalized(), -v.normalized(), -u.cross(v).normalized())  # it shines along its local -z
+    return place @ Matrix(axes).transposed().to_4x4()
+
+
+def _by_distance(data: bpy.types.Light) -> None:
+    """Let it fall with 1 / d in place of 1 / d2."""
+    data.use_nodes = True
+    nodes, links = data.node_tree.nodes, data.node_tree.links
+    nodes.clear()
+    falloff, emission = nodes.new("ShaderNodeLightFalloff"), nodes.new("ShaderNodeEmission")
+    falloff.inputs["Strength"].default_value = 1.0
+    links.new(falloff.outputs["Linear"], emission.inputs["Strength"])
+    links.new(emission.outputs[0], nodes.new("ShaderNodeOutputLight").inputs["Surface"])

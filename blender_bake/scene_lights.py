@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scene's own lights as values: kind, place, color and size of each, in the units of a FRAMES.json."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from blender_bake.light import AREA_WATTS, POINT_WATTS
+from blender_bake.node_values import Place, source, value
+from blender_bake.scene_file import show_as_rendered
+
+DIGITS = 7  # significant ones: Blender's numbers are single floats
+SMALL = 1e-6  # m: a size up to which a light is a point
+UNEVEN = 1e-3  # relative difference of an object's scales from which a spot's cone is elliptical
+ANGLE = 1e-4  # rad: difference of two suns' angles that a note tells
+FULL_SPREAD = math.pi - 1e-3  # rad: of an area light that is diffuse
+ROUND_SIDE = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diameter 1
+
+
+class _CannotError(Exception):
+    """Why a light has no counterpart."""
+
+
+def values(scene: bpy.types.Scene) -> dict[str, Any]:
+    """`lights`: [{name, light, note}] of every light object that renders and shines, in order of name, as FRAMES.json writes lights.
+
+    `left_out`: [{name, reason}] of those without a counterpart. `note`: what the values lack, where they lack anything. `sun_angle`:
+    angular diameter (rad) of the brightest sun, None without one. A light of an instance is named INSTANCER/LIGHT; names are unique.
+    Values are those of the current frame. The world and emissive objects are no light objects.
+    """
+    show_as_rendered(scene)
+    found: list[tuple[str, dict[str, Any], list[str], float | None]] = []
+    left_out: list[dict[str, Any]] = []
+    taken: set[str] = set()
+    graph = bpy.context.evaluated_depsgraph_get()
+    shown = [
+        (_name(instance), instance.object.original.name, instance.matrix_world.copy())
+        for instance in graph.object_instances
+        if instance.object.type == "LIGHT" and not instance.object.hide_render and (instance.is_instance or instance.show_self)
+    ]
+    for name, original, matrix in sorted(shown, key=lambda one: (one[0], *one[2].translation)):
+        obj = bpy.data.objects[original].evaluated_get(graph)
+        unique = _free(name, taken)
+        taken.add(unique)
+        try:
+            light, notes = _light(scene, obj, matrix)
+        except _CannotError as reason:
+            left_out.append({"name": unique, "reason": str(reason)})
+            continue
+        if light is not None:
+            found.append((unique, light, notes, obj.data.angle if obj.data.type == "SUN" else None))
+    suns = [(max(light["color"]), angle) for _, light, _, angle in found if angle is not None]
+    chosen = max(suns)[1] if suns else None
+    for _, _, notes, angle in found:
+        if angle is not None and chosen is not None and abs(angle - chosen) > ANGLE:
+            notes.append(f"its angle is {math.degrees(angle):.3g} degrees: its shadows are those of the brightest sun")
+    lights = [{"name": name, "light": light, **({"note": "; ".join(notes)} if notes else {})} for name, light, notes, _ in found]
+    return {"lights": lights, "left_out": left_out, "sun_angle": None if chosen is None else _rounded(chosen)}
+
+
+def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tuple[dict[str, Any] | None, list[str]]:
+    """The light and what it lacks; None where it does not shine. _CannotError where there is no counterpart."""
+    data = obj.data
+    if data.cycles.is_portal and data.type == "AREA":
+        raise _CannotError("a portal shows the world")
+    color = _strength(data)
+    if not any(color):
+        return None, []
+    if min(color) < 0:
+        raise _CannotError("its power is negative")
+    if not data.use_shadow:
+        raise _CannotError("it casts no shadows")
+    if not obj.visible_diffuse:
+        raise _CannotError("it is hidden from diffuse rays")
+    linking = getattr(obj, "light_linking", None)
+    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+        raise _CannotError("light linking chooses what it lights or what shadows it")
+    bounces = data.cycles.max_bounces
+    notes = [f"its light bounces at most {bounces} times in Cycles"] if bounces < scene.cycles.max_bounces else []
+    return {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[data.type](data, matrix, color, notes), notes
+
+
+def _strength(data: bpy.types.Light) -> np.ndarray:
+    """(3,) energy times color, in watts, or irradiance of a sun; _CannotError where nodes make it vary."""
+    color = np.array(data.color, np.float64) * data.energy * 2 ** getattr(data, "exposure", 0.0)
+    if getattr(data, "use_temperature", False):
+        color = color * np.array(data.temperature_color, np.float64)
+    if not (data.use_nodes and data.node_tree is not None and color.any()):
+        return color
+    output = data.node_tree.get_output_node("CYCLES")
+    shader = None if output is None else source(Place(output.inputs["Surface"]))[1]
+    if shader is None:
+        return np.zeros(3)
+    if any(node.type == "TEX_IES" for node in data.node_tree.nodes):
+        raise _CannotError("an IES texture shapes it")
+    factors = [value(shader.input(name)) for name in ("Color", "Strength")] if shader.node.type == "EMISSION" else [None]
+    if any(factor is None for factor in factors):
+        raise _CannotError("its nodes drive it")
+    for factor in factors:
+        color = color * np.asarray(factor, np.float64)[:3]
+    return color
+
+
+def _point(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str]) -> dict[str, Any]:
+    told = {"position": _triple(matrix.translation), "color": _triple(color / POINT_WATTS), "a0": 1.0, "falloff": "inverse-square"}
+    _require_power(data, data.shadow_soft_size)
+    if data.shadow_soft_size > SMALL:
+        return {"kind": "sphere", "size": _rounded(data.shadow_soft_size), **told}
+    return {"kind": "point", **told}
+
+
+def _spot(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[str]) -> dict[str, Any]:
+    scales = [abs(scale) for scale in matrix.to_scale()]
+    if max(scales) - min(scales) > UNEVEN * max(scales):
+        raise _CannotError("its object is scaled unevenly, so that its cone is elliptical")
+    _require_power(data, data.shadow_soft_size)
+    if data.shadow_soft_size > SMALL:
+        notes.append(f"its radius of {data.shadow_soft_size:.3g} m is left out: its shadows are sharp")
+    outer = data.spot_size / 2
+    edge = math.cos(outer)
+    return {
+        "kind": "spot",
+        "position": _triple(matrix.translation),
+        "direction": _triple(_axis(matrix)),
+        "inner": _rounded(min(math.acos(min(1.0, edge + data.spot_blend * (1 - edge))), outer)),  # Cycles: a smoothstep in the cosine
+        "outer": _rounded(outer),
+        "color": _triple(color / POINT_WATTS),
+        "a0": 1.0,
+        "falloff": "inverse-square",
+    }
+
+
+def _sun(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str]) -> dict[str, Any]:
+    _require_power(data, data.angle)
+    return {"kind": "directional", "direction": _triple(-_axis(matrix)), "color": _triple(color)}
+
+
+def _area(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[str]) -> dict[str, Any]:
+    if data.spread < FULL_SPREAD:
+        raise _CannotError(f"its spread is {math.degrees(data.spread):.3g} degrees: there are area lights of 180 alone")
+    sizes = (data.size, data.size_y if data.shape in {"RECTANGLE", "ELLIPSE"} else data.size)
+    if data.shape in {"DISK", "ELLIPSE"}:
+        sizes = (sizes[0] * ROUND_SIDE, sizes[1] * ROUND_SIDE)
+        notes.append("a rectangle of equal area stands for it")
+    across, up = (matrix.to_3x3().col[k] * sizes[k] for k in (0, 1))
+    area = across.cross(up).length
+    if area <= SMALL**2:
+        raise _CannotError("it has no area")
+    if across.cross(-up).dot(_axis(matrix)) < 0:  # mirrored
+        across = -across
+    watts = color if getattr(data, "normalize", True) else color * area
+    return {
+        "kind": "area",
+        "position": _triple(matrix.translation),
+        "u": _triple(across),
+        "v": _triple(-up),
+        "color": _triple(watts / AREA_WATTS),
+        "a0": 1.0,
+    }
+
+
+def _require_power(data: bpy.types.Light, size: float) -> None:
+    if not getattr(data, "normalize", True) and size > 0:
+        raise _CannotError("its power depends on its size (Normalize is off)")
+
+
+def _axis(matrix: Matrix) -> Vector:
+    """Unit vector along which a light shines: its local -z."""
+    return -matrix.to_3x3().col[2].normalized()
+
+
+def _name(instance: bpy.types.DepsgraphObjectInstance) -> str:
+    own = instance.object.name
+    return f"{instance.parent.name}/{own}" if instance.is_instance and instance.parent is not None else own
+
+
+def _free(name: str, taken: set[str]) -> str:
+    candidate, number = name, 2
+    while candidate in taken:
+        candidate, number = f"{name} {number}", number + 1
+    return candidate
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.{DIGITS}g}")
+
+
+def _triple(numbers: Any) -> list[float]:
+    return [_rounded(float(number)) for number in numbers]

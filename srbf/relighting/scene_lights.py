@@ -1,0 +1,49 @@
+"""The lights of the scene that a deep framebuffer was baked from, as the asset lists them."""
+
+from __future__ import annotations
+
+from srbf.asset import MANIFEST, Asset
+from srbf.errors import InputError
+from srbf.light_entries import lights_of
+from srbf.lights import Light
+
+SHOWN = 8  # names in a line
+
+
+def scene_lights(asset: Asset) -> dict[str, Light]:
+    """The scene's own lights by name, without its world and what emits.
+
+    Parameters
+    ----------
+    asset
+        Of a bake with `light_set=gather`.
+
+    Returns
+    -------
+    dict
+        Lights in the units of `srbf.lights`, in order of name.
+
+    Raises
+    ------
+    InputError
+        Where the asset lists none.
+
+    Examples
+    --------
+    >>> scene_lights(asset)
+    Traceback (most recent call last):
+    srbf.errors.InputError: expected an asset that lists its scene's lights, found none; ...
+    """
+    listed = asset.manifest.get("scene_lights", [])
+    if not listed:
+        raise InputError("expected an asset that lists its scene's lights, found none; bake a scene with lights with `light_set=gather`")
+    lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}")
+    return dict(zip((one["name"] for one in listed), lights, strict=True))
+
+
+def lines_of(asset: Asset) -> list[str]:
+    """What the scene has that its lights in the asset lack: a line for each light left out, or without one of its properties."""
+    notes = [f"light {one['name']!r}: {one['note']}" for one in asset.manifest.get("scene_lights", []) if "note" in one]
+    left = [f"light {one['name']!r} is left out: {one['reason']}" for one in asset.manifest.get("scene_lights_left_out", [])]
+    lines = notes + left
+    return lines if len(lines) <= SHOWN else [*lines[:SHOWN], f"{len(lines) - SHOWN} more in the asset's {MANIFEST}"]

@@ -1,0 +1,28 @@
+/** Files that are dropped on the page: keyframes to play, and environment maps. */
+import { SrbfError } from "../src";
+import { type Environment, readEnvironment } from "./environment_file";
+import { Keyframes, readFrames } from "./keyframes";
+import { environmentState } from "./light_state";
+import { MOST_LIGHTS, type State } from "./state";
+
+const FRAMES_PER_SECOND = 24;
+
+/** Keyframes that play from now on; `usual`: the falloff of lights that do not say. @throws SrbfError on other files. */
+export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square"): Promise<Keyframes> {
+  const keyframes = new Keyframes(readFrames(await file.text(), file.name, usual), state);
+  keyframes.show(0);
+  const { length } = keyframes.frames;
+  Object.assign(state, { path: "frames", seconds: Math.max(0.1, length / FRAMES_PER_SECOND), playing: length > 1 });
+  return keyframes;
+}
+
+/** Add an environment map; the first one turns the other lights off. @throws SrbfError where the asset takes none, there are too many lights, or it cannot be read. */
+export async function droppedEnvironment(file: File, state: State, environments: Map<string, Environment>, takes: boolean): Promise<void> {
+  if (!takes) throw new SrbfError("expected an asset of distant lights for an environment, found one of other lights");
+  environments.set(file.name, await readEnvironment(file));
+  const { lights } = state;
+  const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);
+  if (known < 0 && lights.length >= MOST_LIGHTS) throw new SrbfError(`expected at most ${MOST_LIGHTS} lights; remove one first`);
+  if (known < 0 && !lights.some((light) => light.kind === "environment")) for (const light of lights) light.on = false;
+  state.selected = known < 0 ? lights.push(environmentState(file.name)) - 1 : known;
+}
