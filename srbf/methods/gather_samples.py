@@ -1,4 +1,4 @@
-"""The deep framebuffer in the form of its paper: gather samples of each view cluster, which are lit anew, and one bounce."""
+"""The deep framebuffer in the form of its paper: gather samples of each view cluster, which every light lights, and one bounce."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ def _nearest(points: Float32[ndarray, "B N d"], means: Float32[ndarray, "B K d"]
 
 
 def _split(points: Float32[ndarray, "d n"], sizes: Int[ndarray, " B"], count: int) -> Int[ndarray, " n"]:
-    """Clusters by splitting those of largest spread, of sets that lie one after another in `points`; numbers begin anew in each set."""
+    """Clusters by splitting those of largest spread, of sets that lie one after another in `points`; numbers begin at 0 in each set."""
     total = points.shape[1]
     order = np.arange(total)  # the members of a cluster are next to each other
     starts, lengths, sets = np.concatenate([[0], np.cumsum(sizes)[:-1]]), np.array(sizes), np.arange(len(sizes))

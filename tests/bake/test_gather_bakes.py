@@ -20,6 +20,7 @@ from srbf.lights import PointLight
 from srbf.methods import linear_response
 from srbf.relighting.direct_light import Added, Direct
 from srbf.visibility.gather_operator import GATHER_FILE, GatherOperator
+from srbf.visibility.gathered_samples import SAMPLES_FILE, GatheredSamples
 
 pytestmark = pytest.mark.blender
 
@@ -55,10 +56,33 @@ def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None
     assert len(list((tmp_path / "shown").iterdir())) == 2
 
 
+def test_gather_samples_are_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
+    """The paper's form: one bounce, so less energy than Cycles' four, and as much of the direct light."""
+    folder, asset, bake = tmp_path / "capture", tmp_path / "asset", [*VIEW[:6], "--view-clusters", "200", "--seed", "77", "--gather"]
+    told = done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "0", "--dry-run").output
+    assert "gather samples of view clusters" in told and "not estimated" not in told
+    done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "1", "--holdout-samples", "256")
+    made = (folder / SAMPLES_FILE).stat().st_mtime_ns
+    done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "1", "--holdout-samples", "256")
+    assert (folder / SAMPLES_FILE).stat().st_mtime_ns == made and not (folder / GATHER_FILE).exists()
+    assert "another" in refused(["bake", scene("unlit"), "-o", folder, *bake, "25", "--holdout", "1", "--holdout-samples", "256"], 1)
+    assert Capture.open(folder).manifest["source"]["settings"]["light_set"]["gather"] == 24
+    assert GatheredSamples.read(folder).places.shape == (200, 24, 3)
+    done("fit", folder, "-o", asset)
+    opened, capture = Asset.open(asset), Capture.open(folder)
+    x, y, z = capture.positions([0])[0].tolist()
+    once = linear_response(opened, [PointLight((x, y, z), falloff="inverse-square")])
+    assert opened.method == "gather-samples" and 0.3 < once.sum() / capture.image(0).sum() < 0.95
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [{"kind": "point", "position": [x, y, z]}]}]}))
+    done("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "shown", "--direct", "ray")
+    assert len(list((tmp_path / "shown").iterdir())) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "flags", "status", "words"),
     [
         ("open_air", [], 1, "camera"),
+        ("unlit", ["--gather", "60"], 2, "--gather without --pool"),
         ("unlit", ["--pool", "3"], 2, "16 to 65536"),
         ("unlit", ["--transport", "combined"], 2, "indirect"),
         ("unlit", ["--receiver", "lightmap:Floor"], 2, "view"),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room
+from made_views import surfaces_of, view_of_room
 
 from srbf.asset import Asset
 from srbf.bake.gather_set import GatherSet
@@ -111,8 +111,8 @@ def test_the_order_of_rays_and_of_samples_changes_no_light() -> None:
 
     def light_of(samples: Samples, mixed: slice) -> np.ndarray:
         places = np.round(samples.points / 3 * STEPS).astype(np.uint16)[:, mixed]
-        own = (own.astype(np.float16)[:, mixed] for own in (samples.normals, samples.reflectance))
-        return light_on_clusters(places, box, *own, free, [PointLight((1.0, 1.0, 4.0), falloff="inverse-square")])
+        normals, reflectance = (own.astype(np.float16)[:, mixed] for own in (samples.normals, samples.reflectance))
+        return light_on_clusters(places, box, normals, reflectance, free, [PointLight((1.0, 1.0, 4.0), falloff="inverse-square")])
 
     truth = light_of(one, slice(None))
     assert truth.min() > 0
@@ -271,8 +271,6 @@ def test_damaged_samples_are_refused(capture: Capture, tmp_path: Path) -> None:
 
 
 def test_a_bake_that_is_resumed_keeps_its_samples_and_another_count_has_others(tmp_path: Path) -> None:
-    from made_views import surfaces_of
-
     room = Room.box((1, 1, 1), 0.5)
     made = view_of_room(tmp_path / "own", room, 100, 4, longest=0.5, tested=0, gather=8)
     path, quiet = made.folder / SAMPLES_FILE, lambda done, total, what: None
