@@ -1,4 +1,4 @@
-"""Gather samples of view clusters: what each part of a view sees of the scene, as a few weighted points that every light lights [Hasan2005].
+"""Gather samples of view clusters: what each part of a view sees of the scene, as a few weighted points that are lit [Hasan2005].
 
 The form of the paper. `srbf.visibility.gather_operator` shares one pool of surfels among all clusters in place of samples of each.
 """
