@@ -38,7 +38,7 @@ FEWER = 0.95  # surfels that are asked for again, where those behind translucent
 POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
-SAMPLING = 4e-3  # CPU seconds for the rays and the samples of a cluster, measured at 120 of these
+SAMPLING = 5e-3  # CPU seconds for the rays and the samples of a cluster, measured at 120 of these
 Progress = Callable[[int, int, str], None]
 
 
