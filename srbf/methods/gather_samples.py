@@ -48,7 +48,7 @@ class GatherSamples(Method):
 
     g_kj are the gather samples of view cluster k, D the direct irradiance that the lights lay on them, each with a shadow ray; a pixel
     mixes the clusters nearest to it in place and normal. Glossy pixels add what clusters of their lobes gather. This is the paper's own
-    form, to be compared with: `deep-framebuffer` has less error, all bounces and a shader.
+    form, to be compared with: `deep-framebuffer` has all bounces, a shader and mostly less error.
 
     Parameters
     ----------
