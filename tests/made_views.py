@@ -14,7 +14,8 @@ from srbf.capture import Capture
 from srbf.channels import THROUGH
 from srbf.io import files
 from srbf.io.image import write_image
-from srbf.methods.deep_framebuffer import BEHIND, GLOSSY_FILES
+from srbf.methods.deep_framebuffer import GLOSSY_FILES
+from srbf.methods.mixed_clusters import BEHIND
 
 
 def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
@@ -29,7 +30,14 @@ def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
 
 
 def view_of_room(
-    folder: Path, room: Room, pool: int, clusters: int | None = None, longest: float = 0.12, tested: int = 6, bounces: int = 64
+    folder: Path,
+    room: Room,
+    pool: int,
+    clusters: int | None = None,
+    longest: float = 0.12,
+    tested: int = 6,
+    bounces: int = 64,
+    gather: int | None = None,
 ) -> Capture:
     """The radiance of a view of all cells of a room, under point lights that are held out."""
     transport = room.transport()
@@ -37,7 +45,7 @@ def view_of_room(
     for place in room.free[-tested:] if tested else []:
         lights.append({"kind": "point", "position": place.tolist(), "role": "holdout"})
         images.append(np.einsum("ijc,j->ic", transport, room.direct(place)) * room.albedo / np.pi)
-    light_set = GatherSet(pool, clusters, None, surfaces_of(room, longest, bounces))
+    light_set = GatherSet(pool, clusters, None, gather, surfaces_of(room, longest, bounces))
     keys = {"quantity": "radiance", "receiver": {"kind": "view"}, "albedo": "albedo.exr", **light_set.manifest()}
     capture = write_room(folder, room, lights, images, np.zeros(len(room.places), np.int64), **keys)
     albedo = np.zeros((capture.width * capture.height, 3), np.float32)

@@ -14,12 +14,14 @@ import numpy as np
 
 from srbf.bake.checks import bytes_needed
 from srbf.bake.cubemap_set import CubemapSet, seconds_of_rays
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.job import base_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import Bake
 from srbf.bake.schedule import next_samples
 from srbf.bake.settings import PlannedLight, plan_lights
 from srbf.bake.worker import Worker
+from srbf.compute.threads import cores
 from srbf.cubemap import Cubemap
 from srbf.io.image import write_image
 
@@ -32,6 +34,7 @@ SOURCES = {  # of train lights, by light set
     "cubemap": "directions of a cubemap in place of train lights, by rays",
     "surfels": "form factors of surfels in place of train lights",
 }
+SAMPLED = "gather samples of view clusters in place of train lights"
 TRACED = {"gather": "links by rays", "surfels": "form factors by rays"}  # what comes on top of the lights
 
 
@@ -72,11 +75,14 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
     time = (sum(passes) + 2) * fixed + (sum(light.samples for light in lights) + ambient) * per_sample
     summed = len(lights) if bake.keeps_accumulation else sum(count > 1 for count in passes)
     disk = len(lights) * image_bytes + bytes_needed(settings, 0, summed)
+    sampled = settings.light_set.cost(settings.width * settings.height) if isinstance(settings.light_set, GatherSet) else None
+    if sampled is not None:
+        disk, time = disk + sampled[0], time + sampled[1] / cores()
     where = next(path for path in (bake.folder.resolve(), *bake.folder.resolve().parents) if path.exists())
     free = shutil.disk_usage(where).free
     roles = Counter(light.role for light in lights)
     if settings.light_set is not None:
-        train_from = SOURCES[settings.light_set.kind]
+        train_from = SOURCES[settings.light_set.kind] if sampled is None else SAMPLED
     elif settings.points is not None:
         train_from = f"point lights {settings.points.spacing:g} m apart"
     else:
@@ -104,7 +110,10 @@ def estimate(bake: Bake, say: Callable[[str], None] = lambda line: None) -> list
 
 
 def _time(bake: Bake, seconds: float, has_lights: bool) -> str:
-    traced = TRACED.get(bake.settings.light_set.kind) if bake.settings.light_set is not None else None
+    light_set = bake.settings.light_set
+    traced = TRACED.get(light_set.kind) if light_set is not None else None
+    if isinstance(light_set, GatherSet) and light_set.gather is not None:
+        traced = None  # estimated as well
     if traced is not None and not has_lights:
         return f"that of {traced}, which is not estimated"
     rendered = f"about {_duration(seconds)} {'per sample of all lights ' if bake.is_open_ended else ''}on this machine as loaded now"

@@ -26,11 +26,13 @@ from srbf.visibility.behind import Behind, points_behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
 from srbf.visibility.gather_pool import MOST_POOL, pool_of
+from srbf.visibility.gathered_samples import DEFAULT_CLUSTERS as SAMPLED_CLUSTERS
+from srbf.visibility.gathered_samples import FEWEST, LINK_BYTES, RAYS, SAMPLE_BYTES, SAMPLES_FILE, GatheredSamples, is_sampled
 from srbf.visibility.glossy_gather import Lobes
 from srbf.visibility.pixel_points import PixelPoints
 from srbf.visibility.receivers import LEAST_THROUGH, Receivers
 from srbf.visibility.surface_cells import Fragments
-from srbf.visibility.view_clusters import MOST_CLUSTERS
+from srbf.visibility.view_clusters import MOST_CLUSTERS, NEAREST
 
 FEWER = 0.95  # surfels that are asked for again, where those behind translucent ones do not fit as well
 POOL = 32_768  # surfels
@@ -39,6 +41,7 @@ LEAST_POOL = 16
 TRACED_BY = 2  # counts changes of what is traced: links of former versions are made once more
 SHOWN = 8  # names in a line
 NO_LIGHTS = '{"lights": [], "left_out": [], "sun_angle": null}'
+SAMPLING = 5e-3  # CPU seconds for the rays and the samples of a cluster, measured at 120 of these
 Progress = Callable[[int, int, str], None]
 
 
@@ -112,12 +115,16 @@ class FoundSurfaces:
 
 @dataclass(frozen=True)
 class GatherSet:
-    """Links from `clusters` parts of a view (None: by its size) to a pool of `count` surfels; held-out lights are point lights."""
+    """Links from `clusters` parts of a view (None: by its size) to a pool of `count` surfels; held-out lights are point lights.
+
+    `gather`: in place of links, so many samples of each part, one bounce [Hasan2005]; None: links.
+    """
 
     kind: ClassVar[str] = "gather"
     count: int = POOL
     clusters: int | None = None
     box: Box | None = None
+    gather: int | None = None
     found: FoundSurfaces | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -125,11 +132,22 @@ class GatherSet:
             raise InputError(f"expected a `pool` of {LEAST_POOL} to {MOST_POOL} surfels, found {self.count}")
         if self.clusters is not None and not 1 <= self.clusters <= MOST_CLUSTERS:
             raise InputError(f"expected `view_clusters` auto or 1 to {MOST_CLUSTERS}, found {self.clusters}")
+        if self.gather is not None and not FEWEST <= self.gather <= RAYS:
+            raise InputError(f"expected {FEWEST} to {RAYS} samples of a cluster with `gather`, found {self.gather}")
 
     @staticmethod
-    def parse(pool: int | None, clusters: int | str | None, light_bounds: str | None) -> GatherSet:
-        """From the command line's flags."""
-        return GatherSet(POOL if pool is None else pool, clusters if isinstance(clusters, int) else None, parse_box(light_bounds))
+    def parse(pool: int | None, clusters: int | str | None, light_bounds: str | None, gather: int | None = None) -> GatherSet:
+        """From the command line's flags; InputError where they exclude each other."""
+        if pool is not None and gather is not None:
+            raise InputError("expected `gather` without `pool`, found both: gather samples need no surfels; leave one out")
+        return GatherSet(POOL if pool is None else pool, clusters if isinstance(clusters, int) else None, parse_box(light_bounds), gather)
+
+    def cost(self, pixels: int) -> tuple[int, float] | None:
+        """About how many bytes the samples of a view take, and CPU seconds; None of links, which are not estimated."""
+        if self.gather is None:
+            return None
+        clusters = cluster_count(self.clusters, pixels, SAMPLED_CLUSTERS)
+        return clusters * self.gather * SAMPLE_BYTES + LINK_BYTES * NEAREST * pixels, SAMPLING * clusters
 
     @property
     def is_known(self) -> bool:
@@ -170,13 +188,22 @@ class GatherSet:
     def record(self) -> dict[str, Any]:
         """JSON for the manifest, with a checksum of what was found of the scene."""
         found = self._known
-        return {"kind": self.kind, "pool": self.count, "view_clusters": self.clusters, "box": found.box.tolist(), "places": found.checksum}
+        record = {
+            "kind": self.kind,
+            "pool": self.count,
+            "view_clusters": self.clusters,
+            "box": found.box.tolist(),
+            "places": found.checksum,
+        }
+        return record if self.gather is None else {**record, "gather": self.gather}
 
     def manifest(self) -> dict[str, Any]:
         """Keys of capture.json beside the lights."""
         found = self._known
+        links = {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)}
+        samples = {"samples": SAMPLES_FILE, "bounces": min(1, int(found.bounces))}
         return {
-            "gather": {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)},
+            "gather": links if self.gather is None else samples,
             "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
             "scene_lights": found.scene_lights["lights"],
             **({"scene_lights_left_out": found.scene_lights["left_out"]} if found.scene_lights["left_out"] else {}),
@@ -211,14 +238,16 @@ class GatherSet:
         """
         found = self._known
         key = f"{TRACED_BY} {found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
+        if self.gather is not None:
+            self._sample(receivers, f"{key} {self.gather} samples", seed, progress, say)
+            return
         if is_gathered(receivers.folder, key):
             return
         progress(0, 1, "surfels")
         occluders = EmbreeTriangles(found.occluders)
         view = Receivers.of(receivers)
         pixels, lobes = PixelPoints.of_view(view), Lobes.of(view)
-        if not len(pixels.points):
-            raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
+        _require_pixels(pixels)
         surfaces = Fragments(found.corners, found.albedo)
         warn_of_dark_view(pixels.points, pixels.normals, surfaces, occluders, found.free, seed, say)
         backs = None if found.transmission is None else points_behind(view)
@@ -238,6 +267,27 @@ class GatherSet:
             pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes, backs
         )
         operator.write(receivers.folder, key)
+
+    def _sample(self, receivers: Capture, key: str, seed: int, progress: Progress, say: Callable[[str], None]) -> None:
+        """Gather samples in place of pool and links."""
+        if is_sampled(receivers.folder, key):
+            return
+        assert self.gather is not None
+        found, view = self._known, Receivers.of(receivers)
+        pixels, surfaces = PixelPoints.of_centers(view), Fragments(found.corners, found.albedo)
+        _require_pixels(pixels)
+        progress(0, 1, "view clusters")
+        warn_of_dark_view(pixels.points, pixels.normals, surfaces, EmbreeTriangles(found.occluders), found.free, seed, say)
+        clusters = cluster_count(self.clusters, len(pixels.points), SAMPLED_CLUSTERS)
+        samples = GatheredSamples.traced(
+            surfaces, view, clusters, self.gather, seed, lambda done, total: progress(done, total, "gather samples")
+        )
+        samples.write(receivers.folder, key)
+
+
+def _require_pixels(pixels: PixelPoints) -> None:
+    if not len(pixels.points):
+        raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
 
 
 def _lines_of(told: dict[str, Any]) -> list[str]:

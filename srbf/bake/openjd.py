@@ -115,7 +115,9 @@ def _light_set(light_set: LightSet | None) -> dict[str, Any]:
         return {"light-set": light_set.kind}
     box = None if light_set.box is None else ",".join(map(repr, light_set.box))
     if isinstance(light_set, GatherSet):
-        return {"light-set": light_set.kind, "pool": light_set.count, "view-clusters": light_set.clusters, "light-bounds": box}
+        pool = light_set.count if light_set.gather is None else None
+        own = {"pool": pool, "view-clusters": light_set.clusters, "gather": light_set.gather}
+        return {"light-set": light_set.kind, **own, "light-bounds": box}
     if isinstance(light_set, CubemapSet):
         raise InputError("expected a bake of rendered lights for a farm, found `light_set` cubemap, which one process traces; bake it here")
     if light_set.kind == "surfels":

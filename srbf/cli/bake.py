@@ -53,6 +53,7 @@ def bake(
     surfels_per_m2: flag.SurfelDensity = None,
     pool: flag.PoolSize = None,
     view_clusters: flag.ViewClusterCount = None,
+    gather: flag.GatherCount = None,
     operator: flag.OperatorOf = "rays",
     sparse: flag.Sparse = False,
     full: flag.Full = False,
@@ -93,7 +94,7 @@ def bake(
         points = PointGrid.parse(str(light_set), light_bounds) if by_grid else None
         inside: LightSet | None = None
         if light_set == GatherSet.kind:
-            inside = GatherSet.parse(pool, view_clusters, light_bounds)
+            inside = GatherSet.parse(pool, view_clusters, light_bounds, gather)
         elif light_set is not None and light_set.startswith(WORD):
             inside = CubemapSet.parse(light_set, sparse, full, sparse_by, light_bounds)
         elif light_set is not None and not by_grid:
@@ -114,7 +115,7 @@ def bake(
         if value and not isinstance(inside, CubemapSet):
             raise typer.BadParameter(f"expected --light-set cubemap:SIDE with {name}, found {light_set or 'none'}")
     gathers = light_set == GatherSet.kind
-    for name, value in (("--pool", pool), ("--view-clusters", view_clusters)):
+    for name, value in (("--pool", pool), ("--view-clusters", view_clusters), ("--gather", gather)):
         if value is not None and not gathers:
             raise typer.BadParameter(f"expected --light-set gather with {name}, found {light_set or 'none'}")
     for name, value in (("--light-group", light_group), ("--patches", patches), ("--grid", grid), ("--surfels-per-m2", surfels_per_m2)):

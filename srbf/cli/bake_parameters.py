@@ -144,7 +144,18 @@ ViewClusterCount = Annotated[
         "--view-clusters",
         metavar="auto|COUNT",
         parser=AUTO_OR_COUNT,
-        help="gather: parts of the view that gather light, at most 65536; auto: one a pixel, at most 20000.",
+        help="gather: parts of the view that gather light, at most 65536; auto: one a pixel, at most 20000, with --gather 40000.",
+        show_default=False,
+        rich_help_panel=LIGHTS,
+    ),
+]
+GatherCount = Annotated[
+    int | None,
+    typer.Option(
+        "--gather",
+        metavar="COUNT",
+        parser=COUNT,
+        help="gather: in place of a pool, so many gather samples of each part, 8 to 2000 (the paper's form, one bounce: 120).",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),

@@ -15,11 +15,22 @@ from srbf.asset import Asset, layer_entries
 from srbf.asset_reader import AssetReader
 from srbf.capture import Capture
 from srbf.channels import GLOSS, THROUGH
-from srbf.encode.dilation import dilate, nearest_covered
+from srbf.encode.dilation import nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
 from srbf.lights import WHITE, Light, PointLight, refuse_named
 from srbf.methods.carried import carried_images, carried_scene, common_manifest
+from srbf.methods.mixed_clusters import (
+    BEHIND,
+    MOST_NEAREST,
+    NEIGHBOR_BYTES,
+    check_nearest,
+    neighbor_layers,
+    neighbors,
+    pictures,
+    read_further_neighbors,
+    size,
+)
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GatherOperator
@@ -35,10 +46,8 @@ if TYPE_CHECKING:
     from srbf.gl.passes import Passes
 
 MEGABYTE = 1e6
-MOST_NEAREST = 10
 LEAST_SHARE = 1 / 32  # of the rays, that a budget leaves
 POINT_BYTES = 24  # of a view cluster: place and normal
-NEIGHBOR_BYTES = 3  # of a pixel, for each of its clusters
 POOL_FILE, VIEW = "pool.exr", "view_links"
 FILES = {
     "pool": POOL_FILE,
@@ -47,7 +56,7 @@ FILES = {
     "exchange_links": "exchange_links.png",
     "exchange_rows": "exchange_rows.png",
 }
-BEHIND, POINTS = "behind_neighbors", "view_points"
+POINTS = "view_points"
 GLOSSY_FILES = {"gloss_links": "gloss_links.png", "gloss_rows": "gloss_rows.png", "gloss_neighbors": "gloss_neighbors.png"}
 KEPT = 2  # assets whose links are ready
 
@@ -95,14 +104,13 @@ class DeepFramebuffer(Method):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not 1 <= self.nearest <= MOST_NEAREST:
-            raise InputError(f"expected 1 to {MOST_NEAREST} `nearest` clusters, found {self.nearest}")
+        check_nearest(self.nearest)
         if self.budget is not None and self.budget < 1:
             raise InputError(f"expected a `budget` of 1 megabyte or more, found {self.budget}")
 
     @classmethod
     def is_made_for(cls, capture: Capture) -> bool:
-        return capture.kind in cls.domains
+        return capture.kind in cls.domains and "links" in capture.manifest["gather"]
 
     def encode(self, capture: Capture, run: FitRun = QUIET) -> Asset:
         """Links as bytes, as many as the budget has room for, and the clusters of every pixel.
@@ -131,22 +139,16 @@ class DeepFramebuffer(Method):
         >>> DeepFramebuffer().encode(view).manifest["gather"]["clusters"]  # doctest: +SKIP
         20000
         """
+        if "links" not in capture.manifest.get("gather", {}):
+            raise InputError(f"expected links to a pool in {capture.folder}, found gather samples; leave `method` and `budget` out")
         operator = GatherOperator.read(capture.folder)
         scene = carried_scene(capture)
         if scene is None:
             raise InputError(f"expected scene.glb in {capture.folder}, found none: lights need what casts shadows; bake again")
-        pixels = capture.width * capture.height
-        if len(operator.nearest) != pixels:
-            raise ImageError(f"expected clusters of {pixels} pixels in {capture.folder}, found {len(operator.nearest)}; bake again")
         most = min(self.nearest, operator.nearest.shape[1])
-        view = self._within(operator, most, pixels)
         nearest = nearest_covered(capture.coverage())
-        stored = np.stack(
-            [
-                np.round(dilate(layer.reshape(capture.height, capture.width, 3).astype(np.float32), nearest)).astype(np.uint8)
-                for layer in _neighbors(operator.nearest[:, :most], operator.weights[:, :most])
-            ]
-        )
+        stored = neighbor_layers(capture, operator.nearest[:, :most], operator.weights[:, :most], nearest)
+        view = self._within(operator, most, capture.width * capture.height)
         scale, bias = np.ones((most, 3), np.float32), np.zeros((most, 3), np.float32)
         images = carried_images(capture, nearest)
         unused = (*(GLOSS if operator.gloss is None else ()), *((THROUGH,) if operator.behind is None else ()))
@@ -168,15 +170,14 @@ class DeepFramebuffer(Method):
         if operator.gloss is not None:
             gloss = operator.gloss
             tables["gloss_links"], tables["gloss_rows"] = packed(gloss.links)
-            layers = _neighbors(gloss.nearest, gloss.weights)
-            tables["gloss_neighbors"] = layers.reshape(-1, capture.width, 3)
+            tables["gloss_neighbors"] = neighbors(gloss.nearest, gloss.weights).reshape(-1, capture.width, 3)
             manifest |= {name: {"file": file} for name, file in GLOSSY_FILES.items()}
             manifest["gather"] |= {"lobes": gloss.links.rows, "gloss_rays": gloss.links.rays}
         if operator.points is not None:
             tables[POINTS] = operator.points
             manifest |= {POINTS: {"file": f"{POINTS}.exr"}}
         if operator.behind is not None:
-            tables[BEHIND] = _neighbors(*operator.behind).reshape(-1, capture.width, 3)
+            tables[BEHIND] = neighbors(*operator.behind).reshape(-1, capture.width, 3)
             manifest |= {BEHIND: {"file": f"{BEHIND}.png"}}
         return Asset(manifest, stored, scale, bias, tables, images, scene)
 
@@ -216,14 +217,7 @@ class DeepFramebuffer(Method):
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
         if POINTS in reader.manifest:
             tables[POINTS] = reader.table(POINTS, (2, told["clusters"]), 3)
-        for name, what in (("gloss_neighbors", "lobes"), (BEHIND, "clusters behind")):
-            if name not in reader.manifest:
-                continue
-            pixels = reader.pixels(reader.manifest[name]["file"], 3)
-            if pixels.shape[1] != reader.manifest["width"] or len(pixels) % reader.manifest["height"]:
-                raise ImageError(f"expected {what} of every pixel in {reader.folder}, found {pixels.shape[1]}x{len(pixels)}; fit again")
-            tables[name] = np.round(pixels * 255).astype(np.uint8)
-        return tables
+        return {**tables, **read_further_neighbors(reader)}
 
     @classmethod
     def linear_response(cls, asset: Asset, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"]:
@@ -246,22 +240,7 @@ class DeepFramebuffer(Method):
     @classmethod
     def weighted(cls, asset: Asset, weights: Float64[ndarray, "b C 3"]) -> Float32[ndarray, "b H W 3"]:
         """b pictures from the irradiance of the view clusters."""
-        light = weights.transpose(1, 0, 2).astype(np.float32)  # (C, b, 3)
-        clusters = asset.manifest["gather"]["clusters"]
-        pictures = _mixed(asset.stored, light[:clusters])
-        if asset.quantity == "radiance":
-            pictures = pictures * (cls._albedo(asset) / np.float32(np.pi))
-        for name, reflectance, own in (("gloss_neighbors", "glossy", light[clusters:]), (BEHIND, THROUGH, light[:clusters])):
-            if name in asset.tables and len(own):
-                layers = asset.tables[name].reshape(-1, asset.height, asset.width, 3)
-                pictures = pictures + _mixed(layers, own) * (asset.images[reflectance] / np.float32(np.pi))
-        return np.ascontiguousarray(pictures)
-
-    @classmethod
-    def _albedo(cls, asset: Asset) -> Float32[ndarray, "H W 3"]:
-        if "albedo" not in asset.images:
-            raise InputError("expected the albedo of the pixels in the asset, found none; relight all of it")
-        return asset.images["albedo"]
+        return pictures(asset, weights)
 
     @classmethod
     def local_lights(cls, lights: Sequence[Light]) -> list[PointLight]:
@@ -284,18 +263,11 @@ class DeepFramebuffer(Method):
     @classmethod
     def summary(cls, asset: Asset) -> str:
         told = asset.manifest["gather"]
-        return (
-            f"{told['surfels']} surfels, {told['clusters']} view clusters of {told['view_rays']} rays, {cls.size(asset) / MEGABYTE:.1f} MB"
-        )
+        return f"{told['surfels']} surfels, {told['clusters']} view clusters of {told['view_rays']} rays, {size(asset) / MEGABYTE:.1f} MB"
 
     @classmethod
     def describe(cls, asset: Asset) -> Mapping[str, Any]:
-        return {**asset.manifest["gather"], "nearest": len(asset.stored), "gather_bytes": cls.size(asset)}
-
-    @classmethod
-    def size(cls, asset: Asset) -> int:
-        """Bytes of pool, links and pixels."""
-        return sum(table.nbytes for table in asset.tables.values()) + asset.stored.nbytes
+        return {**asset.manifest["gather"], "nearest": len(asset.stored), "gather_bytes": size(asset)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,23 +340,6 @@ def _ready(asset: Asset) -> _Ready:
         while len(_kept) > KEPT:
             _kept.popitem(last=False)
     return found
-
-
-def _neighbors(clusters: ndarray, weights: ndarray) -> ndarray:
-    """(K, P, 3) bytes: low and high byte of the cluster, weight by the pixel's largest."""
-    share = weights / np.maximum(weights.max(axis=1, keepdims=True), 1e-30)
-    return np.stack([clusters & 255, clusters >> 8, np.round(255 * share)], axis=2).astype(np.uint8).transpose(1, 0, 2)
-
-
-def _mixed(layers: ndarray, light: Float32[ndarray, "C b 3"]) -> Float32[ndarray, "b H W 3"]:
-    """The mean over the clusters of each pixel, of layers (K, H, W, 3) as `_neighbors` has them; 0 of pixels without."""
-    total = np.zeros((*layers.shape[1:3], *light.shape[1:]), np.float32)
-    share = np.zeros((*layers.shape[1:3], 1, 1), np.float32)
-    for layer in layers:
-        own = layer[:, :, 2, None, None].astype(np.float32)
-        total += own * light[layer[:, :, 0].astype(np.int64) + 256 * layer[:, :, 1].astype(np.int64)]
-        share += own
-    return (total / np.maximum(share, 1)).transpose(2, 0, 1, 3)
 
 
 METHOD = DeepFramebuffer

@@ -149,9 +149,9 @@ def is_gathered(folder: Path, key: str) -> bool:
         return False
 
 
-def cluster_count(asked: int | None, pixels: int) -> int:
-    """How many view clusters: those asked for, or one a pixel up to DEFAULT_CLUSTERS."""
-    return min(pixels, DEFAULT_CLUSTERS if asked is None else asked)
+def cluster_count(asked: int | None, pixels: int, most: int = DEFAULT_CLUSTERS) -> int:
+    """How many view clusters: those asked for, or one a pixel up to `most`."""
+    return min(pixels, most if asked is None else asked)
 
 
 def _traced(pool: Surfels, passing: Behind, origins: RayOrigins, rays: int, seed: int, progress: Callable[[int], None]) -> SparseLinks:

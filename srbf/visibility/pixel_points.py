@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy import ndarray
@@ -34,6 +34,11 @@ class PixelPoints:
     size: int
     plain: int = 0
     clustered: int | None = None
+
+    @staticmethod
+    def of_centers(receivers: Receivers) -> PixelPoints:
+        """Of every covered pixel what its center shows."""
+        return PixelPoints.of_view(replace(receivers, sampling={**receivers.sampling, "camera": None}))
 
     @staticmethod
     def of_view(receivers: Receivers) -> PixelPoints:

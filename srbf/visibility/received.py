@@ -54,9 +54,9 @@ class RayShadows:
         return ~self._occluders.occluded(self._starts[points], toward, distance)
 
 
-def starts_of(positions: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]) -> Float32[ndarray, "n 3"]:
-    """Where shadow rays from surfaces start: a little above them, m."""
-    return (positions + lift_of(positions) * normals).astype(np.float32)
+def starts_of(positions: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"], lift: float | None = None) -> Float32[ndarray, "n 3"]:
+    """Where shadow rays from surfaces start: a little above them, or `lift`, m."""
+    return (positions + (lift_of(positions) if lift is None else lift) * normals).astype(np.float32)
 
 
 def lift_of(positions: Float[ndarray, "n 3"]) -> float:
@@ -65,13 +65,13 @@ def lift_of(positions: Float[ndarray, "n 3"]) -> float:
 
 
 class ReceivedLight:
-    """Irradiance of lights on N cells, shadowed by rays to `occluders`, or otherwise."""
+    """Irradiance of lights on N cells, shadowed by rays to `occluders`, or otherwise; `lift`: how far above them rays start, m."""
 
-    def __init__(self, cells: Cells, occluders: EmbreeTriangles | Shadows) -> None:
+    def __init__(self, cells: Cells, occluders: EmbreeTriangles | Shadows, lift: float | None = None) -> None:
         self._cells = cells
         self._normals = cells.normals.astype(np.float64)
         self._places = cells.places.astype(np.float64)
-        self._starts = starts_of(self._places, self._normals)
+        self._starts = starts_of(self._places, self._normals, lift)
         self._shadows: Shadows = RayShadows(self._starts, occluders) if isinstance(occluders, EmbreeTriangles) else occluders
         self._areas = cells.areas.astype(np.float64)
 

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from test_resume import wait_for_lights
 from srbf.asset import Asset
 from srbf.bake.accumulation import Accumulation
 from srbf.bake.folder import hold, hold_shard
+from srbf.bake.gather_set import GatherSet
 from srbf.bake.images import CaptureImages
 from srbf.bake.light_pass import add_pass
 from srbf.bake.light_sets import CloudSet, NamedSet
@@ -320,3 +322,10 @@ def test_a_job_of_a_light_set_says_what_it_is(light_set: NamedSet | CloudSet, ex
     if light_set.kind == "cloud":
         glossy = BakeSettings(Receiver("lightmap", "A"), light_set=light_set, quantity="radiance", gloss=2)
         assert {*expected, "--gloss=2", "--quantity=radiance"} <= set(arguments(glossy))
+
+
+def test_a_job_of_a_gather_says_samples_or_a_pool() -> None:
+    view = BakeSettings(Receiver("view"), transport="indirect", quantity="radiance", light_set=GatherSet(500, 40))
+    assert {"--light-set=gather", "--pool=500", "--view-clusters=40"} <= set(arguments(view))
+    sampled = arguments(replace(view, light_set=GatherSet(clusters=40, gather=120)))
+    assert "--gather=120" in sampled and not any(flag.startswith("--pool") for flag in sampled)

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,10 +21,12 @@ from srbf.lights import PointLight
 from srbf.methods import linear_response
 from srbf.relighting.direct_light import Added, Direct
 from srbf.visibility.gather_operator import GATHER_FILE, GatherOperator
+from srbf.visibility.gathered_samples import SAMPLES_FILE, GatheredSamples
 
 pytestmark = pytest.mark.blender
 
 VIEW = ["--receiver", "view", "--size", "24x24", "--light-set", "gather", "--pool", "600", "--view-clusters", "200", "--seed", "77"]
+LOBES = 0.05  # of 300 clusters of pixels with a detailed stone among them
 CLOTH, WHOLE = 0.08, 0.05  # of the light of some 20 pixels, and of the picture: references of 128 samples, surfels of a pool of 8000
 
 
@@ -55,10 +58,33 @@ def test_a_view_is_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None
     assert len(list((tmp_path / "shown").iterdir())) == 2
 
 
+def test_gather_samples_are_baked_fitted_relit_and_resumed(scene, tmp_path: Path) -> None:
+    """The paper's form: one bounce, so less energy than Cycles' four, and as much of the direct light."""
+    folder, asset, bake = tmp_path / "capture", tmp_path / "asset", [*VIEW[:6], "--view-clusters", "200", "--seed", "77", "--gather"]
+    told = done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "0", "--dry-run").output
+    assert "gather samples of view clusters" in told and "not estimated" not in told
+    done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "1", "--holdout-samples", "256")
+    made = (folder / SAMPLES_FILE).stat().st_mtime_ns
+    done("bake", scene("unlit"), "-o", folder, *bake, "24", "--holdout", "1", "--holdout-samples", "256")
+    assert (folder / SAMPLES_FILE).stat().st_mtime_ns == made and not (folder / GATHER_FILE).exists()
+    assert "another" in refused(["bake", scene("unlit"), "-o", folder, *bake, "25", "--holdout", "1", "--holdout-samples", "256"], 1)
+    assert Capture.open(folder).manifest["source"]["settings"]["light_set"]["gather"] == 24
+    assert GatheredSamples.read(folder).places.shape == (200, 24, 3)
+    done("fit", folder, "-o", asset)
+    opened, capture = Asset.open(asset), Capture.open(folder)
+    x, y, z = capture.positions([0])[0].tolist()
+    once = linear_response(opened, [PointLight((x, y, z), falloff="inverse-square")])
+    assert opened.method == "gather-samples" and 0.3 < once.sum() / capture.image(0).sum() < 0.95
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [{"kind": "point", "position": [x, y, z]}]}]}))
+    done("relight", asset, "--lights", tmp_path / "frames.json", "-o", tmp_path / "shown", "--direct", "ray")
+    assert len(list((tmp_path / "shown").iterdir())) == 1
+
+
 @pytest.mark.parametrize(
     ("name", "flags", "status", "words"),
     [
         ("open_air", [], 1, "camera"),
+        ("unlit", ["--gather", "60"], 2, "--gather without --pool"),
         ("unlit", ["--pool", "3"], 2, "16 to 65536"),
         ("unlit", ["--transport", "combined"], 2, "indirect"),
         ("unlit", ["--receiver", "lightmap:Floor"], 2, "view"),
@@ -132,6 +158,26 @@ def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
             with Added(opened, kind) as added:
                 near = np.asarray(added.response([light]))
             assert np.sqrt(((near - direct)[floor] ** 2).sum() / (direct[floor] ** 2).sum()) < most, kind
+
+
+def test_gather_samples_of_lobes_are_one_bounce_of_links(tmp_path: Path) -> None:
+    """The paper's form on a glossy floor against ours with one bounce: lobes share the clusters by energy, and gather as much light."""
+    scene = tmp_path / "floor.blend"
+    subprocess.run([sys.executable, str(SCENES / "glossy_floor.py"), str(scene)], check=True, capture_output=True, timeout=120)
+    size, own = [*VIEW[:4], "--light-set", "gather", "--seed", "77", "--holdout", "0"], {}
+    for form, flags in (("samples", ["--gather", "400", "--view-clusters", "300"]), ("links", ["--pool", "20000"])):
+        done("bake", scene, "-o", tmp_path / f"{form}-capture", *size, *flags)
+        done("fit", tmp_path / f"{form}-capture", "-o", tmp_path / form)
+        own[form] = Asset.open(tmp_path / form)
+    found, capture = GatheredSamples.read(tmp_path / "samples-capture"), Capture.open(tmp_path / "samples-capture")
+    specular, diffuse = (np.asarray(capture.channel(name), np.float64).sum() for name in ("glossy", "albedo"))
+    assert abs(found.lobes - 300 * specular / (specular + diffuse)) < 2 and found.lobes + found.diffuse == 300
+    x, y, z = capture.manifest["free_places"][0]
+    light = PointLight((x, y, z), falloff="inverse-square")
+    once = replace(own["links"], manifest={**own["links"].manifest, "gather": {**own["links"].manifest["gather"], "bounces": 1}})
+    shiny = own["links"].images["glossy"].max(axis=2) > 0.01
+    pictures = linear_response(own["samples"], [light])[shiny], linear_response(once, [light])[shiny]
+    np.testing.assert_allclose(pictures[0].sum() / pictures[1].sum(), 1, atol=LOBES)
 
 
 def test_light_passes_through_cloth_as_cycles_renders_it(tmp_path: Path) -> None:

@@ -88,6 +88,7 @@ NOT_RUN = {
     "python benchmarks/emissive_objects.py *": "wants four bakes of a scene",
     "python benchmarks/lights_inside.py *": "renders lights of five kinds twice: minutes",
     "python benchmarks/deep_framebuffer.py *": "the same for a view",
+    "python benchmarks/deep_framebuffer_paper.py *": "bakes a view twice, then renders lights of four kinds: minutes",
     "python benchmarks/deep_framebuffer_passes.py *": "wants an asset of a view: half a minute at its smallest",
     "python benchmarks/transfer_frame.py *": "wants an asset of surfels: a minute at its smallest",
     "python benchmarks/transfer_paper.py *": "wants a capture of 40,000 surfels",

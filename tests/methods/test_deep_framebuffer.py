@@ -21,6 +21,7 @@ from srbf.fitting.options import fit
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
 from srbf.methods import linear_response, responses
 from srbf.methods.deep_framebuffer import DeepFramebuffer
+from srbf.methods.mixed_clusters import size
 from srbf.relighting.light_rig import LightRig
 from srbf.visibility.gather_operator import GATHER_FILE, GatherOperator
 
@@ -112,7 +113,7 @@ def test_the_asset_on_disk_is_the_asset(asset: Asset, tmp_path: Path) -> None:
 def test_a_budget_keeps_fewer_rays_and_the_energy(capture: Capture, asset: Asset, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("srbf.methods.deep_framebuffer.MEGABYTE", 6e5)
     small = DeepFramebuffer(budget=1).encode(capture)
-    assert DeepFramebuffer.size(small) < 0.75 * DeepFramebuffer.size(asset)
+    assert size(small) < 0.75 * size(asset)
     assert small.manifest["gather"]["view_rays"] < asset.manifest["gather"]["view_rays"]
     one, other = (linear_response(found, LIGHTS) for found in (small, asset))
     assert abs(one.sum() / other.sum() - 1) < 0.01
@@ -139,7 +140,7 @@ def test_a_view_of_nothing_is_refused(tmp_path: Path, capture: Capture) -> None:
     empty = view_of_room(tmp_path / "empty", Room.box((1, 1, 1), 0.5), 100, 4, tested=0)
     write_image(empty.folder / "coverage.exr", np.zeros((empty.height, empty.width, 1), np.float32), "float")
     with pytest.raises(InputError, match="every pixel is empty"):
-        GatherSet(64, None, None, surfaces_of(BOX, 0.5)).trace(empty, 1, lambda done, total, what: None)
+        GatherSet(64, None, None, None, surfaces_of(BOX, 0.5)).trace(empty, 1, lambda done, total, what: None)
 
 
 def test_what_fits_no_deep_framebuffer_is_refused(asset: Asset, capture: Capture, tmp_path: Path) -> None:

@@ -52,7 +52,17 @@ def another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_methods_are_listed_from_the_simplest() -> None:
     of_directions, inside = (
         ("relighting-map", "eigen-map", "clustered-eigen-map"),
-        ("light-mix", "light-cloud", "named-maps", "glossy-cloud", "transfer", "deep-framebuffer", "neural-map", "transfer-paper"),
+        (
+            "light-mix",
+            "light-cloud",
+            "named-maps",
+            "glossy-cloud",
+            "transfer",
+            "deep-framebuffer",
+            "gather-samples",
+            "neural-map",
+            "transfer-paper",
+        ),
     )
     assert registry.method_names() == (*of_directions, *inside)
     own = {path.stem for path in (ROOT.parent / "web" / "src" / "methods").glob("*.ts")} - {"index", "method", "node_kit"}
