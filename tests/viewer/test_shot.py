@@ -146,6 +146,11 @@ def test_the_script_makes_the_lights_in_blender(chromium: Any, page: Callable[..
     assert size == pytest.approx(np.radians(70), rel=1e-5) and blend == pytest.approx((inner - outer) / (1 - outer), rel=1e-5)
 
 
+def test_the_page_is_served_the_places_that_bright_surfels_light(asset: Asset, tmp_path: Path) -> None:
+    asset.save(tmp_path / "asset")
+    assert "asset/view_points.exr" in contents_of([tmp_path / "asset"])
+
+
 def test_the_page_says_that_it_shows_no_gloss_and_no_light_from_behind(asset: Asset, tmp_path: Path) -> None:
     made = {"plain": asset, "shiny": with_lobes(asset), "thin": with_backs(asset)}
     for name, one in made.items():

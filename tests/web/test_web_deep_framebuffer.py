@@ -44,6 +44,13 @@ def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 
 
 @pytest.fixture(scope="module")
+def divided(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    """Of many surfels, with a wall across that has a door."""
+    room = Room.box((3, 2, 2), 0.25, 0.6, wall=(1.5, 0.6, 1.4), lid=False)
+    return DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("divided") / "capture", room, 8000, 150, tested=0))
+
+
+@pytest.fixture(scope="module")
 def url(browser: Any, asset: Asset) -> str:
     return browser.serve(asset)
 
@@ -71,6 +78,25 @@ def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run:
         expected = methods.relight(asset, lights)
         tolerance = RIM if any(isinstance(light, DirectionalLight) for light in lights) else CLOSE
         np.testing.assert_allclose(picture, expected, atol=tolerance * max(expected.max(), 1e-9), err_msg=str(lights))
+
+
+@pytest.mark.parametrize("weights", ["gpu", "cpu"])
+def test_bright_surfels_light_as_in_numpy(browser: Any, divided: Asset, weights: str) -> None:
+    """Lights 3 cm off a wall, in a corner, and beside the wall with the door, behind which less than all is seen of what is bright."""
+    places = ((0.03, 1.2, 0.9), (0.04, 0.05, 0.9), (1.47, 1.6, 0.5))
+    sets: list[list[Light]] = [[PointLight(place, (1, 0.5, 0.2), falloff="inverse-square")] for place in places]
+    sets.append([AreaLight((0.05, 1.0, 0.9), u=(0, 0.1, 0), v=(0, 0, -0.1)), LIGHTS["point"]])
+    linked = {name: table for name, table in divided.tables.items() if name != "view_points"}
+    bare = replace(divided, tables=linked | {"view_links": divided.tables["view_links"].copy()})
+    for bounces in (1, 12):
+        limited = replace(divided, manifest={**divided.manifest, "gather": {**divided.manifest["gather"], "bounces": bounces}})
+        drawn = browser.lightmaps("three-lightmap", browser.serve(limited), [told(*lights) for lights in sets], weights=weights)
+        for picture, lights in zip(drawn, sets, strict=True):
+            expected = methods.relight(limited, lights)
+            np.testing.assert_allclose(picture, expected, atol=CLOSE * expected.max(), err_msg=str(lights))
+    for lights in sets:
+        expected = methods.relight(divided, lights)
+        assert np.abs(methods.relight(bare, lights) - expected).max() > 10 * CLOSE * expected.max()
 
 
 def test_a_light_that_stays_is_not_computed_again(browser: Any, url: str) -> None:

@@ -4,6 +4,7 @@ import { decodeFloat } from "./exr";
 import type { AssetFiles } from "./files";
 import { type ByteImage, type FloatImage, padToFour } from "./image";
 import type { Manifest } from "./manifest";
+import { NearPool } from "./near_sources";
 import { decodePng } from "./png";
 import { Cells } from "./received_light";
 import type { Surfels } from "./surfels";
@@ -17,6 +18,8 @@ export interface GatherManifest extends Manifest {
   view_rows?: { file: string };
   exchange_links?: { file: string };
   exchange_rows?: { file: string };
+  /** Places and normals of the view's clusters: without, all light comes by links. */
+  view_points?: { file: string };
 }
 
 /** Sparse links of `count` rows, as the shader pack's `srbfLinkedLight` takes them. */
@@ -39,6 +42,8 @@ export interface Gather {
   readonly view: PackedLinks;
   /** Bounces that are added up. */
   readonly terms: number;
+  /** What bright surfels light in closed form. */
+  readonly near?: NearPool;
 }
 
 export const ACROSS = 256; // rows, or clusters, next to each other in a texture
@@ -49,11 +54,13 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
   const { surfels, clusters, view_rays, exchange_rays, bounces } = manifest.gather as Required<GatherManifest>["gather"];
   const file = (manifest.pool as { file: string }).file;
   const scene = manifest.scene as string;
-  const [pool, corners, view, exchange] = await Promise.all([
+  const places = manifest.view_points?.file;
+  const [pool, corners, view, exchange, points] = await Promise.all([
     files.bytes(file).then((buffer) => decodeFloat(buffer, file)),
     files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
     readLinks(files, manifest, "view", clusters, view_rays, surfels),
     readLinks(files, manifest, "exchange", surfels, exchange_rays, surfels),
+    places === undefined ? undefined : files.bytes(places).then((buffer) => decodeFloat(buffer, places)),
   ]);
   if (pool.width !== surfels || pool.height !== 3) throw new SrbfError(`expected ${surfels} x 3 numbers in ${file}, found ${pool.width} x ${pool.height}`);
   const first = pool.data.slice(0, 8 * surfels);
@@ -63,17 +70,24 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
     for (let c = 0; c < 3; ++c) albedo[3 * i + c] = pool.data[4 * (2 * surfels + i) + c];
   }
   const cells = new Cells({ kind: "float", width: surfels, height: 2, channels: 4, data: first }, file);
-  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, terms: termsOf(exchange, albedo, bounces ?? MOST_TERMS) };
+  const terms = termsOf(exchange, albedo, bounces ?? MOST_TERMS);
+  const near = points && terms ? new NearPool(cells, albedo, points, clusters, places as string) : undefined;
+  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, terms, near };
 }
 
-/** What the clusters receive from surfels of this direct irradiance, all bounces included; both (n, 3). */
-export function gathered({ exchange, view, albedo, terms }: Gather, irradiance: Float64Array): Float64Array {
+/**
+ * What the clusters receive from surfels of this direct irradiance, all bounces included; both (n, 3). `near`: what bright surfels lay on the
+ * clusters and, after these, on the surfels, which has been reflected once already.
+ */
+export function gathered({ exchange, view, albedo, terms }: Gather, irradiance: Float64Array, near?: Float64Array): Float64Array {
+  const own = near?.subarray(3 * view.count);
   let radiosity = new Float64Array(irradiance.length);
   for (let term = 0; term < terms; ++term) {
     const arriving = term ? linked(exchange, radiosity) : radiosity;
-    radiosity = irradiance.map((direct, i) => albedo[i] * (direct + arriving[i]));
+    radiosity = irradiance.map((direct, i) => albedo[i] * (direct + arriving[i] + (term && own ? own[i] : 0)));
   }
-  return linked(view, radiosity);
+  const received = linked(view, radiosity);
+  return near ? received.map((x, i) => x + near[i]) : received;
 }
 
 /** Light along links, (count, 3) from (S, 3): `srbfLinkedLight` of every row. */

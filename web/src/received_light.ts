@@ -134,7 +134,7 @@ export class Cells {
 }
 
 /** Two unit vectors across a normal and each other, as the Python library has them [Duff2017]. */
-function frame(x: number, y: number, z: number): [Triple, Triple] {
+export function frame(x: number, y: number, z: number): [Triple, Triple] {
   const sign = z >= 0 ? 1 : -1;
   const a = -1 / (sign + z);
   const b = x * y * a;

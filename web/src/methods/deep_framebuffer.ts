@@ -6,6 +6,7 @@ import { ACROSS, type Gather, gathered, type GatherManifest, readGather } from "
 import { checkSize, type FloatImage } from "../image";
 import { rgb } from "../light_values";
 import type { Triple } from "../matrix";
+import { without } from "../near_sources";
 import { Occluders } from "../occluders";
 import shader from "../shaders/deep_framebuffer.glsl";
 import { type Placed, placed } from "../surfels";
@@ -27,6 +28,7 @@ export const deepFramebuffer: Method = {
       if (!(Number.isInteger(manifest.gather?.[key]) && (manifest.gather?.[key] as number) >= 1)) fail(`gather with ${key} of at least 1`, manifest.gather);
     }
     for (const key of ["pool", "view_links", "view_rows", "exchange_links", "exchange_rows"] as const) if (typeof manifest[key]?.file !== "string") fail(key, manifest[key]);
+    if (manifest.view_points !== undefined && typeof manifest.view_points.file !== "string") fail("view_points", manifest.view_points);
     if (typeof manifest.scene !== "string") fail("a scene", manifest.scene);
     if (manifest.quantity === "radiance" && typeof manifest.albedo !== "string") fail("albedo of pixels", manifest.albedo);
   },
@@ -70,7 +72,10 @@ function projection(gather: Gather): Tables["projectedWeights"] {
   const white = (light: Placed): Float64Array => {
     occluders ??= new Occluders(corners);
     const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    return gathered(gather, rgb(received, cells.count));
+    const irradiance = rgb(received, cells.count);
+    const distant = light.kind === "directional";
+    const near = gather.near?.sources(irradiance, { place: distant ? light.direction : light.position, distant });
+    return near ? gathered(gather, without(near, irradiance), gather.near?.irradiance(near, occluders)) : gathered(gather, irradiance);
   };
   return (lights) => {
     if (lights.named.length) throw new SrbfError(`expected lights inside the scene for a deep framebuffer, found ${JSON.stringify(lights.named[0].name)}`);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What one look of a light lays on each cell of a scene's surfaces, added to that of the looks before: the arithmetic of srbf/visibility/received.py.
+// SRBF_SOURCES: what a group of bright surfels lays there, seen from one place: that of srbf/visibility/near_sources.py.
 // SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
 // depths (or their means, VSM). SRBF_MEAN_NORMALS: normals may be means over several faces. SRBF_REVERSED: the engine's depth is 1 where it is nearest.
 precision highp float;
@@ -16,6 +17,9 @@ precision highp samplerCubeShadow;
 #include "shadow/point_shadow_place.glsl"
 #include "surfels/surfel_visibility.glsl"
 #endif
+#ifdef SRBF_SOURCES
+#include "surfels/disc_factor.glsl"
+#endif
 
 uniform sampler2D places;   // less the middle of all cells, meters; area
 uniform sampler2D normals;  // unit; share of the patch's area
@@ -30,6 +34,11 @@ uniform int falloff;
 uniform float versineInner;
 uniform float versineOuter;
 uniform float lambertian;
+#ifdef SRBF_SOURCES
+uniform sampler2D sources;  // rows: place and area, normal, radiosity, of one surfel a column
+uniform int first;          // column of the group's first surfel
+uniform int count;
+#endif
 #if SRBF_SHADOW == 1
 uniform sampler2D nearness;  // six faces of a cube, or one map of a directional light
 uniform float reach;         // meters of half a directional map's side
@@ -57,12 +66,20 @@ uniform sampler2D shadowMap;
 
 out vec4 irradiance;
 
-float unshadowed(vec4 cell, vec3 normal) {
-#ifdef SRBF_DISTANT
-    return max(dot(normal, light), 0.0);
+vec3 unshadowed(vec4 cell, vec3 normal) {
+#ifdef SRBF_SOURCES
+    vec3 total = vec3(0.0);
+    for (int i = first; i < first + count; ++i) {
+        vec4 source = texelFetch(sources, ivec2(i, 0), 0);
+        float factor = srbfDiscFactor(source.xyz - cell.xyz, normal, texelFetch(sources, ivec2(i, 1), 0).xyz, source.w);
+        total += factor * texelFetch(sources, ivec2(i, 2), 0).rgb;
+    }
+    return total;
+#elif defined(SRBF_DISTANT)
+    return color * max(dot(normal, light), 0.0);
 #else
     SrbfPointLight pointLight = SrbfPointLight(light, vec3(0.0), color, axis, a0, radius, versineInner, versineOuter, falloff);
-    return srbfCellIrradiance(cell, normal, pointLight, lambertian);
+    return color * srbfCellIrradiance(cell, normal, pointLight, lambertian);
 #endif
 }
 
@@ -157,9 +174,9 @@ void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec4 cell = texelFetch(places, at, 0);
     vec3 normal = texelFetch(normals, at, 0).xyz;
-    float amount = unshadowed(cell, normal);
-    if (amount > 0.0) {
+    vec3 amount = unshadowed(cell, normal);
+    if (amount != vec3(0.0)) {
         amount *= visibility(cell.xyz + lift * normal, normal);
     }
-    irradiance = vec4(texelFetch(former, at, 0).rgb + color * amount, 1.0);
+    irradiance = vec4(texelFetch(former, at, 0).rgb + amount, 1.0);
 }

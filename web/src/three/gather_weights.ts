@@ -1,6 +1,7 @@
 /**
  * The irradiance of a deep framebuffer's view clusters, computed by the GPU: direct light on its surfels, bounces between them, links to the clusters.
- * A light that has not moved is kept, so that another color, or another light, costs one small pass. Nothing is read back.
+ * A light that has not moved is kept, so that another color, or another light, costs one small pass. Of one that has moved, direct light is read back
+ * where bright surfels light in closed form, which the CPU finds.
  */
 import { type DataTexture, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import bounceStage from "../../../glsl/stages/deep_framebuffer_bounce.frag";
@@ -14,6 +15,7 @@ import { packedCells } from "../surfels";
 import type { ShadowedLook } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
+import { NearIrradiance } from "./near_irradiance";
 import { SurfelIrradiance } from "./surfel_irradiance";
 import { tableTexture } from "./textures";
 
@@ -22,6 +24,7 @@ export class GatherWeights {
   /** How often the bounces of a light were computed. */
   computed = 0;
   private readonly direct: SurfelIrradiance;
+  private readonly near?: NearIrradiance;
   private readonly albedo: DataTexture;
   private readonly links: DataTexture[];
   private readonly radiosity: [WebGLRenderTarget, WebGLRenderTarget];
@@ -42,6 +45,7 @@ export class GatherWeights {
     const cells = packedCells(gather.surfels);
     this.middle = cells.middle;
     this.direct = new SurfelIrradiance(gather.surfels, cells, shadowSize, { SRBF_MEAN_NORMALS: 1 });
+    if (gather.near) this.near = new NearIrradiance(gather.near, cells, this.direct);
     const albedo = new Float32Array(4 * cells.width * cells.height);
     for (let i = 0; i < gather.surfels.cells.count; ++i) albedo.set(gather.albedo.subarray(3 * i, 3 * i + 3), 4 * i);
     this.albedo = floatTexture(albedo, cells.width, cells.height);
@@ -83,25 +87,31 @@ export class GatherWeights {
     renderer.clear(true, false, false);
     irradiance.forEach(({ texture }, i) => {
       const [look] = shining[i];
-      const values = { former: former.texture, light: texture, color: look.color.map((x) => x * shining[i].length) };
-      for (const [name, value] of Object.entries(values)) this.sum.uniforms[name].value = value;
-      this.sum.draw(renderer, next);
+      this.add(renderer, former.texture, texture, look.color.map((x) => x * shining[i].length), next);
       [former, next] = [next, former];
     });
   }
 
   dispose(): void {
     const targets = [...this.radiosity, ...this.sums, ...this.known.values(), ...this.unused];
+    this.near?.dispose();
     for (const one of [this.direct, this.albedo, ...this.links, ...targets, this.bounce, this.clusters, this.sum]) one.dispose();
+  }
+
+  private add(renderer: WebGLRenderer, former: Texture, light: Texture, color: number[], target: WebGLRenderTarget): void {
+    for (const [name, value] of Object.entries({ former, light, color })) this.sum.uniforms[name].value = value;
+    this.sum.draw(renderer, target);
   }
 
   /** Of a light in white. */
   private white(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): WebGLRenderTarget {
     const target = this.unused.pop() ?? floatTarget(...this.size);
     const share = 1 / looks.length;
-    this.bounce.uniforms.direct.value = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: [share, share, share] as Triple })));
+    const direct = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: [share, share, share] as Triple })));
+    const near = this.near?.draw(renderer, direct, looks);
     let [light, next] = this.radiosity;
     for (let term = 0; term < this.gather.terms; ++term) {
+      this.bounce.uniforms.direct.value = near ? (term ? near.second : near.far) : direct.texture;
       this.bounce.uniforms.light.value = light.texture;
       this.bounce.uniforms.first.value = term ? 0 : 1;
       this.bounce.draw(renderer, next);
@@ -112,7 +122,9 @@ export class GatherWeights {
       renderer.clear(true, false, false);
     }
     this.clusters.uniforms.light.value = light.texture;
-    this.clusters.draw(renderer, target);
+    const [, linked] = this.sums;
+    this.clusters.draw(renderer, near ? linked : target);
+    if (near) this.add(renderer, linked.texture, near.clusters, [1, 1, 1], target);
     ++this.computed;
     return target;
   }

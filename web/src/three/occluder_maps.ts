@@ -5,7 +5,7 @@ import { cross, type Triple } from "../matrix";
 import fragmentShader from "../shaders/occluder_nearness.glsl";
 import vertexShader from "../shaders/occluder_corner.glsl";
 
-const NEAREST = 5e-3; // meters: what is nearer to a light casts no shadow
+const NEAREST = 5e-3; // meters
 
 /** What the lookup needs of the map that was drawn last. */
 export interface DrawnMap {
@@ -48,8 +48,11 @@ export class OccluderMaps {
     this.far = mesh({ SRBF_DISTANT: 1 });
   }
 
-  /** Draw what a light sees; `place` is its place, or the direction to a distant one. The renderer clears nothing by itself. */
-  draw(renderer: WebGLRenderer, place: Triple, distant: boolean): DrawnMap {
+  /**
+   * Draw what a light sees; `place` is its place, or the direction to a distant one. What is nearer to it than `nearest` (m) casts no shadow.
+   * The renderer clears nothing by itself.
+   */
+  draw(renderer: WebGLRenderer, place: Triple, distant: boolean, nearest = NEAREST): DrawnMap {
     const { uniforms, size, camera } = this;
     const target = distant ? this.flat : this.cube;
     renderer.setClearColor(0, 0);
@@ -62,7 +65,7 @@ export class OccluderMaps {
       renderer.render(this.far, camera);
       return { nearness: target.texture, reach: this.radius, across, up };
     }
-    set(uniforms, { light: place, reach: 1 });
+    set(uniforms, { light: place, reach: 1, nearest });
     target.viewport.set(0, 0, 3 * size, 2 * size);
     renderer.setRenderTarget(target);
     renderer.clear(true, true, false);

@@ -8,12 +8,17 @@ import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
 
+/** A pass of surfel_irradiance.glsl. */
+export function irradiancePass(uniforms: Record<string, IUniform>, defines: Record<string, number>): FullscreenPass {
+  return new FullscreenPass(cellIrradiance, uniforms, defines);
+}
+
 export class SurfelIrradiance {
   readonly places: DataTexture;
   readonly normals: DataTexture;
   private readonly lift: number;
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
-  private readonly maps: OccluderMaps;
+  readonly maps: OccluderMaps;
   private readonly passes = new Map<string, FullscreenPass>();
 
   /** `shadowSize`: texels per side of a face of the shadow maps; `defines` of surfel_irradiance.glsl. */
@@ -31,7 +36,7 @@ export class SurfelIrradiance {
   }
 
   /** The irradiance of all `looks` together, one texel per cell; within `undisturbed`. */
-  draw(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): Texture {
+  draw(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): WebGLRenderTarget {
     let [sum, next] = this.sums;
     renderer.setRenderTarget(sum);
     renderer.setClearColor(0, 0);
@@ -40,7 +45,7 @@ export class SurfelIrradiance {
       this.add(renderer, look, sum.texture, next);
       [sum, next] = [next, sum];
     }
-    return sum.texture;
+    return sum;
   }
 
   dispose(): void {
@@ -53,7 +58,7 @@ export class SurfelIrradiance {
     const key = JSON.stringify(defines);
     let pass = this.passes.get(key);
     if (!pass) {
-      pass = new FullscreenPass(cellIrradiance, this.uniforms(), defines);
+      pass = irradiancePass(this.uniforms(), defines);
       this.passes.set(key, pass);
     }
     const own = shadow ? {} : this.maps.draw(renderer, look.place, look.distant);

@@ -82,7 +82,7 @@ export class SurfelWeights {
   /** Draw the weights under lights, each a list of looks; within `undisturbed`. */
   draw(renderer: WebGLRenderer, lights: readonly (readonly ShadowedLook[])[]): void {
     this.repaint(renderer);
-    this.means.uniforms.irradiance.value = this.direct.draw(renderer, lights.flat());
+    this.means.uniforms.irradiance.value = this.direct.draw(renderer, lights.flat()).texture;
     this.means.draw(renderer, this.received);
     for (const { parts, partial, whole, target: wholes } of this.tables) {
       parts.draw(renderer, partial);
