@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +49,17 @@ def add(layer: bpy.types.ViewLayer) -> None:
         shown = tree.nodes.new("ShaderNodeOutputAOV")
         shown.aov_name = AOV
         tree.links.new(color.outputs[0], shown.inputs["Color"])
+
+
+def is_layered(material: bpy.types.Material | None) -> bool:
+    """Whether all gloss of a material is that of Principled surfaces, which lies over their diffuse reflection."""
+    kinds = set() if material is None or not material.use_nodes else set(_kinds(material.node_tree))
+    return bool(kinds & FRESNEL) and not kinds & PLAIN
+
+
+def _kinds(tree: bpy.types.NodeTree | None) -> Iterator[str]:
+    for node in () if tree is None else tree.nodes:
+        yield from _kinds(node.node_tree) if node.type == "GROUP" else (node.bl_idname,)
 
 
 def remove(layer: bpy.types.ViewLayer) -> None:

@@ -36,7 +36,8 @@ def facts(scene: bpy.types.Scene, question: dict[str, Any], events: Events, fram
     scene_lights: true            -> `scene_lights`: {lights, left_out, sun_angle}, see `scene_lights.values`
     places                        -> `places`: see `free_places.places`
     surfaces: {cells, spacing, gloss} -> `files` in `scratch`: `corners` (T, 3, 3), `albedo` (T, 3), with gloss as if it were diffuse where
-        `gloss` is true, or `caustics` and the scene has reflective ones, `transmission` (T, 3), what is let through diffusely,
+        `gloss` is true, or `caustics` and the scene has reflective ones, else of `caustics` apart in `gloss` (T, 3),
+        `transmission` (T, 3), what is let through diffusely,
         `object` (T,), `transparent` (T,), `emission` (T, 3) and `one_sided` (T,) of all surfaces in fragments no longer than a cell, if
         they were `cells`, or than `spacing` m if that is more; `occluders` (U, 3, 3), the triangles that block light;
         `surface_objects`: their names by number; `bounces`: diffuse ones that the scene's settings allow
@@ -89,11 +90,13 @@ def _probes(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path) -> 
 
 def _surfaces(scene: bpy.types.Scene, question: dict[str, Any], scratch: Path, events: Events) -> dict[str, Any]:
     longest = max(math.sqrt(surfaces.area(scene) / question["cells"]), question.get("spacing") or 0.0)
-    gloss = scene.cycles.caustics_reflective if question.get("gloss") == "caustics" else bool(question.get("gloss"))
+    gloss: surfaces.Gloss = "diffuse" if question.get("gloss") else "none"
+    if question.get("gloss") == "caustics" and not scene.cycles.caustics_reflective:
+        gloss = "apart"
     found = surfaces.fragments(scene, longest, events, gloss)
-    names = ("corners", "albedo", "transmission", "object", "transparent", "emission", "one_sided", "occluders")
+    names = ("corners", "albedo", "transmission", "object", "transparent", "emission", "one_sided", "occluders", "gloss")
     return {
-        "files": {name: hand_over(scratch, name, found[name]) for name in names},
+        "files": {name: hand_over(scratch, name, found[name]) for name in names if name in found},
         "surface_objects": found["names"],
         "bounces": min(scene.cycles.diffuse_bounces, scene.cycles.max_bounces),
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import bpy
 import numpy as np
@@ -13,11 +13,15 @@ import numpy as np
 from blender_bake.emission_switch import emits
 from blender_bake.fragment_albedo import EMISSION, GRAY, Attributes, Kinds, even_albedo, faces_front, varies, varying_albedo
 from blender_bake.ipc import Events, WorkerError
+from blender_bake.lobes import is_layered
 from blender_bake.reflected import lets_light_through, reflection_alone
 from blender_bake.scene_file import Shown, corners_of, rendered, show_as_rendered
 from blender_bake.translucency import _passes
 from blender_bake.without_triangles import is_only_volume
 
+Gloss = Literal["none", "diffuse", "apart"]
+GRAZING = 0.03  # of what a layer lets through along the normal, how much it reflects from all around: Schlick's term, 0.05 of the smooth
+LEAST_BELOW = 0.05  # of light that passes a layer
 MOST = 400_000  # fragments, unless the scene has more triangles
 PER_SQUARE = 6.0  # fragments per square of the longest edge, about
 PARTS = 2  # halvings of every edge of a fragment whose emission varies: textures are finer than fragments
@@ -36,6 +40,7 @@ class _Shape:
     parents: np.ndarray
     weights: np.ndarray
     albedo: np.ndarray
+    gloss: np.ndarray
     emission: np.ndarray
     one_sided: np.ndarray
     transmission: np.ndarray
@@ -63,12 +68,13 @@ def occluders(scene: bpy.types.Scene) -> np.ndarray:
     return np.concatenate([np.zeros((0, 3, 3), np.float32), *_read_scene()[2]])
 
 
-def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: bool = False) -> dict[str, Any]:
+def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: Gloss = "none") -> dict[str, Any]:
     """All surfaces that render and that diffuse rays see, as T fragments: triangles with no edge longer than `longest` meters.
 
     corners (T, 3, 3) float32 in the world, wound so that normals point as they render; albedo (T, 3) float32, diffuse color by Cycles: 0 of
-    metal, glass and black, without translucency, with `gloss` also what gloss reflects, as if it were diffuse; transmission (T, 3) float32,
-    what translucent materials let through diffusely; object (T,) int32 of `names`, a list; transparent
+    metal, glass and black, without translucency, of gloss `diffuse` also what gloss reflects, as if it were diffuse; of gloss `apart` that
+    is in `gloss` (T, 3) float32, beyond the albedo, which then is that of a path without gloss; transmission (T, 3) float32, what
+    translucent materials let through diffusely; object (T,) int32 of `names`, a list; transparent
     (T,) bool: of a material that light passes; occluders (O, 3, 3) float32: the undivided triangles that cast shadows and are not
     transparent; emission (T, 3) float32, radiance of the front, and one_sided (T,) bool: of a material whose back may emit less, see
     `faces_front`; longest: the longest edge in fact, larger where the scene would have had more than 400,000 fragments. Ends the use of the
@@ -82,8 +88,8 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
     if divided > 1.001 * longest:
         events.warn(f"the surfaces are divided into triangles of {divided:.3g} m in place of {longest:.3g} m: the scene is large")
     with reflection_alone():
-        transparent = _color(scene, shapes, ("DIFFUSE", "GLOSSY") if gloss else ("DIFFUSE",))
-    _let_through(scene, shapes, gloss)
+        transparent = _color(scene, shapes, gloss)
+    _let_through(scene, shapes, gloss != "none")
     _shine(scene, shapes)
     names = list(dict.fromkeys(one.name for one in placed))
     numbers = {name: i for i, name in enumerate(names)}
@@ -97,6 +103,7 @@ def fragments(scene: bpy.types.Scene, longest: float, events: Events, gloss: boo
         "corners": np.concatenate(corners),
         "albedo": np.concatenate([shapes[one.key].albedo for one in placed]).astype(np.float32),
         "transmission": np.concatenate([shapes[one.key].transmission for one in placed]).astype(np.float32),
+        **({"gloss": np.concatenate([shapes[one.key].gloss for one in placed]).astype(np.float32)} if gloss == "apart" else {}),
         "object": np.concatenate([np.full(len(part), numbers[one.name], np.int32) for part, one in zip(corners, placed, strict=True)]),
         "names": names,
         "transparent": np.concatenate([transparent[one.key] for one in placed]),
@@ -148,13 +155,25 @@ def _divide(shapes: dict[tuple[Any, ...], _Shape], placed: list[_Placed], longes
         longest *= 1.05 * max(1.0, (total / max(MOST, least)) ** 0.5)
 
 
-def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], kinds: Kinds) -> dict[tuple[Any, ...], np.ndarray]:
-    """Set every shape's albedo; which fragments are transparent, by shape."""
+def _color(scene: bpy.types.Scene, shapes: dict[tuple[Any, ...], _Shape], gloss: Gloss) -> dict[tuple[Any, ...], np.ndarray]:
+    """Set every shape's albedo, and its gloss where that is apart; which fragments are transparent, by shape.
+
+    A Principled surface has its specular lobe over its diffuse one, which it dims; Cycles' passes show both along the normal. Where
+    paths from diffuse surfaces have no gloss (caustics are off), it dims nothing there.
+    """
     passing = {m: m is not None and bool(m.use_nodes and m.node_tree and _passes(m)) for m in _used(shapes)}
     transparent = {}
-    for key, albedo in _colors(scene, shapes, kinds).items():
+    glossy = {} if gloss == "none" else _colors(scene, shapes, ("GLOSSY",))
+    for key, albedo in _colors(scene, shapes, ("DIFFUSE",)).items():
         shape = shapes[key]
-        shape.albedo = albedo
+        shape.albedo, shape.gloss = albedo, np.zeros_like(albedo)
+        if gloss != "none":
+            over = np.array([is_layered(material) for material in shape.materials])[shape.slots[shape.parents]][:, None]
+            lobe = glossy[key]
+            bare = np.where(over, np.minimum(albedo / np.maximum(1 - lobe, LEAST_BELOW), 1), albedo)
+            lobe = np.where(over & (lobe > 0), lobe + (1 - lobe) * GRAZING, lobe)
+            extra = np.where(over, lobe * (1 - bare), np.minimum(lobe, 1 - bare))
+            shape.albedo, shape.gloss = (bare + extra, shape.gloss) if gloss == "diffuse" else (bare, extra)
         transparent[key] = np.array([passing.get(material, False) for material in shape.materials])[shape.slots[shape.parents]]
     return transparent
 
@@ -282,7 +301,7 @@ def _of_mesh(shown: Shown, mesh: bpy.types.Mesh, shapes: dict[tuple[Any, ...], _
         mesh.loop_triangles.foreach_get("polygon_index", faces)
         attributes = Attributes.of(mesh, found.loops.reshape(-1, 3)[kept].ravel(), faces[kept])
     nothing = np.zeros(0)
-    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, *(nothing,) * 6), key
+    yield _Shape(corners[kept], slots[kept], materials, attributes, shown.matrix, *(nothing,) * 7), key
 
 
 def _materials(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> list[bpy.types.Material | None]:

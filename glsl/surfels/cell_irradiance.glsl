@@ -10,10 +10,12 @@
 #include "surfels/tangents.glsl"
 
 float srbfCellIrradiance(vec4 cell, vec3 normal, SrbfPointLight pointLight, float lambertian) {
-    const float NEAR_SIDES = 8.0;  // sides of a cell, closer than which it is measured by PARTS x PARTS points
+    const float NEAR_SIDES = 8.0;  // sides of a cell, closer than which it is measured by PARTS x PARTS points;
+    const float NEAR_CONE = 64.0;  // of a spot of a half-angle below 120 degrees, whose cone may end in it
     const int PARTS = 4;
     vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, cell.xyz);
-    if (dot(lightVector, lightVector) >= NEAR_SIDES * NEAR_SIDES * cell.w) {
+    float sides = pointLight.versineOuter < 1.5 ? NEAR_CONE : NEAR_SIDES;
+    if (dot(lightVector, lightVector) >= sides * sides * cell.w) {
         return srbfPartIrradiance(lightVector, normal, pointLight, lambertian, cell.w);
     }
     vec3 tangent;

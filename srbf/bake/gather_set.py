@@ -38,7 +38,7 @@ FEWER = 0.95  # surfels that are asked for again, where those behind translucent
 POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
-TRACED_BY = 2  # counts changes of what is traced: links of former versions are made once more
+TRACED_BY = 3  # counts changes of what is traced: links of former versions are made once more
 SHOWN = 8  # names in a line
 NO_LIGHTS = '{"lights": [], "left_out": [], "sun_angle": null}'
 SAMPLING = 5e-3  # CPU seconds for the rays and the samples of a cluster, measured at 120 of these
@@ -50,7 +50,8 @@ class FoundSurfaces:
     """What a scene has for a view's gather: opaque triangles (T, 3, 3) with albedo and object, what casts shadows, free places, m.
 
     `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow. `transmission`: what the triangles
-    let through diffusely, where any does. `lights`: the scene's own as JSON, {lights, left_out, sun_angle}, see
+    let through diffusely, where any does. `gloss`: what their gloss reflects where lobes alone see it, of scenes without reflective
+    caustics. `lights`: the scene's own as JSON, {lights, left_out, sun_angle}, see
     `blender_bake.scene_lights`.
     """
 
@@ -63,6 +64,7 @@ class FoundSurfaces:
     box: Float64[ndarray, " 6"]
     bounces: Int[ndarray, ""]
     transmission: Float32[ndarray, "T 3"] | None = None
+    gloss: Float32[ndarray, "T 3"] | None = None
     lights: str = NO_LIGHTS
 
     @functools.cached_property
@@ -109,6 +111,7 @@ class FoundSurfaces:
             np.array(places["box"], np.float64),
             np.array(facts["bounces"]),
             passed,
+            arrays["gloss"][opaque] if "gloss" in arrays and (arrays["gloss"] > 0).any() else None,
             json.dumps(facts["scene_lights"]) if "scene_lights" in facts else NO_LIGHTS,
         )
 
@@ -255,7 +258,9 @@ class GatherSet:
         points, normals = np.concatenate([own.points for own in looks]), np.concatenate([own.normals for own in looks])
         asked = self.count
         while True:
-            pool = pool_of(surfaces, found.objects, occluders, found.free, points, normals, asked, seed, lobes, found.transmission)
+            pool = pool_of(
+                surfaces, found.objects, occluders, found.free, points, normals, asked, seed, lobes, found.transmission, found.gloss
+            )
             total = pool.count + len(Behind.of(pool).surfels)
             if total <= MOST_POOL:
                 break

@@ -76,6 +76,8 @@ class LinkPasses:
         self._reflectance = textures.kept(reflectance.astype(np.float32))
         size = self._albedo.size
         self._radiosity = [programs.target(size), programs.target(size)]
+        lobed = tables["pool"][3, :, :3] if len(tables["pool"]) > 3 else None
+        self._lobed = None if lobed is None else (textures.kept(folded(lobed)), programs.target(size))
         self.view_rows = own = -(-told["clusters"] // WIDTH)
         self._spans = [(self._view, 0, own)]  # links, and the rows of the target that they fill
         self._further: list[tuple[moderngl.TextureArray, int, moderngl.Texture]] = []  # neighbors of pixels, how many, and reflectance
@@ -108,8 +110,8 @@ class LinkPasses:
             return
         bounced = self.bounced(direct, None if apart is None else apart.second)
         for links, first, count in self._spans:
-            if links is not self._view and apart is not None:
-                bounced = self._added(bounced, apart.taken)
+            if links is not self._view:
+                bounced = self._seen_by_lobes(bounced, direct, apart)
             bounced.use(2)
             target.viewport = (0, first, WIDTH, count)
             target.use()
@@ -142,6 +144,19 @@ class LinkPasses:
             self._programs.run("deep_framebuffer_bounce.frag", {}, values)
             (light, light_target), (other, other_target) = (other, other_target), (light, light_target)
         return other
+
+    def _seen_by_lobes(self, bounced: moderngl.Texture, direct: moderngl.Texture, apart: Apart | None) -> moderngl.Texture:
+        """What surfels reflect toward lobes: more than toward other surfels, where gloss that these do not see is apart."""
+        if self._lobed is not None:
+            albedo, (extra, target) = self._lobed
+            target.use()
+            bounced.use(2)
+            (direct if apart is None else apart.second).use(3)
+            albedo.use(4)
+            values = {**self._exchange.uniforms(0), "light": 2, "direct": 3, "albedo": 4, "first": 0}
+            self._programs.run("deep_framebuffer_bounce.frag", {}, values)
+            bounced = self._added(bounced, extra)
+        return bounced if apart is None else self._added(bounced, apart.taken)
 
     def _added(self, one: moderngl.Texture, other: moderngl.Texture) -> moderngl.Texture:
         """The sum of two textures of surfels, in the one of `bounced` that is free."""

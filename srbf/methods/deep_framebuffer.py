@@ -163,8 +163,9 @@ class DeepFramebuffer(Method):
             "view_rays": view.rays,
             "exchange_rays": operator.exchange.rays,
             **({} if bounces is None else {"bounces": bounces}),
+            **({} if operator.lobed is None else {"lobed": True}),
         }
-        tables = {"pool": np.concatenate([operator.cells.image(), np.pad(operator.cells.albedo, ((0, 0), (0, 1)))[None]])}
+        tables = {"pool": operator.pool_image()}
         for name, links in (("view", view), ("exchange", operator.exchange)):
             tables[f"{name}_links"], tables[f"{name}_rows"] = packed(links)
         if operator.gloss is not None:
@@ -208,7 +209,7 @@ class DeepFramebuffer(Method):
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["gather"]
-        tables = {"pool": reader.table("pool", (3, told["surfels"]), 4)}
+        tables = {"pool": reader.table("pool", (4 if told.get("lobed") else 3, told["surfels"]), 4)}
         for name in ("view", "exchange", *(("gloss",) if "lobes" in told else ())):
             for part in ("links", "rows"):
                 pixels = reader.pixels(reader.manifest[f"{name}_{part}"]["file"], 3)
@@ -282,16 +283,18 @@ class _Ready:
     cells: Cells
     received: ReceivedLight
     points: Float32[ndarray, "2 R 3"] | None
+    lobed: Float32[ndarray, "S 3"] | None
     occluders: EmbreeTriangles
 
     def under(self, lights: Sequence[Light], bounces: int | None) -> Float64[ndarray, "C 3"]:
         """What view clusters and lobes gather under lights, whose brightest surfels light the clusters and other surfels in closed form."""
         albedo = self.cells.albedo
-        direct, taken = np.zeros((2, *albedo.shape), np.float32)
+        direct, taken, whole = np.zeros((3, *albedo.shape), np.float32)
         near = np.zeros((0 if self.points is None else self.points.shape[1], 3), np.float32)
         for light in lights:
             color = np.array(light.color, np.float32)
             irradiance = self.received.irradiance(replace(light, color=WHITE)).astype(np.float32)
+            whole += color * irradiance
             if self.points is not None and bounces != 0:
                 first = albedo * irradiance
                 bright = NearSources.of(self.cells, first, light)
@@ -306,7 +309,13 @@ class _Ready:
             radiosity += radiosity_of(self.exchange, albedo, near[clusters:], None if bounces is None else bounces - 1)
         found = (self.view @ radiosity).astype(np.float64)
         found[: len(near[:clusters])] += near[:clusters]
-        return found if self.gloss is None else np.concatenate([found, self.gloss @ (radiosity + taken)])
+        if self.gloss is None:
+            return found
+        seen = radiosity + taken
+        if self.lobed is not None and bounces != 0:
+            arriving = whole + self.exchange @ radiosity + (near[clusters:] if len(near) else 0)
+            seen = seen + self.lobed * arriving
+        return np.concatenate([found, self.gloss @ seen])
 
 
 _kept: OrderedDict[tuple[int, int], _Ready] = OrderedDict()
@@ -335,7 +344,8 @@ def _ready(asset: Asset) -> _Ready:
             own = np.stack([cells.places, cells.normals]).astype(np.float32)
             points = np.concatenate([tables[POINTS][:2], own], axis=1)
         lobes = gloss[0] if gloss else None
-        found = _Ready(tables, asset.scene, view, exchange, lobes, cells, ReceivedLight(cells, occluders), points, occluders)
+        lobed = np.ascontiguousarray(tables["pool"][3, :, :3]) if len(tables["pool"]) > 3 else None
+        found = _Ready(tables, asset.scene, view, exchange, lobes, cells, ReceivedLight(cells, occluders), points, lobed, occluders)
         _kept[key] = found
         while len(_kept) > KEPT:
             _kept.popitem(last=False)

@@ -44,7 +44,8 @@ class GatherOperator:
 
     Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
     lobes gather, where there are any. `behind`: as `nearest` and `weights`, of what falls on the backs of pixels that let light through.
-    `points`: places (m) and normals of the clusters, None of captures that have them not.
+    `points`: places (m) and normals of the clusters, None of captures that have them not. `lobed`: what surfels reflect, beyond their
+    albedo, where a lobe sees them.
     """
 
     cells: Cells
@@ -55,6 +56,7 @@ class GatherOperator:
     gloss: GlossyGather | None = None
     behind: tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]] | None = None
     points: Float32[ndarray, "2 C 3"] | None = None
+    lobed: Float32[ndarray, "S 3"] | None = None
 
     @staticmethod
     def traced(
@@ -92,12 +94,12 @@ class GatherOperator:
         )
         gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2, passing=passing)
         points = np.stack([found.places, found.normals]).astype(np.float32)
-        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points)
+        lobed = None if pool.gloss is None or gloss is None else np.pad(pool.gloss, ((0, len(passing.surfels)), (0, 0)))
+        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points, lobed)
 
     def write(self, folder: Path, key: str) -> None:
-        """pool.exr, three rows (x, y, z, area), (normal, 0), (albedo, 0), and gather.npz; `key` tells what they are of."""
-        image = np.concatenate([self.cells.image(), np.pad(self.cells.albedo, ((0, 0), (0, 1)))[None]]).astype(np.float32)
-        write_image(folder / POOL_FILE, image, "float")
+        """pool.exr and gather.npz; `key` tells what they are of."""
+        write_image(folder / POOL_FILE, self.pool_image(), "float")
         arrays = {
             **self.view.arrays("view"),
             **self.exchange.arrays("exchange"),
@@ -110,13 +112,18 @@ class GatherOperator:
         with files.atomic_path(folder / GATHER_FILE) as temporary, open(temporary, "wb") as file:
             np.savez_compressed(file, key=np.array(key), **arrays)
 
+    def pool_image(self) -> Float32[ndarray, "n S 4"]:
+        """Rows (x, y, z, area), (normal, 0), (albedo, 0), and (what lobes see beyond it, 0) where there is any."""
+        colors = [self.cells.albedo, *([] if self.lobed is None else [self.lobed])]
+        return np.concatenate([self.cells.image(), *(np.pad(color, ((0, 0), (0, 1)))[None] for color in colors)]).astype(np.float32)
+
     @staticmethod
     def read(folder: Path) -> GatherOperator:
         """ImageError where the files are missing, damaged, or not of one bake."""
         path = folder / GATHER_FILE
         image = read_image(folder / POOL_FILE, 4)
-        if len(image) != 3:
-            raise ImageError(f"expected 3 rows in {folder / POOL_FILE}, found {len(image)}; bake again with `force=True`")
+        if len(image) not in (3, 4):
+            raise ImageError(f"expected 3 or 4 rows in {folder / POOL_FILE}, found {len(image)}; bake again with `force=True`")
         count = image.shape[1]
         try:
             with np.load(path) as stored:
@@ -137,7 +144,8 @@ class GatherOperator:
         points = arrays.get("points")
         if points is not None and points.shape != (2, view.rows, 3):
             raise ImageError(f"expected places of {view.rows} clusters in {path}, found {points.shape}; bake again with `force=True`")
-        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points)
+        lobed = np.ascontiguousarray(image[3, :, :3]) if len(image) > 3 else None
+        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points, lobed)
 
 
 def is_gathered(folder: Path, key: str) -> bool:

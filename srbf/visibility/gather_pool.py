@@ -34,18 +34,21 @@ def pool_of(
     seed: int = 0,
     lobes: Lobes | None = None,
     transmission: Float32[ndarray, "T 3"] | None = None,
+    gloss: Float32[ndarray, "T 3"] | None = None,
 ) -> Surfels:
     """At most about `count` surfels of all surfaces that light reaches, small where cosine rays from the view's `points` end.
 
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well, and rays of specular
-    `lobes` do, by what these reflect. `transmission`: what the triangles let through diffusely.
+    `lobes` do, by what these reflect. `transmission`: what the triangles let through diffusely;
+    `gloss`: what theirs reflects for lobes alone.
     """
     surfaces, source = cut_at_walls(surfaces, occluders, GAP * float(np.sqrt(surfaces.areas.sum() / count)))
     objects = objects[source]
     both = surfaces.both_sides()
     passed = None if transmission is None else np.tile(transmission[source], (2, 1))
-    color = both.albedo if passed is None else both.albedo + passed
+    shone = None if gloss is None or not (gloss > 0).any() else np.tile(gloss[source], (2, 1))
+    color = both.albedo + sum(part for part in (passed, shone) if part is not None)
     able = np.flatnonzero((color.max(axis=1) >= DARK) & (both.areas > 0))
     seen = looked_at(surfaces, points, normals, seed)
     gathered = (seen if lobes is None else seen + mirrored(surfaces, lobes, float(len(points)), seed))[able]
@@ -75,9 +78,12 @@ def pool_of(
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]
     dark = np.zeros((len(of_surfel), 3), np.float32)
-    own = None if passed is None else grouped_cells(Fragments(sides.corners, passed[kept].astype(np.float32)), owner).albedo
+    own, lobed = (
+        None if part is None else grouped_cells(Fragments(sides.corners, part[kept].astype(np.float32)), owner).albedo
+        for part in (passed, shone)
+    )
     unseen = np.zeros(len(of_surfel), bool)
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own)
+    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own, lobed)
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

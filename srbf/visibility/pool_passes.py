@@ -126,7 +126,8 @@ class PoolPasses(Passes):
         if not near.count:
             return direct, None
         taken = np.zeros_like(first)
-        taken[near.surfels] = near.parts[:, None] * first[near.surfels]
+        reflected = self._cells.albedo + self._asset.tables["pool"][3, :, :3] if len(self._asset.tables["pool"]) > 3 else self._cells.albedo
+        taken[near.surfels] = near.parts[:, None] * (reflected * irradiance)[near.surfels]
         irradiance[near.surfels] *= 1 - near.parts[:, None]
         for (texture, _), values in ((self._far, irradiance), (self._second, irradiance), (self._taken, taken)):
             texture.write(folded(np.column_stack([values, np.zeros(count, np.float32)])))

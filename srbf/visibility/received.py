@@ -18,7 +18,8 @@ from srbf.visibility.surface_cells import OFFSET, Cells, frames
 
 SIDE = 4  # points per side of an area light
 DIRECTIONS = 512  # of an environment map
-NEAR, PARTS = 8.0, 4  # sides of a cell, closer than which it is measured by so many points a side
+NEAR, PARTS = 8.0, 4  # sides of a cell, closer than which it is measured by so many points a side;
+NEAR_CONE, WIDEST = 64.0, 2 * np.pi / 3  # of a spot of a half-angle below that, rad, whose cone may end in it
 Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -101,7 +102,8 @@ class ReceivedLight:
                 found = found * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
             return found
 
-        return self._from_place(np.array(light.position), strength)
+        sides = NEAR_CONE if isinstance(light, SpotLight) and light.outer < WIDEST else NEAR
+        return self._from_place(np.array(light.position), strength, sides)
 
     def _of_area(self, light: AreaLight) -> Float64[ndarray, " N"]:
         """The mean of a grid of points, each a Lambertian emitter: cos_l cos a0^2 / r^2."""
@@ -117,17 +119,17 @@ class ReceivedLight:
         places = [center + s * u + t * v for s in steps for t in steps]
         return np.sum([self._from_place(place, strength) for place in places], axis=0) / side**2
 
-    def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength) -> Float64[ndarray, " N"]:
+    def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength, sides: float = NEAR) -> Float64[ndarray, " N"]:
         """The mean of cos times `strength` over every cell that sees a place.
 
-        Cells are taken as squares: at their middles far away, by PARTS x PARTS points closer than NEAR sides. r^2 is at least A / 2 pi, so
-        that no part takes more than half of a light.
+        Cells are taken as squares: at their middles far away, by PARTS x PARTS points closer than so many `sides`. r^2 is at least
+        A / 2 pi, so that no part takes more than half of a light.
         """
         least = self._areas / (2 * np.pi)
         vector = place - self._places
         squared = np.einsum("nk,nk->n", vector, vector)
         amount = _falling(vector, squared, self._normals, least, strength)
-        near = np.flatnonzero(squared < NEAR**2 * self._areas)
+        near = np.flatnonzero(squared < sides**2 * self._areas)
         if len(near):
             tangent, bitangent = frames(self._normals[near])
             steps = (np.arange(PARTS) + 0.5) / PARTS - 0.5

@@ -33,7 +33,7 @@ class Surfels:
     `owners` (2, T): the surfel of the front and of the back of each triangle; -1 of sides that are out of reach. `objects` (S,): the number
     of each surfel's object. `emission` (S, 3): mean radiance of what it emits itself. `hidden` (S,): those that emit into a gap which no
     free place sees, narrower than a surfel, as the back of a picture does: receivers there are lit, and the bounces stay in the gap.
-    `transmission` (S, 3): what they let through diffusely, where any does.
+    `transmission` (S, 3): what they let through diffusely, where any does. `gloss` (S, 3): what they reflect for lobes alone.
     """
 
     cells: Cells
@@ -43,6 +43,7 @@ class Surfels:
     emission: Float32[ndarray, "S 3"]
     hidden: Bool[ndarray, " S"]
     transmission: Float32[ndarray, "S 3"] | None = None
+    gloss: Float32[ndarray, "S 3"] | None = None
 
     @property
     def count(self) -> int:

@@ -152,7 +152,7 @@ def test_gloss_is_relit_as_cycles_renders_it(tmp_path: Path) -> None:
         indirect, direct = capture.image(index), read_image(folder / file, 3)
         own = linear_response(opened, [light])
         # the scene has no caustics: what lobes see of other lobes is left out
-        np.testing.assert_allclose(own[glossy].sum() / indirect[glossy].sum(), 1, atol=0.13)
+        np.testing.assert_allclose(own[glossy].sum() / indirect[glossy].sum(), 1, atol=0.05)
         kinds: tuple[tuple[Direct, float], ...] = (("ray", 0.12), ("shadow-map", 0.6))  # highlights smaller than a pixel
         for kind, most in kinds:
             with Added(opened, kind) as added:

@@ -12,7 +12,7 @@ from made_rooms import Room
 from made_views import view_of_room
 
 from srbf.asset import Asset
-from srbf.lights import PointLight, SphereLight
+from srbf.lights import PointLight, SphereLight, SpotLight
 from srbf.methods import linear_response
 from srbf.methods.deep_framebuffer import POINTS, DeepFramebuffer
 from srbf.visibility.embree import EmbreeTriangles
@@ -132,3 +132,15 @@ def test_an_asset_keeps_the_places(lit: Asset, tmp_path: Path) -> None:
     lit.save(tmp_path / "asset")
     light = [PointLight((0.03, 1.1, 0.9), falloff="inverse-square")]
     np.testing.assert_allclose(linear_response(Asset.open(tmp_path / "asset"), light), linear_response(lit, light), rtol=1e-4)
+
+
+def test_a_cone_ends_within_cells() -> None:
+    """The light of a narrow spot on a wall is that of its cone, wherever its edge is: 12 directions, of cells half as wide as the spot."""
+    room = Room.box((3, 2, 2), 0.25, 0.6)
+    cells = Cells(room.places, room.normals, room.areas, room.albedo.astype(np.float32), np.arange(len(room.places)))
+    received = ReceivedLight(cells, EmbreeTriangles(room.corners))
+    outer = 0.2
+    for y in np.linspace(0.8, 1.2, 12):
+        spot = SpotLight((0.5, float(y), 1.0 + 0.1 * float(y)), falloff="inverse-square", direction=(1, 0, 0), inner=outer, outer=outer)
+        flux = float((received.irradiance(spot)[:, 0] * cells.areas).sum())
+        assert flux == pytest.approx(2 * np.pi * (1 - np.cos(outer)), rel=0.08)

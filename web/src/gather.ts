@@ -62,7 +62,7 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
     readLinks(files, manifest, "exchange", surfels, exchange_rays, surfels),
     places === undefined ? undefined : files.bytes(places).then((buffer) => decodeFloat(buffer, places)),
   ]);
-  if (pool.width !== surfels || pool.height !== 3) throw new SrbfError(`expected ${surfels} x 3 numbers in ${file}, found ${pool.width} x ${pool.height}`);
+  if (pool.width !== surfels || pool.height < 3) throw new SrbfError(`expected ${surfels} x 3 numbers in ${file}, found ${pool.width} x ${pool.height}`);
   const first = pool.data.slice(0, 8 * surfels);
   const albedo = new Float32Array(3 * surfels);
   for (let i = 0; i < surfels; ++i) {

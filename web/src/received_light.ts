@@ -7,7 +7,8 @@ import type { Occluders } from "./occluders";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
 export const SIDE = 4; // points per side of an area light
-const [NEAR, PARTS] = [8, 4]; // sides of a cell, closer than which it is measured by so many points a side
+const [NEAR, PARTS] = [8, 4]; // sides of a cell, closer than which it is measured by so many points a side;
+const [NEAR_CONE, WIDEST] = [64, -0.5]; // of a spot of a half-angle below one of that cosine, whose cone may end in it
 const SOFTNESS_MIN = 1e-6; // in cosine, of a spot's edge
 
 /** N cells of K patches: `cells.exr`. */
@@ -59,7 +60,7 @@ export class Cells {
       const near = Math.max(squared, light.radius ** 2, least);
       const strength = light.falloff === "inverse-square" ? light.a0 ** 2 / near : light.a0 / Math.sqrt(near);
       return cone ? strength * smooth(-(ux * cone.axis[0] + uy * cone.axis[1] + uz * cone.axis[2]), cone.inner, cone.outer) : strength;
-    });
+    }, cone && cone.outer > WIDEST ? NEAR_CONE : NEAR);
     return this.means(out);
   }
 
@@ -90,13 +91,14 @@ export class Cells {
 
   /**
    * Area times the mean of cosine times `strength` of every cell that sees `place`, added to its patch: by PARTS x PARTS points of cells
-   * closer than NEAR sides. The unit vector to the place is (ux, uy, uz).
+   * closer than so many sides. The unit vector to the place is (ux, uy, uz).
    */
   private add(
     out: Float64Array,
     place: Triple,
     occluders: Occluders,
     strength: (squared: number, ux: number, uy: number, uz: number, least: number) => number,
+    sides = NEAR,
   ): void {
     const { places, starts, normals, areas, owners } = this;
     for (let i = 0; i < this.count; ++i) {
@@ -112,7 +114,7 @@ export class Cells {
       };
       const least = areas[i] / (2 * Math.PI);
       let amount = 0;
-      if (x * x + y * y + z * z < NEAR ** 2 * areas[i]) {
+      if (x * x + y * y + z * z < sides ** 2 * areas[i]) {
         const [[tx, ty, tz], [bx, by, bz]] = frame(nx, ny, nz);
         const side = Math.sqrt(areas[i]);
         for (let part = 0; part < PARTS ** 2; ++part) {
