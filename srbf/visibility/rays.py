@@ -32,6 +32,7 @@ FIRST_SAMPLES = 4  # of every texel
 FIRST_IN_VIEW, FINE_VIEW = 16, 1 << 18  # of every pixel, where shadows of thin things fall between few; of views of at most so many pixels
 SAMPLES = 32  # of a texel whose first samples differ
 MAX_SAMPLES = 512  # of a texel whose samples still differ, mostly at shadow edges
+MANY_EDGES = 0.1  # of the lit texels, for which edges get MAX_SAMPLES: the noise of fewer counts less in the picture
 EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
 SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of it
 SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
@@ -152,7 +153,9 @@ class RayTracer:
             self._refine(sums, light, new, range(self._few, self._count))
             refined[new] = True
         edges = np.flatnonzero(refined & sums.edges())
-        most = min(self._most, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
+        share = len(edges) / max(1, int((sums.total[self._texels] > 0).any(axis=1).sum()))  # of what is lit
+        enough = max(MAX_SAMPLES // 8, int(MAX_SAMPLES * min(1.0, share / MANY_EDGES)))
+        most = min(self._most, enough, self._count + EDGE_BUDGET * len(self._texels) // max(1, len(edges)))
         self._refine(sums, light, edges, range(self._count, most))
         return sums.mean().astype(np.float32)
 

@@ -200,7 +200,7 @@ function spreadOf(points: number[][], weights: number[]): { spread: number; alon
   const middle = mean(points, weights);
   const off = points.map((point) => point.map((x, k) => x - middle[k]));
   const matrix = middle.map((_, i) => middle.map((_, j) => off.reduce((sum, d, n) => sum + weights[n] * d[i] * d[j], 0)));
-  const spread = points.length > 1 ? matrix.reduce((sum, row, i) => sum + row[i], 0) : 0; // but for rounding
+  const spread = points.length > 1 ? matrix.reduce((sum, row, i) => sum + row[i], 0) : 0; // without rounding
   if (spread <= 0) return { spread, along: off.map(() => 0) };
   const axis = longestAxis(matrix);
   return { spread, along: off.map((d) => d.reduce((sum, x, k) => sum + x * axis[k], 0)) };
