@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32, Float64
+from srbf.arrays import Float, Float64
 from srbf.errors import InputError
 from srbf.io.ies import parse_ies
 
@@ -49,7 +49,7 @@ class Profile:
     True
     """
 
-    table: Float32[ndarray, "H W 3"]
+    table: ndarray  # (H, W, 3) float32
     projected: bool = False
     file: tuple[str, bytes] | None = field(default=None, repr=False)
 

@@ -22,6 +22,7 @@ from srbf.bake.surface_checks import warn_of_dark_view, warn_of_empty
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.io.ies import parse_ies
 from srbf.visibility.behind import Behind, points_behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
@@ -106,7 +107,7 @@ class FoundSurfaces:
             np.array(places["box"], np.float64),
             np.array(facts["bounces"]),
             passed,
-            json.dumps(facts["scene_lights"]) if "scene_lights" in facts else NO_LIGHTS,
+            json.dumps(readable(facts["scene_lights"])) if "scene_lights" in facts else NO_LIGHTS,
         )
 
 
@@ -179,6 +180,7 @@ class GatherSet:
             "gather": {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)},
             "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
             "scene_lights": found.scene_lights["lights"],
+            **({"scene_profiles": found.scene_lights["profiles"]} if found.scene_lights.get("profiles") else {}),
             **({"scene_lights_left_out": found.scene_lights["left_out"]} if found.scene_lights["left_out"] else {}),
         }
 
@@ -238,6 +240,20 @@ class GatherSet:
             pool, pixels, occluders, clusters, seed, lambda n, total: progress(n, total, "gather rays"), lobes, backs
         )
         operator.write(receivers.folder, key)
+
+
+def readable(told: dict[str, Any]) -> dict[str, Any]:
+    """The scene's own lights without those whose IES file is not read, which are left out with the reason."""
+    profiles, faults = dict(told.get("profiles", {})), {}
+    for name, text in told.get("profiles", {}).items():
+        try:
+            parse_ies(text.encode(), name)
+        except InputError as error:
+            faults[name] = str(error)
+            del profiles[name]
+    kept = [one for one in told["lights"] if one["light"].get("profile") not in faults]
+    left = [{"name": one["name"], "reason": faults[one["light"]["profile"]]} for one in told["lights"] if one not in kept]
+    return {**told, "lights": kept, "left_out": told["left_out"] + left, "profiles": profiles}
 
 
 def _lines_of(told: dict[str, Any]) -> list[str]:

@@ -114,7 +114,7 @@ def read_profile(path: Path) -> Profile:
 
 
 def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
-    """The lights of every frame of a FRAMES.json; files of environments and profiles are found beside it. ManifestError, InputError on bad ones.
+    """The lights of every frame of a FRAMES.json; files are found beside it. ManifestError, InputError on bad ones.
 
     `falloff`: of point and spot lights that do not say it.
     """

@@ -58,14 +58,18 @@ def parse_ies(content: bytes, where: str) -> IesFile:
     if tilt is None:
         raise InputError(f"expected a line TILT=NONE in the IES file {where}, found none")
     if tilt[1].upper() != "NONE":
-        raise InputError(f"expected TILT=NONE in the IES file {where}, found TILT={tilt[1][:40]!r}; export it without a tilt")
+        raise InputError(f"expected TILT=NONE in the IES file {where}, found TILT={tilt[1][:40]}; export it without a tilt")
     words = re.split(r"[\s,]+", text[tilt.end() :].strip())
     numbers = _numbers(words[:HEADER], HEADER, where)
     counts = [int(n) for n in numbers[3:5]]
     if not all(1 <= count <= MOST_ANGLES and count == n for count, n in zip(counts, numbers[3:5], strict=True)) or counts[0] < 2:
-        raise InputError(f"expected numbers of vertical and horizontal angles in the IES file {where}, found {numbers[3]:g}, {numbers[4]:g}")
+        raise InputError(
+            f"expected numbers of vertical and horizontal angles in the IES file {where}, found {numbers[3]:g}, {numbers[4]:g}"
+        )
     if numbers[5] != 1:
-        raise InputError(f"expected photometry of type C in the IES file {where}, found type {TYPES.get(int(numbers[5]), f'{numbers[5]:g}')}")
+        raise InputError(
+            f"expected photometry of type C in the IES file {where}, found type {TYPES.get(int(numbers[5]), f'{numbers[5]:g}')}"
+        )
     v, h = counts
     rest = _numbers(words[HEADER : HEADER + v + h + v * h], v + h + v * h, where)
     vertical, horizontal = rest[:v], rest[v : v + h]
@@ -94,7 +98,9 @@ def _whole_circle(
     if horizontal[0] == 0 and np.isclose(horizontal[-1] + horizontal[1], 360):
         horizontal, candela = np.append(horizontal, 360.0), np.concatenate([candela, candela[:1]])
     if horizontal[0] != 0 or horizontal[-1] != 360:
-        raise InputError(f"expected horizontal angles from 0 to 0, 90, 180 or 360 degrees in the IES file {where}, found {_ends(horizontal)}")
+        raise InputError(
+            f"expected horizontal angles from 0 to 0, 90, 180 or 360 degrees in the IES file {where}, found {_ends(horizontal)}"
+        )
     return horizontal, candela
 
 

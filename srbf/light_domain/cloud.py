@@ -22,7 +22,7 @@ def isotropic(light: Light) -> PointLight:
     """A point or sphere light of inverse-square falloff, InputError for others: all that a cloud of captured point lights can be."""
     if not isinstance(light, PointLight) or isinstance(light, SpotLight) or light.falloff != "inverse-square" or light.profile is not None:
         raise InputError(
-            "expected point lights of inverse-square falloff and without a profile for a cloud of captured point lights or without embreex, "
+            "expected point lights of inverse-square falloff, without a profile, for a cloud of captured point lights or without embreex, "
             "found another; "
             "capture patches for any light, and install embreex"
         )

@@ -77,7 +77,15 @@ class SurfelLight:
                     self._profiles.of(point.profile).use(3)
                 gl.enable_only(gl.BLEND)
                 gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
-                units = {"surfels": 0, "normals": 1, "heights": 2, "profile": 3, "lift": self._lift, "lambertian": lambertian, "weight": weight}
+                units = {
+                    "surfels": 0,
+                    "normals": 1,
+                    "heights": 2,
+                    "profile": 3,
+                    "lift": self._lift,
+                    "lambertian": lambertian,
+                    "weight": weight,
+                }
                 self._programs.run("deep_framebuffer_surfels.frag", {}, {**uniforms, **units})
         return self.texture
 
