@@ -30,7 +30,7 @@ class IesFile:
     def table(self, as_cycles: bool = True) -> Float32[ndarray, "R C"]:
         """CANDELA times the candela at R angles from the axis, 0 to pi, and C about it, 0 to 2 pi, the ends included; 0 outside the file.
 
-        Cubic interpolation. `as_cycles`: with 0 past the ends of the file, where Cycles 4.5 takes 0 but for the downward axis; between the
+        Cubic interpolation. `as_cycles`: with 0 past the ends of the file, where Cycles 4.5 takes 0, except at the downward axis; between the
         first two and the last two angles that is up to an eighth too bright, and so is all of a file of one horizontal angle. Else
         periodic about the axis, and mirrored at both ends of it.
         """
@@ -59,7 +59,7 @@ def parse_ies(content: bytes, where: str) -> IesFile:
         raise InputError(f"expected a line TILT=NONE in the IES file {where}, found none")
     if tilt[1].upper() != "NONE":
         raise InputError(f"expected TILT=NONE in the IES file {where}, found TILT={tilt[1][:40]}; export it without a tilt")
-    words = re.split(r"[\s,]+", text[tilt.end() :].strip())
+    words = [word for word in re.split(r"[\s,]+", text[tilt.end() :]) if word]
     numbers = _numbers(words[:HEADER], HEADER, where)
     counts = [int(n) for n in numbers[3:5]]
     if not all(1 <= count <= MOST_ANGLES and count == n for count, n in zip(counts, numbers[3:5], strict=True)) or counts[0] < 2:

@@ -152,7 +152,7 @@ def designed() -> None:
     light("Shadowless", "POINT", (1, 1, 1), 0.001, use_shadow=False)
 
 
-LAMP = """IESNA:LM-63-2002
+PHOTOMETRY = """IESNA:LM-63-2002
 TILT=NONE
 1 1000 1 7 5 1 2 0 0 0
 1 1 10
@@ -183,17 +183,17 @@ def by_ies(name: str, kind: str, place: tuple[float, float, float], energy: floa
 def luminaires() -> None:
     """The room under lights that IES files shape, and others whose files are not taken."""
     walls()
-    by_ies("Lamp", "POINT", (1.0, 1.2, 1.6), 6, LAMP, shadow_soft_size=0).rotation_euler = (0.5, -0.4, 0.8)
+    by_ies("Downlight", "POINT", (1.0, 1.2, 1.6), 6, PHOTOMETRY, shadow_soft_size=0).rotation_euler = (0.5, -0.4, 0.8)
     washer = by_ies("Washer", "SPOT", (2.4, 0.6, 1.2), 8, None, shadow_soft_size=0, spot_size=2.4, spot_blend=0.2, color=(1, 0.6, 0.3))
     washer.rotation_euler = (1.1, 0.3, 2.0)
     node = next(node for node in washer.data.node_tree.nodes if node.type == "TEX_IES")
     node.mode, node.filepath = "EXTERNAL", "//washer.ies"
     node.inputs["Strength"].default_value = 1.5
-    Path(sys.argv[2]).with_name("washer.ies").write_text(LAMP)
-    by_ies("Type B", "POINT", (1, 1, 1), 0.001, LAMP.replace("7 5 1 2", "7 5 2 2"))
+    Path(sys.argv[2]).with_name("washer.ies").write_text(PHOTOMETRY)
+    by_ies("Type B", "POINT", (1, 1, 1), 0.001, PHOTOMETRY.replace("7 5 1 2", "7 5 2 2"))
     by_ies("No file", "POINT", (1, 1, 1), 0.001, None)
-    by_ies("Panel", "AREA", (1, 1, 1.9), 0.001, LAMP)
-    turned = by_ies("Turned", "POINT", (1, 1, 1), 0.001, LAMP).data.node_tree
+    by_ies("Panel", "AREA", (1, 1, 1.9), 0.001, PHOTOMETRY)
+    turned = by_ies("Turned", "POINT", (1, 1, 1), 0.001, PHOTOMETRY).data.node_tree
     node = next(node for node in turned.nodes if node.type == "TEX_IES")
     turned.links.new(turned.nodes.new("ShaderNodeTexCoord").outputs["Normal"], node.inputs["Vector"])
     missing = by_ies("Missing", "POINT", (1, 1, 1), 0.001, None)

@@ -39,7 +39,7 @@ LANTERN = {
     "falloff": "inverse-square",
     "direction": [0.3, 1, -0.2],
     "roll": -0.7,
-    "profile": "lamp.ies",
+    "profile": "downlight.ies",
 }
 
 
@@ -57,12 +57,12 @@ def shot(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_scenes_ies_lights_are_taken_and_others_named(shot: Path) -> None:
-    lamp, washer = scene_lights(Asset.open(shot / "asset")).values()
-    assert type(lamp) is PointLight and isinstance(washer, SpotLight)
-    assert lamp.profile is not None and lamp.profile == washer.profile  # of one text
+    downlight, washer = scene_lights(Asset.open(shot / "asset")).values()
+    assert type(downlight) is PointLight and isinstance(washer, SpotLight)
+    assert downlight.profile is not None and downlight.profile == washer.profile  # of one text
     np.testing.assert_allclose(washer.color, 8 * 1.5 / (4 * np.pi) * np.array([1, 0.6, 0.3]), rtol=1e-5)
     told = json.loads((shot / "asset" / "asset.json").read_text())
-    assert list(told["scene_profiles"]) == ["Lamp.ies"]
+    assert list(told["scene_profiles"]) == ["Downlight.ies"]
     left = {one["name"]: one["reason"] for one in told["scene_lights_left_out"]}
     assert set(left) == {"Type B", "No file", "Panel", "Turned", "Missing"}
     assert "type B" in left["Type B"] and "no file" in left["No file"] and "nowhere.ies" in left["Missing"] and "turn" in left["Turned"]
@@ -73,14 +73,14 @@ def test_relighting_by_them_is_what_cycles_renders(shot: Path, scene: Path, tmp_
     words = ["--direct", "shadow-map"] if renderer == "gl" else []
     done("relight", shot / "asset", "--scene-lights", "--renderer", renderer, *words, "-o", tmp_path / "relit.exr")
     relit = read_image(tmp_path / "relit.exr")[:, :, :3]
-    reference = sum(by_cycles(scene, name, SAMPLES) for name in ("Lamp", "Washer"))
+    reference = sum(by_cycles(scene, name, SAMPLES) for name in ("Downlight", "Washer"))
     assert relative(relit, np.asarray(reference)) < PICTURE
 
 
 def test_frames_light_a_room_as_cycles_does(shot: Path, scene: Path, tmp_path: Path) -> None:
     """A tilted luminaire and a projected picture from files beside FRAMES.json."""
     write_image(tmp_path / "slide.exr", 3 * picture(), "float")
-    (tmp_path / "lamp.ies").write_text(json.loads((shot / "asset" / "asset.json").read_text())["scene_profiles"]["Lamp.ies"])
+    (tmp_path / "downlight.ies").write_text(json.loads((shot / "asset" / "asset.json").read_text())["scene_profiles"]["Downlight.ies"])
     (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [PROJECTOR]}, {"lights": [LANTERN]}]}))
     done("relight", shot / "asset", "--lights", tmp_path / "frames.json", "-o", tmp_path / "relit")
     asset = Asset.open(shot / "asset")

@@ -15,7 +15,7 @@ TEXT = ies_text(V, H, CD)
 
 
 def parsed(text: str) -> object:
-    return parse_ies(text.encode("latin-1"), "lamp.ies")
+    return parse_ies(text.encode("latin-1"), "downlight.ies")
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def parsed(text: str) -> object:
     ids=["1986", "1991", "1995", "2002", "2019"],
 )
 def test_files_of_every_edition_are_read(head: str) -> None:
-    found = parse_ies((head + TEXT[TEXT.index("TILT") :]).encode("latin-1"), "lamp.ies")
+    found = parse_ies((head + TEXT[TEXT.index("TILT") :]).encode("latin-1"), "downlight.ies")
     np.testing.assert_array_equal(found.vertical, V)
     np.testing.assert_array_equal(found.horizontal, [0, 45, 90, 135, 180, 225, 270, 315, 360])
     np.testing.assert_array_equal(found.candela[[0, 1, 2, 3, 4, 5, 6, 7, 8]], np.array(CD)[[0, 1, 2, 1, 0, 1, 2, 1, 0]])
@@ -98,7 +98,7 @@ def test_an_even_file_is_even_but_where_cycles_is_not() -> None:
     ],
 )
 def test_what_is_not_read_says_so_in_one_line(text: str, line: str) -> None:
-    with pytest.raises(InputError, match="lamp.ies") as error:
+    with pytest.raises(InputError, match="downlight.ies") as error:
         parsed(text)
     assert line in str(error.value) and "\n" not in str(error.value)
 
