@@ -11,12 +11,16 @@ from mathutils import Matrix, Vector
 
 from blender_bake.ipc import WorkerError
 from blender_bake.light import AREA_WATTS, POINT_WATTS
+from blender_bake.light_frame import rotation
 
 TYPES = {"directional": "SUN", "point": "POINT", "sphere": "POINT", "spot": "SPOT", "area": "AREA"}
 
 
 def make(scene: bpy.types.Scene, lights: list[dict[str, Any]], sun_angle: float = 0.0) -> None:
-    """Add the lights to the scene; suns have the angular diameter `sun_angle`, rad. WorkerError for kinds that Blender lacks."""
+    """Add the lights to the scene; suns have the angular diameter `sun_angle`, rad. WorkerError for kinds that Blender lacks.
+
+    A `profile` is the path of its file, an IES file or an image.
+    """
     for light in lights:
         kind = light["kind"]
         if kind not in TYPES:
@@ -28,8 +32,8 @@ def make(scene: bpy.types.Scene, lights: list[dict[str, Any]], sun_angle: float 
         data.energy = most * _watts(light)
         obj = bpy.data.objects.new(data.name, data)
         obj.matrix_world = _placed(light, data, sun_angle)
-        if light.get("falloff") == "linear":
-            _by_distance(data)
+        if light.get("falloff") == "linear" or "profile" in light:
+            _with_nodes(data, light)
         scene.collection.objects.link(obj)
 
 
@@ -50,26 +54,43 @@ def _placed(light: dict[str, Any], data: bpy.types.Light, sun_angle: float) -> M
         data.angle = sun_angle
         return Vector(light["direction"]).to_track_quat("Z", "Y").to_matrix().to_4x4()
     place = Matrix.Translation(light["position"])
+    profile = "profile" in light
+    turned = rotation(Vector(light.get("direction", (0, 0, -1))), light.get("roll", 0.0)) if profile else Matrix()
     if kind in ("point", "sphere"):
         data.shadow_soft_size = light.get("size", 0.0)
-        return place
+        return place @ turned
     if kind == "spot":
         edge = math.cos(light["outer"])
         data.shadow_soft_size, data.spot_size = 0.0, 2 * light["outer"]
         data.spot_blend = min(1.0, (math.cos(light["inner"]) - edge) / max(1 - edge, 1e-9))
-        return place @ Vector(light["direction"]).to_track_quat("-Z", "Y").to_matrix().to_4x4()
+        return place @ (turned if profile else Vector(light["direction"]).to_track_quat("-Z", "Y").to_matrix().to_4x4())
     u, v = Vector(light["u"]), Vector(light["v"])
     data.shape, data.size, data.size_y = "RECTANGLE", u.length, v.length
     axes = (u.normalized(), -v.normalized(), -u.cross(v).normalized())  # it shines along its local -z
     return place @ Matrix(axes).transposed().to_4x4()
 
 
-def _by_distance(data: bpy.types.Light) -> None:
-    """Let it fall with 1 / d in place of 1 / d2."""
+def _with_nodes(data: bpy.types.Light, light: dict[str, Any]) -> None:
+    """Let it fall with 1 / d in place of 1 / d2 where that is asked for, and shine by its profile where it has one."""
     data.use_nodes = True
     nodes, links = data.node_tree.nodes, data.node_tree.links
     nodes.clear()
-    falloff, emission = nodes.new("ShaderNodeLightFalloff"), nodes.new("ShaderNodeEmission")
-    falloff.inputs["Strength"].default_value = 1.0
-    links.new(falloff.outputs["Linear"], emission.inputs["Strength"])
+    emission = nodes.new("ShaderNodeEmission")
+    strength = emission.inputs["Strength"]
     links.new(emission.outputs[0], nodes.new("ShaderNodeOutputLight").inputs["Surface"])
+    path = light.get("profile", "")
+    if path.lower().endswith(".ies"):
+        shape = nodes.new("ShaderNodeTexIES")
+        shape.mode, shape.filepath = "EXTERNAL", path
+        shape.inputs["Strength"].default_value = 1.0
+        links.new(shape.outputs["Fac"], strength)
+        strength = shape.inputs["Strength"]
+    elif path:
+        image, place = nodes.new("ShaderNodeTexImage"), nodes.new("ShaderNodeTexCoord")
+        image.image, image.extension = bpy.data.images.load(path), "EXTEND"
+        links.new(place.outputs["UV"], image.inputs["Vector"])
+        links.new(image.outputs["Color"], emission.inputs["Color"])
+    if light.get("falloff") == "linear":
+        falloff = nodes.new("ShaderNodeLightFalloff")
+        falloff.inputs["Strength"].default_value = 1.0
+        links.new(falloff.outputs["Linear"], strength)

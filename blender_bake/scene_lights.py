@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -11,6 +12,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from blender_bake.light import AREA_WATTS, POINT_WATTS
+from blender_bake.light_frame import roll_of
 from blender_bake.node_values import Place, source, value
 from blender_bake.scene_file import show_as_rendered
 
@@ -19,6 +21,7 @@ SMALL = 1e-6  # m: a size up to which a light is a point
 UNEVEN = 1e-3  # relative difference of an object's scales from which a spot's cone is elliptical
 ANGLE = 1e-4  # rad: difference of two suns' angles that a note tells
 FULL_SPREAD = math.pi - 1e-3  # rad: of an area light that is diffuse
+MOST_IES = 1 << 22  # bytes of a photometric file
 ROUND_SIDE = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diameter 1
 
 
@@ -27,7 +30,8 @@ class _CannotError(Exception):
 
 
 def values(scene: bpy.types.Scene) -> dict[str, Any]:
-    """`lights`: [{name, light, note}] of every light object that renders and shines, in order of name, as FRAMES.json writes lights.
+    """`lights`: [{name, light, note}] of every light object that renders and shines, in order of name, as FRAMES.json writes lights;
+    `profiles`: the text of IES files by the name that a light's `profile` has.
 
     `left_out`: [{name, reason}] of those without a counterpart. `note`: what the values lack, where they lack anything. `sun_angle`:
     angular diameter (rad) of the brightest sun, None without one. A light of an instance is named INSTANCER/LIGHT; names are unique.
@@ -37,6 +41,7 @@ def values(scene: bpy.types.Scene) -> dict[str, Any]:
     found: list[tuple[str, dict[str, Any], list[str], float | None]] = []
     left_out: list[dict[str, Any]] = []
     taken: set[str] = set()
+    profiles: dict[str, str] = {}
     graph = bpy.context.evaluated_depsgraph_get()
     shown = [
         (_name(instance), instance.object.original.name, instance.matrix_world.copy())
@@ -48,11 +53,13 @@ def values(scene: bpy.types.Scene) -> dict[str, Any]:
         unique = _free(name, taken)
         taken.add(unique)
         try:
-            light, notes = _light(scene, obj, matrix)
+            light, notes, profile = _light(scene, obj, matrix)
         except _CannotError as reason:
             left_out.append({"name": unique, "reason": str(reason)})
             continue
         if light is not None:
+            if profile is not None:
+                light["profile"] = _stored(profile, unique, profiles)
             found.append((unique, light, notes, obj.data.angle if obj.data.type == "SUN" else None))
     suns = [(max(light["color"]), angle) for _, light, _, angle in found if angle is not None]
     chosen = max(suns)[1] if suns else None
@@ -60,17 +67,22 @@ def values(scene: bpy.types.Scene) -> dict[str, Any]:
         if angle is not None and chosen is not None and abs(angle - chosen) > ANGLE:
             notes.append(f"its angle is {math.degrees(angle):.3g} degrees: its shadows are those of the brightest sun")
     lights = [{"name": name, "light": light, **({"note": "; ".join(notes)} if notes else {})} for name, light, notes, _ in found]
-    return {"lights": lights, "left_out": left_out, "sun_angle": None if chosen is None else _rounded(chosen)}
+    return {
+        "lights": lights,
+        "left_out": left_out,
+        "sun_angle": None if chosen is None else _rounded(chosen),
+        **({"profiles": profiles} if profiles else {}),
+    }
 
 
-def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tuple[dict[str, Any] | None, list[str]]:
-    """The light and what it lacks; None where it does not shine. _CannotError where there is no counterpart."""
+def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tuple[dict[str, Any] | None, list[str], str | None]:
+    """The light, what it lacks, the text of its IES file; None where it does not shine. _CannotError where there is no counterpart."""
     data = obj.data
     if data.cycles.is_portal and data.type == "AREA":
         raise _CannotError("a portal shows the world")
-    color = _strength(data)
+    color, profile = _strength(data)
     if not any(color):
-        return None, []
+        return None, [], None
     if min(color) < 0:
         raise _CannotError("its power is negative")
     if not data.use_shadow:
@@ -82,28 +94,76 @@ def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tup
         raise _CannotError("light linking chooses what it lights or what shadows it")
     bounces = data.cycles.max_bounces
     notes = [f"its light bounces at most {bounces} times in Cycles"] if bounces < scene.cycles.max_bounces else []
-    return {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[data.type](data, matrix, color, notes), notes
+    light = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[data.type](data, matrix, color, notes)
+    if profile is not None:
+        if matrix.is_negative:
+            raise _CannotError("its object is mirrored, and so would its IES texture be")
+        direction = _triple(_axis(matrix))
+        light |= {"direction": direction, "roll": _rounded(roll_of(Vector(direction), matrix))}
+    return light, notes, profile
 
 
-def _strength(data: bpy.types.Light) -> np.ndarray:
-    """(3,) energy times color, in watts, or irradiance of a sun; _CannotError where nodes make it vary."""
+def _strength(data: bpy.types.Light) -> tuple[np.ndarray, str | None]:
+    """((3,) energy times color, in watts, or irradiance of a sun, the text of an IES file that shapes it); _CannotError where other nodes
+    make it vary."""
     color = np.array(data.color, np.float64) * data.energy * 2 ** getattr(data, "exposure", 0.0)
     if getattr(data, "use_temperature", False):
         color = color * np.array(data.temperature_color, np.float64)
     if not (data.use_nodes and data.node_tree is not None and color.any()):
-        return color
+        return color, None
     output = data.node_tree.get_output_node("CYCLES")
     shader = None if output is None else source(Place(output.inputs["Surface"]))[1]
     if shader is None:
-        return np.zeros(3)
-    if any(node.type == "TEX_IES" for node in data.node_tree.nodes):
-        raise _CannotError("an IES texture shapes it")
-    factors = [value(shader.input(name)) for name in ("Color", "Strength")] if shader.node.type == "EMISSION" else [None]
+        return np.zeros(3), None
+    factors: list[np.ndarray | None] = [None]
+    profile = None
+    if shader.node.type == "EMISSION":
+        factors = [value(shader.input("Color"))]
+        strength = shader.input("Strength")
+        shape = None if strength is None else source(strength)[1]
+        if shape is not None and shape.node.type == "TEX_IES":
+            profile = _ies_of(data, shape)
+            factors.append(value(shape.input("Strength")))
+        else:
+            factors.append(value(strength))
     if any(factor is None for factor in factors):
         raise _CannotError("its nodes drive it")
     for factor in factors:
         color = color * np.asarray(factor, np.float64)[:3]
-    return color
+    return color, profile
+
+
+def _ies_of(data: bpy.types.Light, shape: Place) -> str:
+    """The text of the file of an IES texture; _CannotError where it is not there, or not that of a point or a spot, in its own frame."""
+    node = shape.node
+    if data.type not in {"POINT", "SPOT"}:
+        raise _CannotError("an IES texture shapes it: there are such point and spot lights alone")
+    vector = shape.input("Vector")
+    if vector is not None and source(vector)[1] is not None:
+        raise _CannotError("nodes turn its IES texture")
+    if node.mode == "INTERNAL":
+        if node.ies is None:
+            raise _CannotError("its IES texture has no file")
+        return node.ies.as_string()
+    path = Path(bpy.path.abspath(node.filepath, library=data.original.library))
+    try:
+        content = path.read_bytes() if node.filepath else b""
+    except OSError as error:
+        raise _CannotError(f"its IES file {path} is not read ({error.strerror})") from None
+    if not content:
+        raise _CannotError("its IES texture has no file")
+    if len(content) > MOST_IES:
+        raise _CannotError(f"its IES file {path} has more than {MOST_IES >> 20} MB")
+    return content.decode("latin-1")
+
+
+def _stored(text: str, light: str, profiles: dict[str, str]) -> str:
+    """The name that an IES file's text has in `profiles`: that of the first light with it."""
+    for name, known in profiles.items():
+        if known == text:
+            return name
+    profiles[f"{light}.ies"] = text
+    return f"{light}.ies"
 
 
 def _point(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str]) -> dict[str, Any]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from srbf import schemas
 from srbf.errors import InputError
+from srbf.light_profile import Profile
 from srbf.lights import (
     AreaLight,
     DirectionalLight,
@@ -21,13 +22,15 @@ from srbf.lights import (
 )
 
 KINDS: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight, "sphere": SphereLight, "area": AreaLight}
+OF_PROFILES = ("direction", "roll", "profile")
+Profiles = Callable[[str], Profile]
 
 
-def light_of(entry: dict[str, Any], falloff: Falloff = "linear") -> Light:
+def light_of(entry: dict[str, Any], falloff: Falloff = "linear", profiles: Profiles | None = None) -> Light:
     """The light of an entry that keeps to frames.schema.json, of any kind but an environment, which has a file.
 
     `falloff`: of a point or spot light that does not say it. A `name` says which of the scene's lights it is and changes nothing, but of a
-    named light. InputError on values out of range.
+    named light. `profiles`: the profile of a file's name. InputError on values out of range, and on a profile without `profiles`.
     """
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
     if entry["kind"] == "named":
@@ -35,24 +38,41 @@ def light_of(entry: dict[str, Any], falloff: Falloff = "linear") -> Light:
     fields.pop("name", None)
     if entry["kind"] in ("point", "spot"):
         fields.setdefault("falloff", falloff)
+    if "profile" in fields:
+        if profiles is None:
+            raise InputError(f"expected lights without files, found the profile {fields['profile']!r}")
+        fields["profile"] = profiles(fields["profile"])
     return KINDS[entry["kind"]](**fields)
 
 
 def entry_of(light: Light) -> dict[str, Any]:
-    """The entry of a light; InputError for an environment, whose image is no entry's."""
+    """The entry of a light, its profile by the name of the profile's file; InputError for an environment, whose image is no entry's, and
+    for a profile without a file."""
     if isinstance(light, EnvironmentLight):
         raise InputError("expected lights that Blender has, found an environment")
     fields = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(light).items()}
+    if isinstance(light, PointLight):
+        if light.profile is None:
+            fields = {name: value for name, value in fields.items() if name not in OF_PROFILES or "inner" in fields and name == "direction"}
+        elif light.profile.file is None:
+            raise InputError("expected a profile that was read from a file, found another")
+        else:
+            fields["profile"] = light.profile.file[0]
     kind = next((kind for kind, made in KINDS.items() if type(light) is made), "named")
     return {"kind": kind, **fields}
 
 
-def lights_of(entries: Sequence[dict[str, Any]], where: str, falloff: Falloff = "inverse-square") -> list[Light]:
+def lights_of(
+    entries: Sequence[dict[str, Any]], where: str, falloff: Falloff = "inverse-square", profiles: Profiles | None = None
+) -> list[Light]:
     """Lights of entries that are not checked yet, none of them an environment; ManifestError and InputError name `where`."""
     schemas.check({"frames": [{"lights": list(entries)}]}, "frames", where)
     if any(entry["kind"] == "environment" for entry in entries):
         raise InputError(f"expected lights without files in {where}, found an environment")
-    return [light_of(entry, falloff) for entry in entries]
+    try:
+        return [light_of(entry, falloff, profiles) for entry in entries]
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def named(name: str, intensity: float = 1.0, color: Triple = (1.0, 1.0, 1.0)) -> NamedLight:

@@ -78,7 +78,7 @@ def light_vectors(light: PointLight, positions: Float[ndarray, "*p 3"]) -> tuple
     directions
         (..., 3) float64 from the receivers to the light; 0 where a receiver is at the light.
     strength
-        (...) float64, the factor on the light's irradiance.
+        (...) float64, the factor on the light's irradiance, without a profile's.
 
     Examples
     --------

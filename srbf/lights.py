@@ -11,12 +11,15 @@ from numpy import ndarray
 
 from srbf.arrays import Float32, Float64
 from srbf.errors import InputError
+from srbf.light_profile import Profile, axes_of, roll_of
 from srbf.sphere import normalize
 
 Falloff = Literal["linear", "inverse-square"]
 Triple = tuple[float, float, float]
 WHITE: Triple = (1.0, 1.0, 1.0)
+DOWN: Triple = (0.0, 0.0, -1.0)
 PARALLEL = 1e-9  # sine of the angle between an area light's sides up to which they are parallel
+NEARLY_FLAT = 1.57  # rad: a half-angle from which on no image fills a cone
 DEFAULT_RADIUS = 1e-4  # meters, the smallest distance counted, so that a light in a surface stays finite
 
 
@@ -66,11 +69,18 @@ class PointLight:
         `linear`, the article's a0/|L|, or `inverse-square`, (a0/|L|)^2.
     radius
         m, above 0: |L| is never less, so that a light in a surface stays finite.
+    direction
+        (x, y, z) that a profile's axis points along, from the light; normalized. By default straight down.
+    roll
+        Turns a profile about that, rad: see `srbf.light_profile.axes_of`.
+    profile
+        What share of the strength goes into each direction: a factor on `color`. None: all of it into every direction. Projected ones are
+        of spots.
 
     Raises
     ------
     InputError
-        On `a0` or `radius` not above 0, on another falloff, and on numbers that are not three or not finite.
+        On `a0` or `radius` not above 0, on another falloff, on a projected profile, and on numbers that are not three or not finite.
 
     Examples
     --------
@@ -84,14 +94,48 @@ class PointLight:
     a0: float = 1.0
     falloff: Falloff = "linear"
     radius: float = DEFAULT_RADIUS
+    direction: Triple = field(default=DOWN, kw_only=True)
+    roll: float = field(default=0.0, kw_only=True)
+    profile: Profile | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", triple(self.position, "position"))
+        object.__setattr__(self, "direction", _unit(self.direction))
+        object.__setattr__(self, "roll", triple((self.roll, 0, 0), "a roll and two zeros")[0])
         object.__setattr__(self, "color", triple(self.color, "color"))
         for name in ("a0", "radius"):
             object.__setattr__(self, name, _above_zero(getattr(self, name), name))
         if self.falloff not in get_args(Falloff):
             raise InputError(f"expected a falloff of linear, inverse-square, found {self.falloff!r}")
+        if self.profile is not None and self.profile.projected and self.tangent == 0:
+            raise InputError("expected a spot of an outer half-angle below pi / 2 to project an image, found another light")
+
+    @property
+    def tangent(self) -> float:
+        """Of a spot's outer half-angle, 0 where there is none below pi / 2: half of a projected image's width, 1 m ahead."""
+        return 0.0
+
+    def factors(self, away: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:
+        """The profile's factors on the color in directions away from the light.
+
+        Parameters
+        ----------
+        away
+            (n, 3) vectors from the light, of any length.
+
+        Returns
+        -------
+        ndarray
+            (n, 3) float64; 1 without a profile.
+
+        Examples
+        --------
+        >>> PointLight((0.0, 0.0, 2.0)).factors(np.array([[0.0, 0.0, -1.0]])).tolist()
+        [[1.0, 1.0, 1.0]]
+        """
+        if self.profile is None:
+            return np.ones((len(away), 3))
+        return self.profile.at(np.asarray(away, np.float64) @ np.stack(axes_of(self.direction, self.roll), axis=1), self.tangent)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,10 +144,10 @@ class SpotLight(PointLight):
 
     Parameters
     ----------
-    position, color, a0, falloff, radius
+    position, color, a0, falloff, radius, roll, profile
         Of the point light.
     direction
-        (x, y, z) of the axis, from the light; normalized.
+        (x, y, z) of the axis, of the cone and of a profile, from the light; normalized.
     inner, outer
         Half-angles, rad: 0 <= inner <= outer <= pi.
 
@@ -122,18 +166,21 @@ class SpotLight(PointLight):
     srbf.errors.InputError: expected spot half-angles 0 <= inner <= outer <= pi rad, found inner 0.5, outer 0.3
     """
 
-    direction: Triple
+    direction: Triple = field()  # without the default of a point light
     inner: float
     outer: float
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        object.__setattr__(self, "direction", _unit(self.direction))
         inner, outer = float(self.inner), float(self.outer)
         if not 0 <= inner <= outer <= np.pi:
             raise InputError(f"expected spot half-angles 0 <= inner <= outer <= pi rad, found inner {inner:g}, outer {outer:g}")
         object.__setattr__(self, "inner", inner)
         object.__setattr__(self, "outer", outer)
+        super().__post_init__()
+
+    @property
+    def tangent(self) -> float:
+        return float(np.tan(self.outer)) if 0 < self.outer < NEARLY_FLAT else 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +189,7 @@ class SphereLight(PointLight):
 
     Parameters
     ----------
-    position, color, a0, falloff
+    position, color, a0, falloff, direction, roll, profile
         Of the point light in the center; the falloff is `inverse-square` unless it is said.
     size
         Radius of the sphere, m, above 0.
@@ -339,8 +386,11 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
         u, v = triple(linear @ light.u, "u"), triple(linear @ light.v, "v")
         return replace(light, position=position, u=u, v=v, a0=light.a0 * scale)
     changes: dict[str, Any] = {"position": position, "a0": light.a0 * scale, "radius": light.radius * scale}
-    if isinstance(light, SpotLight):
-        return replace(light, direction=_unit(linear @ light.direction), **changes)
+    if isinstance(light, SpotLight) or light.profile is not None:
+        direction = _unit(linear @ light.direction)
+        changes["direction"] = direction
+        if light.profile is not None:
+            changes["roll"] = roll_of(direction, linear @ axes_of(light.direction, light.roll)[0])
     if isinstance(light, SphereLight):
         return replace(light, size=light.size * scale, **changes)
     return replace(light, **changes)
@@ -350,6 +400,14 @@ def refuse_named(lights: Sequence[Light], method: str) -> None:
     """InputError where one of the lights of an asset that wants lights inside its scene is one of the scene's own, by name."""
     if any(isinstance(light, NamedLight) for light in lights):
         raise InputError(f"expected lights inside the scene for a {method} asset, found a named one; bake `light_set=named` to mix lights")
+
+
+def refuse_profiles(lights: Sequence[Light], method: str) -> None:
+    """InputError where one of the lights has a profile, of an asset whose method takes none."""
+    if any(isinstance(light, PointLight) and light.profile is not None for light in lights):
+        raise InputError(
+            f"expected lights without a profile for a {method} asset, found one; capture the scene with `light_set=surfels` or `gather`"
+        )
 
 
 def triple(value: object, name: str = "a vector") -> Triple:

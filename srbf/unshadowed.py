@@ -20,7 +20,7 @@ def irradiance_from(light: Light, points: Float[ndarray, "n 3"], normals: Float[
     Parameters
     ----------
     light
-        Of any kind with a place or a direction; its color does not count.
+        Of any kind with a place or a direction; its color and its profile do not count.
     points
         (n, 3), m.
     normals

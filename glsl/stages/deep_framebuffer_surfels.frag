@@ -7,6 +7,7 @@ precision highp int;
 precision highp sampler2D;
 
 #include "surfels/cell_irradiance.glsl"
+#include "surfels/profiled_irradiance.glsl"
 #include "shadow/cube_face.glsl"
 #include "shadow/point_shadow_place.glsl"
 #include "surfels/surfel_visibility.glsl"
@@ -14,6 +15,11 @@ precision highp sampler2D;
 uniform sampler2D surfels;  // place, meters; area
 uniform sampler2D normals;
 uniform sampler2D heights;  // one over the depth of the nearest occluder
+uniform sampler2D profile;
+uniform bool profiled;      // whether the light has one
+uniform vec3 profileAcross;
+uniform vec3 profileUp;
+uniform float profileTangent;
 uniform SrbfPointLight pointLight;
 uniform vec3 across;
 uniform vec3 up;
@@ -34,10 +40,15 @@ void main() {
     if (srbfCubeFace(fromLight) != cubeFace) {
         discard;
     }
-    float amount = srbfCellIrradiance(cell, normal, pointLight, lambertian);
-    if (amount > 0.0) {
+    vec3 amount = vec3(0.0);
+    if (profiled) {
+        amount = srbfProfiledIrradiance(cell, normal, pointLight, profile, profileAcross, profileUp, profileTangent);
+    } else {
+        amount = vec3(srbfCellIrradiance(cell, normal, pointLight, lambertian));
+    }
+    if (amount.r + amount.g + amount.b > 0.0) {
         vec3 place = srbfPointShadowPlace(fromLight, across, up, ahead, reach);
         amount *= srbfSurfelVisibility(heights, ivec2(0), textureSize(heights, 0).x, place);
     }
-    irradiance = vec4(vec3(amount * weight), 1.0);
+    irradiance = vec4(amount * weight, 1.0);
 }

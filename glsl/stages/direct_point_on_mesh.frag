@@ -8,6 +8,7 @@ precision highp sampler2D;
 
 #include "lights/light_vector.glsl"
 #include "lights/point_light_strength.glsl"
+#include "lights/profile.glsl"
 #include "shadow/cube_face.glsl"
 #include "shadow/point_shadow_place.glsl"
 #include "shadow/point_shadow_slope.glsl"
@@ -20,6 +21,11 @@ uniform sampler2D faces;    // normals of the triangles
 uniform sampler2D heights;  // one over the depth
 uniform sampler2D transmittance;
 uniform sampler2D wallHeights;
+uniform sampler2D profile;
+uniform bool profiled;  // whether the light has a profile
+uniform vec3 profileAcross;
+uniform vec3 profileUp;
+uniform float profileTangent;
 uniform bool walls;  // whether any of the scene is translucent
 uniform SrbfPointLight pointLight;
 uniform vec3 facing;  // normal of a surface that glows, at this point of it; 0 for a point or spot light
@@ -66,6 +72,9 @@ void main() {
     if (walls) {
         float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
         visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
+    }
+    if (profiled) {
+        visibility *= srbfProfile(profile, -lightVector, pointLight.axis, profileAcross, profileUp, profileTangent);
     }
     response = vec4(visibility * amount, amount);
 }

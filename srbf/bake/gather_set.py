@@ -22,6 +22,7 @@ from srbf.bake.surface_checks import warn_of_dark_view, warn_of_empty
 from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.io.ies import parse_ies
 from srbf.visibility.behind import Behind, points_behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
@@ -112,7 +113,7 @@ class FoundSurfaces:
             np.array(facts["bounces"]),
             passed,
             arrays["gloss"][opaque] if "gloss" in arrays and (arrays["gloss"] > 0).any() else None,
-            json.dumps(facts["scene_lights"]) if "scene_lights" in facts else NO_LIGHTS,
+            json.dumps(readable(facts["scene_lights"])) if "scene_lights" in facts else NO_LIGHTS,
         )
 
 
@@ -209,6 +210,7 @@ class GatherSet:
             "gather": links if self.gather is None else samples,
             "free_places": [[round(value, 6) for value in place] for place in found.free.tolist()],
             "scene_lights": found.scene_lights["lights"],
+            **({"scene_profiles": found.scene_lights["profiles"]} if found.scene_lights.get("profiles") else {}),
             **({"scene_lights_left_out": found.scene_lights["left_out"]} if found.scene_lights["left_out"] else {}),
         }
 
@@ -293,6 +295,20 @@ class GatherSet:
 def _require_pixels(pixels: PixelPoints) -> None:
     if not len(pixels.points):
         raise InputError("expected surfaces in view, found none: every pixel is empty; turn the camera")
+
+
+def readable(told: dict[str, Any]) -> dict[str, Any]:
+    """The scene's own lights without those whose IES file is not read, which are left out with the reason."""
+    profiles, faults = dict(told.get("profiles", {})), {}
+    for name, text in told.get("profiles", {}).items():
+        try:
+            parse_ies(text.encode(), name)
+        except InputError as error:
+            faults[name] = str(error)
+            del profiles[name]
+    kept = [one for one in told["lights"] if one["light"].get("profile") not in faults]
+    left = [{"name": one["name"], "reason": faults[one["light"]["profile"]]} for one in told["lights"] if one not in kept]
+    return {**told, "lights": kept, "left_out": told["left_out"] + left, "profiles": profiles}
 
 
 def _lines_of(told: dict[str, Any]) -> list[str]:

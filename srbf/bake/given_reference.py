@@ -62,11 +62,13 @@ def render_given(
     blender: Path | None = None,
     stop: threading.Event | None = None,
     seed: int = 1,
+    profiles: Path | None = None,
 ) -> GivenReference:
     """Render a view's picture under `lights`, entries as of FRAMES.json (without environments and named lights), by Cycles.
 
     What the scene emits by itself is in it, as the asset's ambient light; its own lights and world are off, unless the capture was baked
-    with `keep_scene_lights`. `progress` gets samples (done, total). `stop`: once it is set, Blender's process is killed.
+    with `keep_scene_lights`. `profiles`: the folder of the files of the lights' profiles. `progress` gets samples
+    (done, total). `stop`: once it is set, Blender's process is killed.
     InputError for lights that Cycles lacks, an asset of another receiver or transport than a view's, or a missing scene; BakeError where
     Blender fails; StoppedError.
     """
@@ -75,7 +77,10 @@ def render_given(
     if not 1 <= samples <= MOST_SAMPLES:
         raise InputError(f"expected 1 to {MOST_SAMPLES} samples, found {samples}")
     require_scene(scene)
-    lights_of(lights, GIVEN)
+    if profiles is None:
+        lights_of(lights, GIVEN)
+    else:
+        lights = [{**one, "profile": str(profiles.resolve() / one["profile"])} if "profile" in one else one for one in lights]
     if any(light["kind"] == "named" for light in lights):
         raise InputError("expected lights inside the scene for a render by Cycles, found a named one")
     made = asset.manifest.get("source", {}).get("bake", {})

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from srbf import schemas
 from srbf.errors import InputError
 from srbf.io import files
-from srbf.light_entries import light_of, named
+from srbf.light_entries import Profiles, light_of, named
+from srbf.light_profile import Profile, read_ies_profile
 from srbf.lights import (
     AreaLight,
     DirectionalLight,
@@ -95,36 +97,54 @@ def with_falloff(lights: Sequence[Light], falloff: Falloff) -> list[Light]:
 
 def read_environment(path: Path) -> EnvironmentLight:
     """An equirectangular EXR or picture, its values taken as linear. What was done that is not plain is a warning."""
-    return EnvironmentLight(_environment(path))
+    return EnvironmentLight(_linear(path))
+
+
+def read_profile(path: Path) -> Profile:
+    """A photometric file (.ies), or an image that a spot projects: EXR as it is, other formats as sRGB where they do not say.
+
+    InputError and ImageError on a file that is not there or not read.
+    """
+    if path.suffix.lower() == ".ies":
+        return read_ies_profile(path)
+    pixels = _linear(path, "linear" if path.suffix.lower() in (".exr", ".hdr") else "srgb")
+    if (pixels < 0).any():
+        raise InputError(f"expected an image of at least 0 to project, found {pixels.min():g} in {path}")
+    return Profile(pixels, projected=True, file=(path.name, path.read_bytes()))
 
 
 def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
-    """The lights of every frame of a FRAMES.json; environment files are found beside it. ManifestError, InputError on bad ones.
+    """The lights of every frame of a FRAMES.json; files are found beside it. ManifestError, InputError on bad ones.
 
     `falloff`: of point and spot lights that do not say it.
     """
     document = files.read_json(path)
     schemas.check(document, "frames", str(path))
     frames = []
+
+    @functools.cache
+    def profile(name: str) -> Profile:
+        return read_profile(path.parent / name)
+
     for number, frame in enumerate(document["frames"]):
         try:
-            frames.append([_light(entry, path.parent, falloff) for entry in frame["lights"]])
+            frames.append([_light(entry, path.parent, falloff, profile) for entry in frame["lights"]])
         except InputError as error:
             raise InputError(f"{path}, frame {number}: {error}") from error
     return frames
 
 
-def _light(entry: dict[str, Any], folder: Path, falloff: Falloff) -> Light:
+def _light(entry: dict[str, Any], folder: Path, falloff: Falloff, profiles: Profiles) -> Light:
     if entry["kind"] != "environment":
-        return light_of(entry, falloff)
+        return light_of(entry, falloff, profiles)
     fields: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in entry.items() if key != "kind"}
-    return EnvironmentLight(_environment(folder / fields.pop("file")), **fields)
+    return EnvironmentLight(_linear(folder / fields.pop("file")), **fields)
 
 
-def _environment(path: Path) -> np.ndarray:
+def _linear(path: Path, transfer: Literal["linear", "srgb"] = "linear") -> np.ndarray:
     from srbf.importing.pictures import read_picture, said_once
 
-    picture = read_picture(path, "linear")
+    picture = read_picture(path, transfer)
     for line in said_once([(path.name, picture.notes)]):
         warnings.warn(line, stacklevel=2)
     return picture.pixels

@@ -11,6 +11,7 @@ from numpy import ndarray
 from srbf.arrays import Float, Float32
 from srbf.gl.context import Limits
 from srbf.gl.depth_buffer import DepthCamera
+from srbf.light_profile import axes_of
 from srbf.lights import PointLight, SpotLight
 
 FALLOFF = {"linear": 0, "inverse-square": 1}  # SRBF_FALLOFF_LINEAR, SRBF_FALLOFF_INVERSE_SQUARE
@@ -32,7 +33,7 @@ def point_light_uniforms(light: PointLight) -> dict[str, Any]:
     position = np.array(light.position, np.float64)
     high = position.astype(np.float32)
     low = (position - high).astype(np.float32)
-    axis = (0.0, 0.0, 1.0)
+    axis = (0.0, 0.0, 1.0) if light.profile is None else light.direction
     inner, outer = NO_CONE
     if isinstance(light, SpotLight):
         axis = light.direction
@@ -47,6 +48,18 @@ def point_light_uniforms(light: PointLight) -> dict[str, Any]:
         "versineInner": inner,
         "versineOuter": outer,
         "falloff": FALLOFF[light.falloff],
+    }
+
+
+def profile_uniforms(light: PointLight) -> dict[str, Any]:
+    """What the shaders know of a light's profile beside its texture: whether it has one, its frame, and what is projected how far."""
+    x, y, _ = axes_of(light.direction, light.roll)
+    tangent = light.tangent if light.profile is not None and light.profile.projected else 0.0
+    return {
+        "profiled": light.profile is not None,
+        "profileAcross": tuple(x.tolist()),
+        "profileUp": tuple(y.tolist()),
+        "profileTangent": tangent,
     }
 
 

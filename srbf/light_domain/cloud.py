@@ -20,9 +20,10 @@ MARGIN = 0.1  # of a box's longest side, m: a light this far outside the places 
 
 def isotropic(light: Light) -> PointLight:
     """A point or sphere light of inverse-square falloff, InputError for others: all that a cloud of captured point lights can be."""
-    if not isinstance(light, PointLight) or isinstance(light, SpotLight) or light.falloff != "inverse-square":
+    if not isinstance(light, PointLight) or isinstance(light, SpotLight) or light.falloff != "inverse-square" or light.profile is not None:
         raise InputError(
-            "expected point lights of inverse-square falloff for a cloud of captured point lights or without embreex, found another; "
+            "expected point lights of inverse-square falloff, without a profile, for a cloud of captured point lights or without embreex, "
+            "found another; "
             "capture patches for any light, and install embreex"
         )
     return light

@@ -11,7 +11,7 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.light_domain import domain_of_asset
-from srbf.lights import Light, moved
+from srbf.lights import Light, moved, refuse_profiles
 from srbf.methods.over_lights import finish
 from srbf.methods.protocol import FitRun, Method, Moving
 from srbf.registry import method_named
@@ -77,6 +77,11 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     list
         Of lights, in order.
 
+    Raises
+    ------
+    InputError
+        On a light with a profile, where the asset's method takes none.
+
     Examples
     --------
     >>> from srbf.methods import in_asset_frame
@@ -84,6 +89,8 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     >>> in_asset_frame(asset, [sun]) == [sun]
     True
     """
+    if not method_of(asset).takes_profiles:
+        refuse_profiles(lights, asset.method)
     return [moved(light, asset.asset_from_world) for light in lights]
 
 

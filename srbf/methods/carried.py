@@ -14,7 +14,7 @@ from srbf.capture import Capture
 from srbf.encode.dilation import dilate
 from srbf.light_domain import LightDomain
 
-OWN_LIGHTS = ("scene_lights", "scene_lights_left_out")  # keys of capture.json and asset.json
+OWN_LIGHTS = ("scene_lights", "scene_lights_left_out", "scene_profiles")  # keys of capture.json and asset.json
 
 
 def carried_images(capture: Capture, nearest: Int[ndarray, "H W"] | None) -> dict[str, ndarray]:

@@ -98,6 +98,7 @@ class DeepFramebuffer(Method):
     receivers: ClassVar[tuple[str, ...]] = ("view",)
     exportable: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
+    takes_profiles: ClassVar[bool] = True
 
     nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")
     budget: int | None = None

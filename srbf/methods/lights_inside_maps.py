@@ -29,6 +29,7 @@ class LightsInsideMaps(LightTableMaps):
     """A method whose lights are inside the scene."""
 
     tables: ClassVar[dict[str, str]] = {**LightTableMaps.tables, "cells": "cells.exr", **FILES, **kept_visibility.FILES}
+    takes_profiles: ClassVar[bool] = True
 
     visibility: str = "none"  # compressed depths of the surfels; and of the receivers:
     receiver_visibility: bool = False

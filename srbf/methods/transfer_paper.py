@@ -91,6 +91,7 @@ class TransferPaper(Method):
     on_page: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
     exportable: ClassVar[bool] = False
+    takes_profiles: ClassVar[bool] = True
 
     basis: Literal["paper"] | str = setting(PAPER, "Patch-to-patch matrices over bases of direct light, of captures of surfels.")
     d2: int = setting(10, "Coefficients of direct light per cluster of surfels.")

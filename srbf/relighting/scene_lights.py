@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
 from srbf.light_entries import lights_of
+from srbf.light_profile import Profile
 from srbf.lights import Light
 
 SHOWN = 8  # names in a line
@@ -26,7 +29,7 @@ def scene_lights(asset: Asset) -> dict[str, Light]:
     Raises
     ------
     InputError
-        Where the asset lists none.
+        Where the asset lists none, or the profile of one is damaged.
 
     Examples
     --------
@@ -37,7 +40,15 @@ def scene_lights(asset: Asset) -> dict[str, Light]:
     listed = asset.manifest.get("scene_lights", [])
     if not listed:
         raise InputError("expected an asset that lists its scene's lights, found none; bake a scene with lights with `light_set=gather`")
-    lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}")
+    texts = asset.manifest.get("scene_profiles", {})
+
+    @functools.cache
+    def profile(name: str) -> Profile:
+        if name not in texts:
+            raise InputError(f"expected the profile {name!r} among its `scene_profiles`, found none; fit again")
+        return Profile.of_ies(texts[name].encode(), name)
+
+    lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}", profiles=profile)
     return dict(zip((one["name"] for one in listed), lights, strict=True))
 
 

@@ -11,6 +11,7 @@ from numpy import ndarray
 from srbf.arrays import Float32
 from srbf.gl.context import compile_program
 from srbf.gl.includes import resolve
+from srbf.light_profile import Profile
 
 if TYPE_CHECKING:
     import moderngl
@@ -61,6 +62,20 @@ class Resources:
         """`resource`, registered for release."""
         self._made.callback(resource.release)
         return resource
+
+
+class ProfileTextures:
+    """Textures of profiles, which stay: lights of equal profiles share one."""
+
+    def __init__(self, resources: Resources) -> None:
+        self._resources = resources
+        self._made: dict[Profile, moderngl.Texture] = {}
+
+    def of(self, profile: Profile) -> moderngl.Texture:
+        """Its table, for `lights/profile.glsl`."""
+        if profile not in self._made:
+            self._made[profile] = self._resources.texture(profile.table)
+        return self._made[profile]
 
 
 def render(array: moderngl.VertexArray, uniforms: dict[str, Any], vertices: int = -1) -> None:

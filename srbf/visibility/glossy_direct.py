@@ -125,10 +125,10 @@ class GlossyRays:
         square = np.repeat(self._disc[first : first + each], count, axis=0)
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, lambda: (square + turn) % 1)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        lit = np.flatnonzero((NoL > LEAST) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0))
+        lit = np.flatnonzero((NoL > LEAST) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
         direction = rays.direction[lit].astype(np.float32)
         own = self._pixels.reflected(pixels[lit], samples.point[lit], samples.normal[lit], rays.direction[lit].astype(np.float64))
-        own *= (rays.irradiance[lit] * rays.importance[lit] * rays.opening[lit] / NoL[lit])[:, None]
+        own *= (rays.irradiance[lit] * rays.importance[lit] / NoL[lit])[:, None] * rays.opening[lit]
         own *= self._tracer.reaching(samples, lit, direction, None if rays.distance is None else rays.distance[lit])
         found = np.zeros((len(samples.texel), 3))
         found[lit] = own
@@ -162,12 +162,15 @@ class GlossyMaps:
         """What the lobes reflect of a light that gives their pixels the irradiance `shadowed`."""
         unshadowed = irradiance_from(light, self._points, self._normals)
         color, direction = np.array(light.color, np.float64), self._toward(light)
+        if isinstance(light, PointLight):
+            color = color * light.factors(self._points - np.array(light.position))
+        color = np.broadcast_to(color, (len(unshadowed), 3))
         NoL = np.einsum("nc,nc->n", self._normals, direction)
         lit = np.flatnonzero((NoL > LEAST_COS) & (unshadowed > 0))
         reflected = self._pixels.reflected(self._pixels.texels[lit], self._points[lit], self._normals[lit], direction[lit])
-        seen = np.clip(shadowed[lit] / np.maximum(unshadowed[lit, None] * color, 1e-30), 0, 1)
+        seen = np.clip(shadowed[lit] / np.maximum(unshadowed[lit, None] * color[lit], 1e-30), 0, 1)
         found = np.zeros((len(NoL), 3))
-        found[lit] = reflected * (unshadowed[lit] / NoL[lit])[:, None] * seen * color
+        found[lit] = reflected * (unshadowed[lit] / NoL[lit])[:, None] * seen * color[lit]
         return found
 
     def _toward(self, light: CastingLight) -> Float64[ndarray, "G 3"]:

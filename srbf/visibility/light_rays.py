@@ -22,13 +22,13 @@ CastingLight = DirectionalLight | PointLight | AreaLight  # with a direct light 
 
 @dataclass(frozen=True)
 class LightRays:
-    """n rays: unit vectors to the light, distance (m; None: endless), unshadowed irradiance (white light, without a spot's cone), the
-    part that a spot's cone lets out, and weight in a texel's mean."""
+    """n rays: unit vectors to the light, distance (m; None: endless), unshadowed irradiance (white light, without a spot's cone), what
+    a spot's cone and a profile let out, and weight in a texel's mean."""
 
     direction: Float[ndarray, "n 3"]
     distance: Float64[ndarray, " n"] | None
     irradiance: Float64[ndarray, " n"]
-    opening: Float64[ndarray, " n"]
+    opening: Float64[ndarray, "n 3"]
     importance: Float64[ndarray, " n"]
 
 
@@ -56,15 +56,15 @@ def rays_towards(
         vector = np.array(light.position) - point
         distance = np.linalg.norm(vector, axis=1)
         unit = vector / np.maximum(distance, 1e-30)[:, None]
-        opening = np.ones(len(point))
+        opening = light.factors(-vector)
         if isinstance(light, SpotLight):
-            opening = spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
+            opening = opening * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))[:, None]
         return LightRays(unit, distance, attenuation(distance, light) * _cosine(unit, normal), opening, np.ones(len(point)))
     axis = np.array(light.direction)
     unit = np.broadcast_to(axis, point.shape)
     if sun_angle > 0:
         unit = _turned(unit, disc_points(square()) * np.tan(sun_angle / 2))
-    return LightRays(unit, None, _cosine(unit, normal), np.ones(len(point)), np.ones(len(point)))
+    return LightRays(unit, None, _cosine(unit, normal), np.ones((len(point), 3)), np.ones(len(point)))
 
 
 def _towards_sphere(
@@ -92,7 +92,8 @@ def _weighted(
     exact = irradiance_from(light, point, normal)
     importance = np.where(exact > 0, np.maximum(added / np.maximum(exact, 1e-300), MIN_IMPORTANCE), 1)
     short = SHORT_OF_LIGHT * (1 + np.abs(point).max(axis=1, initial=0))
-    return LightRays(unit, np.maximum(distance - short, 0), exact, np.ones(len(point)), importance)
+    opening = light.factors(point - np.array(light.position)) if isinstance(light, SphereLight) else np.ones((len(point), 3))
+    return LightRays(unit, np.maximum(distance - short, 0), exact, opening, importance)
 
 
 def _cosine(unit: ndarray, normal: ndarray) -> Float64[ndarray, " n"]:

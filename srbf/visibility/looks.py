@@ -10,7 +10,7 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float64
-from srbf.gl.uniforms import point_light_uniforms
+from srbf.gl.uniforms import point_light_uniforms, profile_uniforms
 from srbf.light_geometry import area_samples
 from srbf.lights import AreaLight, PointLight, SphereLight, SpotLight, Triple, triple
 from srbf.sphere import point_set
@@ -38,6 +38,7 @@ class Look:
         nearest = NEAREST * (1 + max(map(abs, self.light.position)))
         shared = {
             "pointLight": point_light_uniforms(self.light),
+            **profile_uniforms(self.light),
             "light": self.light.position,
             "facing": self.facing,
             "nearest": nearest,

@@ -82,7 +82,10 @@ class PixelLookups:
                 continue
             exact, whole = irradiance_from(sized, part.place, part.normal), found[:, 3].astype(np.float64)
             importance = np.where(exact > 0, np.maximum(whole / np.where(exact > 0, exact, 1), MIN_IMPORTANCE), 1)
-            sums.add(own, samples.share, importance, visible_part(found), exact)
+            visible = visible_part(found)
+            if isinstance(sized, SphereLight):
+                visible = visible * sized.factors(part.place - np.array(sized.position)).astype(np.float32)
+            sums.add(own, samples.share, importance, visible, exact)
         return sums.mean().astype(np.float32)
 
 

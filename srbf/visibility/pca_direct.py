@@ -39,7 +39,10 @@ class PcaDirect:
                 irradiance = irradiance_from(light, positions, normals)
                 lit = np.flatnonzero(irradiance > 0)
                 seen = irradiance[lit] * self._seen(light, lit, starts[lit].astype(np.float64), normals[lit])
-                total[lit] += (seen[:, None] * np.array(light.color)).astype(np.float32)
+                color = np.array(light.color)
+                if isinstance(light, PointLight):
+                    color = color * light.factors(positions[lit] - np.array(light.position))
+                total[lit] += (seen[:, None] * color).astype(np.float32)
         image = np.zeros((*covered.shape, 3), np.float32)
         image[covered] = total
         nearest = None if covered.all() else nearest_covered(covered.astype(np.float32))

@@ -232,8 +232,8 @@ class RayTracer:
 
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, square)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        visible = np.repeat(rays.opening.astype(np.float32)[:, None], 3, axis=1)
-        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0))
+        visible = rays.opening.astype(np.float32)
+        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
         direction = rays.direction[lit].astype(np.float32)
         origin = self._origins(samples, lit, direction)
         visible[lit] *= self._shadow_rays.passed(origin, direction, None if rays.distance is None else rays.distance[lit])

@@ -20,7 +20,7 @@ SIDE = 4  # points per side of an area light
 DIRECTIONS = 512  # of an environment map
 NEAR, PARTS = 8.0, 4  # sides of a cell, closer than which it is measured by so many points a side;
 NEAR_CONE, WIDEST = 64.0, 2 * np.pi / 3  # of a spot of a half-angle below that, rad, whose cone may end in it
-Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+Strength = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]  # (n, 1), or (n, 3) by a profile
 
 
 @functools.lru_cache(maxsize=4)
@@ -79,9 +79,9 @@ class ReceivedLight:
     def irradiance(self, light: Light) -> Float64[ndarray, "N 3"]:
         """On every cell, in the light's units; 0 for lights without a place or a direction."""
         if isinstance(light, AreaLight):
-            return self._of_area(light)[:, None] * np.array(light.color)
+            return self._of_area(light) * np.array(light.color)
         if isinstance(light, PointLight):
-            return self._of_point(light)[:, None] * np.array(light.color)
+            return self._of_point(light) * np.array(light.color)
         if isinstance(light, DirectionalLight):
             return self._from(np.array(light.direction))[:, None] * np.array(light.color)
         if isinstance(light, EnvironmentLight):
@@ -92,34 +92,34 @@ class ReceivedLight:
         """The mean irradiance of every patch."""
         return patch_means(self._cells, self.irradiance(light))
 
-    def _of_point(self, light: PointLight) -> Float64[ndarray, " N"]:
-        """cos a0^2 / r^2 of what sees the light, or a0 / r for a linear falloff; times a spot's cone."""
+    def _of_point(self, light: PointLight) -> Float64[ndarray, "N _"]:
+        """cos a0^2 / r^2 of what sees the light, or a0 / r for a linear falloff; times a spot's cone and a profile."""
 
         def strength(squared: ndarray, unit: ndarray, least: ndarray) -> ndarray:
             near = np.maximum(np.maximum(squared, light.radius**2), least)
             found = light.a0**2 / near if light.falloff == "inverse-square" else light.a0 / np.sqrt(near)
             if isinstance(light, SpotLight):
                 found = found * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
-            return found
+            return found[:, None] if light.profile is None else found[:, None] * light.factors(-unit)
 
         sides = NEAR_CONE if isinstance(light, SpotLight) and light.outer < WIDEST else NEAR
         return self._from_place(np.array(light.position), strength, sides)
 
-    def _of_area(self, light: AreaLight) -> Float64[ndarray, " N"]:
+    def _of_area(self, light: AreaLight) -> Float64[ndarray, "N 1"]:
         """The mean of a grid of points, each a Lambertian emitter: cos_l cos a0^2 / r^2."""
         u, v, center = np.array(light.u), np.array(light.v), np.array(light.position)
         facing = np.cross(u, v)
         facing /= np.linalg.norm(facing)
 
         def strength(squared: ndarray, unit: ndarray, least: ndarray) -> ndarray:
-            return np.maximum(-(unit @ facing), 0) * light.a0**2 / np.maximum(squared, least)
+            return (np.maximum(-(unit @ facing), 0) * light.a0**2 / np.maximum(squared, least))[:, None]
 
         side = self._shadows.side
         steps = (np.arange(side) + 0.5) / side - 0.5
         places = [center + s * u + t * v for s in steps for t in steps]
         return np.sum([self._from_place(place, strength) for place in places], axis=0) / side**2
 
-    def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength, sides: float = NEAR) -> Float64[ndarray, " N"]:
+    def _from_place(self, place: Float64[ndarray, " 3"], strength: Strength, sides: float = NEAR) -> Float64[ndarray, "N _"]:
         """The mean of cos times `strength` over every cell that sees a place.
 
         Cells are taken as squares: at their middles far away, by PARTS x PARTS points closer than so many `sides`. r^2 is at least
@@ -134,7 +134,7 @@ class ReceivedLight:
             tangent, bitangent = frames(self._normals[near])
             steps = (np.arange(PARTS) + 0.5) / PARTS - 0.5
             side = np.sqrt(self._areas[near])[:, None]
-            found = np.zeros(len(near))
+            found = np.zeros((len(near), amount.shape[1]))
             for s in steps:
                 for t in steps:
                     part = vector[near] - side * (s * tangent + t * bitangent)
@@ -167,21 +167,22 @@ class ReceivedLight:
         result[front] = cosine[front] * self._shadows.visible(front, toward, None)
         return result
 
-    def _shadowed(self, amount: Float64[ndarray, " N"], place: Float64[ndarray, " 3"]) -> Float64[ndarray, " N"]:
+    def _shadowed(self, amount: Float64[ndarray, "N c"], place: Float64[ndarray, " 3"]) -> Float64[ndarray, "N c"]:
         """`amount` where it is above 0 and nothing stands between a cell and `place`."""
-        front = np.flatnonzero(amount > 0)
+        front = np.flatnonzero((amount > 0).any(axis=1))
         vector = place - self._starts[front]
         distance = np.linalg.norm(vector, axis=1)
-        result = np.zeros(len(amount))
-        result[front] = amount[front] * self._shadows.visible(front, vector / np.maximum(distance, 1e-30)[:, None], distance)
+        result = np.zeros_like(amount)
+        visible = self._shadows.visible(front, vector / np.maximum(distance, 1e-30)[:, None], distance)
+        result[front] = amount[front] * np.asarray(visible)[:, None]
         return result
 
 
-def _falling(vector: ndarray, squared: ndarray, normals: ndarray, least: ndarray, strength: Strength) -> Float64[ndarray, " n"]:
+def _falling(vector: ndarray, squared: ndarray, normals: ndarray, least: ndarray, strength: Strength) -> Float64[ndarray, "n _"]:
     """cos times `strength` of (r^2, unit vectors to the light, the least r^2); 0 from behind."""
     unit = vector / np.sqrt(np.maximum(squared, 1e-30))[:, None]
     cosine = np.einsum("nk,nk->n", unit, normals)
-    return np.where(cosine > 0, cosine * strength(squared, unit, least), 0.0)
+    return np.where(cosine > 0, cosine, 0.0)[:, None] * strength(squared, unit, least)
 
 
 def patch_means(cells: Cells, values: Float64[ndarray, "N 3"]) -> Float64[ndarray, "K 3"]:

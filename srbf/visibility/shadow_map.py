@@ -15,7 +15,7 @@ from srbf.errors import ShaderError
 from srbf.gl.context import Limits, create_context
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, triple
 from srbf.unshadowed import irradiance_from
-from srbf.visibility.gl_resources import Resources, render
+from srbf.visibility.gl_resources import ProfileTextures, Resources, render
 from srbf.visibility.looks import look_of, looks_over
 from srbf.visibility.lookup_points import EDGE_PARTS, LookupPoints
 from srbf.visibility.map_lookups import Lookups, PixelLookups, visible_part
@@ -31,6 +31,7 @@ SUN_SAMPLES = 16  # shadow maps of a sun with a disc
 LOOKS = 32  # places of a light with a size
 LOOK_SIZE = 512  # texels per side of their cubes' faces
 LAYERS_PER_LOOK = 4  # of a texel's lookups
+PROFILE_UNIT = 6
 
 
 class ShadowMapper:
@@ -98,6 +99,9 @@ class ShadowMapper:
     def _of_point(self, light: PointLight) -> Float32[ndarray, "H W 3"]:
         look = look_of(light)
         size = max(1, self._size // 2) if look.faces else self._size
+        if light.profile is not None:
+            with self._context:
+                self._profiles.of(light.profile).use(PROFILE_UNIT)
         return self._of_maps(POINT_STAGES, [{**uniforms, "weight": 1.0} for uniforms in look.maps(size)], size)
 
     def _of_maps(self, stages: tuple[str, str, str], looks: list[dict[str, Any]], size: int) -> Float32[ndarray, "H W 3"]:
@@ -129,10 +133,11 @@ class ShadowMapper:
                 for uniforms in look.maps(size):
                     self._draw(POINT_STAGES, {**uniforms, "weight": 1.0}, size, lookups)
             found = self._sums()
-            exact = np.zeros(found.shape[0] * found.shape[1])
+            exact = np.zeros((found.shape[0] * found.shape[1], 3))
             for layer in self._layers:
-                exact += layer.weight * irradiance_from(light, layer.place, layer.normal)
-            return self._with(self._edges, (visible_part(found) * exact.reshape(*found.shape[:2], 1)).astype(np.float32), light)
+                own = (layer.weight * irradiance_from(light, layer.place, layer.normal))[:, None]
+                exact += own * light.factors(layer.place - np.array(light.position)) if isinstance(light, SphereLight) else own
+            return self._with(self._edges, (visible_part(found) * exact.reshape(*found.shape[:2], 3)).astype(np.float32), light)
 
     @staticmethod
     def _with(
@@ -166,6 +171,7 @@ class ShadowMapper:
         self._points = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
         self._casters = ShadowCasters(self._resources, receivers.triangles, self._center)
         self._sized: dict[int, ShadowMaps] = {}
+        self._profiles = ProfileTextures(self._resources)
         corners = self._resources.buffer(np.array([[-1, -1], [3, -1], [-1, 3]]))
         self._lookup = {
             stages: self._resources.array(self._resources.program("fullscreen.vert", fragment), corners, "2f", "corner")
@@ -194,7 +200,7 @@ class ShadowMapper:
         gl.enable_only(gl.BLEND)
         gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
         names = ("points", "normals", "faces")
-        units = {name: unit for unit, name in enumerate((*names, *maps.textures()))}
+        units = {name: unit for unit, name in enumerate((*names, *maps.textures()))} | {"profile": PROFILE_UNIT}
         for name, texture in maps.textures().items():
             texture.use(units[name])
         for own in lookups:

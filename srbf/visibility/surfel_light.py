@@ -14,7 +14,7 @@ from srbf.gl.deep_framebuffer import folded
 from srbf.gl.programs import Programs
 from srbf.io.scene_glb import read_triangles
 from srbf.lights import AreaLight, Light, PointLight, SpotLight, triple
-from srbf.visibility.gl_resources import Resources
+from srbf.visibility.gl_resources import ProfileTextures, Resources
 from srbf.visibility.looks import WORLD, Look
 from srbf.visibility.received import SIDE, ReceivedLight, lift_of, occluders_of
 from srbf.visibility.shadow_casters import POINT_STAGES, ShadowCasters, ShadowMaps
@@ -55,6 +55,7 @@ class SurfelLight:
         self.casters = ShadowCasters(self._resources, read_triangles(scene), self.center)
         self.maps, self._size = ShadowMaps.of(self._resources, size), size
         self.texture, self._target = self._resources.target(self._places.size, 4, "f4")
+        self._profiles = ProfileTextures(self._resources)
         self._by_rays: ReceivedLight | None = None
 
     def draw(self, light: Light) -> moderngl.Texture:
@@ -72,9 +73,19 @@ class SurfelLight:
                 self._target.use()
                 for unit, texture in enumerate((self._places, self._normals, self.maps.heights[0])):
                     texture.use(unit)
+                if point.profile is not None:
+                    self._profiles.of(point.profile).use(3)
                 gl.enable_only(gl.BLEND)
                 gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
-                units = {"surfels": 0, "normals": 1, "heights": 2, "lift": self._lift, "lambertian": lambertian, "weight": weight}
+                units = {
+                    "surfels": 0,
+                    "normals": 1,
+                    "heights": 2,
+                    "profile": 3,
+                    "lift": self._lift,
+                    "lambertian": lambertian,
+                    "weight": weight,
+                }
                 self._programs.run("deep_framebuffer_surfels.frag", {}, {**uniforms, **units})
         return self.texture
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -151,6 +152,55 @@ def designed() -> None:
     light("Shadowless", "POINT", (1, 1, 1), 0.001, use_shadow=False)
 
 
+PHOTOMETRY = """IESNA:LM-63-2002
+TILT=NONE
+1 1000 1 7 5 1 2 0 0 0
+1 1 10
+0 15 30 45 60 90 180
+0 90 180 270 360
+300 260 200 120 60 10 0
+300 280 150 60 20 5 0
+300 150 60 20 10 5 0
+300 280 150 60 20 5 0
+300 260 200 120 60 10 0
+"""
+
+
+def by_ies(name: str, kind: str, place: tuple[float, float, float], energy: float, text: str | None, **values: Any) -> Any:
+    """A light whose strength is an IES texture with a file of this text, in the .blend."""
+    obj = light(name, kind, place, energy, **values)
+    obj.data.use_nodes = True
+    nodes, links = obj.data.node_tree.nodes, obj.data.node_tree.links
+    shader = next(node for node in nodes if node.type == "EMISSION")
+    node = nodes.new("ShaderNodeTexIES")
+    if text is not None:
+        node.ies = bpy.data.texts.new(f"{name}.ies")
+        node.ies.write(text)
+    links.new(node.outputs["Fac"], shader.inputs["Strength"])
+    return obj
+
+
+def luminaires() -> None:
+    """The room under lights that IES files shape, and others whose files are not taken."""
+    walls()
+    by_ies("Downlight", "POINT", (1.0, 1.2, 1.6), 6, PHOTOMETRY, shadow_soft_size=0).rotation_euler = (0.5, -0.4, 0.8)
+    washer = by_ies("Washer", "SPOT", (2.4, 0.6, 1.2), 8, None, shadow_soft_size=0, spot_size=2.4, spot_blend=0.2, color=(1, 0.6, 0.3))
+    washer.rotation_euler = (1.1, 0.3, 2.0)
+    node = next(node for node in washer.data.node_tree.nodes if node.type == "TEX_IES")
+    node.mode, node.filepath = "EXTERNAL", "//washer.ies"
+    node.inputs["Strength"].default_value = 1.5
+    Path(sys.argv[2]).with_name("washer.ies").write_text(PHOTOMETRY)
+    by_ies("Type B", "POINT", (1, 1, 1), 0.001, PHOTOMETRY.replace("7 5 1 2", "7 5 2 2"))
+    by_ies("No file", "POINT", (1, 1, 1), 0.001, None)
+    by_ies("Panel", "AREA", (1, 1, 1.9), 0.001, PHOTOMETRY)
+    turned = by_ies("Turned", "POINT", (1, 1, 1), 0.001, PHOTOMETRY).data.node_tree
+    node = next(node for node in turned.nodes if node.type == "TEX_IES")
+    turned.links.new(turned.nodes.new("ShaderNodeTexCoord").outputs["Normal"], node.inputs["Vector"])
+    missing = by_ies("Missing", "POINT", (1, 1, 1), 0.001, None)
+    node = next(node for node in missing.data.node_tree.nodes if node.type == "TEX_IES")
+    node.mode, node.filepath = "EXTERNAL", "//nowhere.ies"
+
+
 def removed() -> None:
     """The room without one of its lights."""
     room()
@@ -224,7 +274,7 @@ def white_world() -> None:
 
 SCENES: dict[str, Callable[[], None]] = {
     scene.__name__: scene
-    for scene in (room, designed, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
+    for scene in (room, designed, luminaires, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
 }
 
 if __name__ == "__main__":

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from made_profiles import picture, uneven
 from twins import EPS, POINT, SPOT, SUM, UNIT, Evaluate, N, point_light_expression, twin, units, vec4
 
+from srbf.gl.uniforms import profile_uniforms
 from srbf.light_geometry import environment_samples
+from srbf.light_profile import Profile, axes_of
 from srbf.lights import EnvironmentLight, PointLight
 from srbf.methods.surface_changes import Surfaces
 from srbf.visibility.environment_cells import cell_radiance
@@ -13,6 +18,7 @@ from srbf.visibility.received import NEAR, NEAR_CONE, ReceivedLight, patch_means
 from srbf.visibility.surface_cells import Cells, frames
 
 WIDTH = 16  # texels of a map
+STEEP = 1e-4  # of the largest value: an angle's rounding times how fast a profile changes
 CELLS = 0.01  # of a mean over 100 places in place of all of a cell
 
 
@@ -66,6 +72,53 @@ def _(evaluate: Evaluate) -> None:
         expected = ReceivedLight(own, Unshadowed()).irradiance(light)[:, 0] / light.color[0]
         np.testing.assert_allclose(found, expected, atol=4 * SUM * expected.max())
         assert near.mean() > 0.2 and (light is SPOT or near.mean() < 0.9) and (expected[near] > 0).any()
+
+
+def profile_arguments(light: PointLight) -> str:
+    """The last arguments of srbfProfile: across, up, tangent."""
+    told = profile_uniforms(light)
+    vectors = [f"vec3({', '.join(map(repr, told[name]))})" for name in ("profileAcross", "profileUp")]
+    return f"{', '.join(vectors)}, {told['profileTangent']!r}"
+
+
+PROFILED = (
+    PointLight((0.1, 0.2, 0.3), falloff="inverse-square", direction=(0.1, 0.7, -0.4), roll=0.4, profile=uneven),
+    replace(SPOT, falloff="inverse-square", roll=-0.6, profile=Profile(picture(), projected=True)),
+)
+
+
+@twin("lights/profile.glsl")
+def _(evaluate: Evaluate) -> None:
+    for light in PROFILED:
+        assert light.profile is not None
+        x, y, _ = axes_of(light.direction, light.roll)
+        away = np.concatenate([units(8 * N, 71), [x, y, -x, -y]]).astype(np.float32)
+        axis = f"vec3({', '.join(map(repr, light.direction))})"
+        expression = f"vec4(srbfProfile(profile, a.xyz, {axis}, {profile_arguments(light)}), 0.0)"
+        found = evaluate("lights/profile.glsl", expression, vec4(away), images={"profile": light.profile.table})[:, :3]
+        expected = light.factors(away)
+        if light.profile.projected:  # the edge of what is in front
+            found, expected = found[:-4], expected[:-4]
+        np.testing.assert_allclose(found, expected, atol=STEEP * expected.max())
+        assert (expected.max(axis=1) > 0.1 * expected.max()).mean() > 0.2
+    falling = np.repeat(np.linspace(1, 0, 7, dtype=np.float32)[:, None, None], 3, axis=2)
+    poles = vec4(np.array([[0, 0, 1], [0, 0, -1]]))
+    call = "vec4(srbfProfile(profile, a.xyz, vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0), 0.0), 0.0)"
+    found = evaluate("lights/profile.glsl", call, poles, images={"profile": falling})
+    np.testing.assert_allclose(found[:, 0], Profile(falling).at(poles[:, :3], 0.0)[:, 0], atol=UNIT)
+
+
+@twin("surfels/profiled_irradiance.glsl")
+def _(evaluate: Evaluate) -> None:
+    own = cells(63, np.random.default_rng(64).uniform(1e-4, 0.04, N))  # near and far
+    for light in PROFILED:
+        assert light.profile is not None
+        call = f"srbfProfiledIrradiance(a, b.xyz, {point_light_expression(light)}, profile, {profile_arguments(light)})"
+        inputs = (vec4(own.places, own.areas), vec4(own.normals))
+        found = evaluate("surfels/profiled_irradiance.glsl", f"vec4({call}, 0.0)", *inputs, images={"profile": light.profile.table})[:, :3]
+        expected = ReceivedLight(own, Unshadowed()).irradiance(light) / np.array(light.color)
+        np.testing.assert_allclose(found, expected, atol=STEEP * expected.max())
+        assert (expected > 0).any()
 
 
 def on_map(evaluate: Evaluate, file: str, call: str, *rows: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_profiles import picture, uneven
 from made_rooms import Room
 from made_views import view_of_room, with_backs, with_lobed, with_lobes
 from typer.testing import CliRunner
@@ -20,6 +21,7 @@ from srbf.errors import InputError
 from srbf.export import export
 from srbf.gl.programs import Programs
 from srbf.io.image import read_image
+from srbf.light_profile import Profile
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, NamedLight, PointLight, SphereLight, SpotLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.relighter import Relighter
@@ -38,6 +40,15 @@ LIGHTS: dict[str, Light] = {
     "spot": SpotLight((2.0, 1.0, 1.5), falloff="inverse-square", direction=(0.2, 0, -1), inner=0.5, outer=0.8),
     "near a wall": PointLight((0.05, 1.2, 0.8), falloff="inverse-square"),
     "sphere": SphereLight((0.6, 1.2, 0.8), (0.2, 1, 0.4), size=0.1),
+    "ies": PointLight((0.8, 0.7, 1.1), (1, 0.5, 0.2), falloff="inverse-square", direction=(1, 0.2, -0.3), roll=0.4, profile=uneven),
+    "picture": SpotLight(
+        (2.0, 1.0, 1.5),
+        falloff="inverse-square",
+        direction=(0.2, 0, -1),
+        inner=0.5,
+        outer=0.8,
+        profile=Profile(picture(), projected=True),
+    ),
     "area": AreaLight((1.5, 1, 1.7), u=(0.6, 0, 0), v=(0, -0.3, 0)),
     "sun": DirectionalLight((0.2, 0.1, 1)),
     "environment": EnvironmentLight(np.random.default_rng(3).uniform(0, 1, (8, 16, 3)).astype(np.float32)),

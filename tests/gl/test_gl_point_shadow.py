@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 from closed_forms import build_plane, quad
+from made_profiles import picture, uneven
 from rooms import room
 from rounded import lightmap, sphere
 
+from srbf.light_profile import Profile
 from srbf.lights import AreaLight, Light, PointLight, SphereLight, SpotLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.rays import RayTracer
@@ -22,6 +24,16 @@ LIGHTS: dict[str, Light] = {
     "narrow spot": SpotLight((-0.7, -0.7, 1.8), direction=(0.6, 0.6, -1.2), inner=0.4, outer=0.6, falloff="inverse-square"),
     "wide spot": SpotLight((-0.7, -0.7, 1.0), direction=(0.6, 0.6, -0.2), inner=1.2, outer=1.5, falloff="inverse-square"),
     "sphere": SphereLight((0.1, -0.1, 1.6), size=0.15),
+    "ies": PointLight((0.1, -0.1, 1.6), falloff="inverse-square", direction=(0.5, 0.2, -1), roll=0.3, profile=uneven),
+    "picture": SpotLight(
+        (-0.7, -0.7, 1.8),
+        direction=(0.6, 0.6, -1.2),
+        inner=0.4,
+        outer=0.6,
+        falloff="inverse-square",
+        profile=Profile(picture(), projected=True),
+    ),
+    "sphere with a profile": SphereLight((0.1, -0.1, 1.6), size=0.15, roll=0.3, profile=uneven),
     "area": AreaLight((0.0, 0.0, 1.99), u=(0.6, 0, 0), v=(0, -0.6, 0)),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import subprocess
 import sys
@@ -138,6 +139,22 @@ def test_more_lights_than_the_page_takes_are_named(chromium: Any, asset: Asset, 
     chromium("open", url=serve(tmp_path / "many"), width=WIDTH, height=HEIGHT)
     assert len(names(chromium)) == 16
     assert "lights past 16: Bulb 16, Bulb 17" in chromium("run", script="document.getElementById('status').textContent")
+
+
+def test_profiles_are_named_as_missing_and_refused_in_frames(
+    chromium: Any, asset: Asset, serve: Callable[..., str], tmp_path: Path
+) -> None:
+    shaped = [{"name": "Washer", "light": {**LIGHTS[0]["light"], "profile": "Downlight.ies", "roll": 0.5}}, *LIGHTS[1:]]
+    before, asset.manifest["scene_lights"] = asset.manifest["scene_lights"], shaped
+    asset.save(tmp_path / "shaped")
+    asset.manifest["scene_lights"] = before
+    chromium("open", url=serve(tmp_path / "shaped"), width=WIDTH, height=HEIGHT)
+    assert names(chromium)[0] == "Washer"
+    status = "document.getElementById('status').textContent"
+    assert "lights shown without their IES profiles: Washer" in chromium("run", script=status)
+    frames = json.dumps({"frames": [{"lights": [shaped[0]["light"]]}]})
+    chromium("drop", name="FRAMES.json", bytes=base64.b64encode(frames.encode()).decode())
+    assert "expected lights without a profile" in chromium("run", script="document.getElementById('toast').textContent")
 
 
 def test_frames_have_their_names_and_exact_colors(chromium: Any, asset: Asset, page: Callable[..., None], tmp_path: Path) -> None:

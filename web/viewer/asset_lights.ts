@@ -23,8 +23,11 @@ export function kindsOf(asset: Asset): readonly AddedKind[] {
   return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
 }
 
+/** An entry without its profile, which the page does not show: see `missingLine`. */
+const plain = ({ profile: _, ...light }: Record<string, unknown>) => light;
+
 /** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
-export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square"), name }) as LightState);
+export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(plain(light), `light ${name} of the asset`, "inverse-square"), name }) as LightState);
 
 /** The scene's own lights as asset.json has them. */
 export type Designed = readonly { name: string; light: Record<string, unknown> }[];
@@ -32,7 +35,7 @@ export type Designed = readonly { name: string; light: Record<string, unknown> }
 /** The linear color of a light: that of asset.json where it is as designed, since the page rounds colors to bytes. */
 export function exactColor(light: LightState, designed: Designed): Triple {
   const own = light.name === undefined || light.kind === "named" ? undefined : designed.find(({ name }) => name === light.name);
-  const before = own && stateOf(own.light, own.name, "inverse-square");
+  const before = own && stateOf(plain(own.light), own.name, "inverse-square");
   return own && before?.color === light.color && before.intensity === light.intensity ? (own.light.color as Triple) : linearColor(light);
 }
 
@@ -40,7 +43,14 @@ export function exactColor(light: LightState, designed: Designed): Triple {
 export function missingLine({ manifest }: Asset): string {
   const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
-  return [beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "", left.length ? `lights left out: ${left.join(", ")}` : ""].filter(Boolean).join("; ");
+  const shaped = (manifest.scene_lights ?? []).filter(({ light }) => light.profile !== undefined).map(({ name }) => name);
+  return [
+    shaped.length ? `lights shown without their IES profiles: ${shaped.join(", ")}` : "",
+    beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
+    left.length ? `lights left out: ${left.join(", ")}` : "",
+  ]
+    .filter(Boolean)
+    .join("; ");
 }
 
 /** Lights as designed, in place of those of the scene; of the others as many stay as there is room for. */

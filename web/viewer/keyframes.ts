@@ -84,6 +84,7 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
     if (!Number.isFinite(value)) bad(`a number of ${key}`, value);
     return value as number;
   };
+  if (entry.profile !== undefined) bad("lights without a profile, which srbf relight takes and the page does not,", entry.profile);
   const color = triple("color", [1, 1, 1]);
   if (color.some((x) => x < 0)) bad("colors of 0 or more", color);
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
