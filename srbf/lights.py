@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Float, Float32, Float64
 from srbf.errors import InputError
 from srbf.light_profile import Profile, axes_of, roll_of
 from srbf.sphere import normalize
@@ -115,7 +115,7 @@ class PointLight:
         """Of a spot's outer half-angle, 0 where there is none below pi / 2: half of a projected image's width, 1 m ahead."""
         return 0.0
 
-    def factors(self, away: Float64[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:
+    def factors(self, away: Float[ndarray, "n 3"]) -> Float64[ndarray, "n 3"]:
         """The profile's factors on the color in directions away from the light.
 
         Parameters

@@ -12,11 +12,9 @@ float srbfDiscFactor(vec3 toward, vec3 normal, vec3 facing, float area) {
     const int PARTS = 4;
     float far = -dot(toward, facing);
     int parts = far > 0.0 && dot(toward, toward) < CLOSE * CLOSE * area ? PARTS : 1;
-    vec3 tangent = vec3(0.0);
-    vec3 bitangent = vec3(0.0);
-    if (parts > 1) {
-        srbfTangents(facing, tangent, bitangent);
-    }
+    vec3 tangent;
+    vec3 bitangent;
+    srbfTangents(facing, tangent, bitangent);
     float part = area / float(parts * parts);
     float total = 0.0;
     for (int i = 0; i < parts * parts; ++i) {

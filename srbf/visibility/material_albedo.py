@@ -92,6 +92,6 @@ def _means(
     values: Float64[ndarray, "n 3"], material: Int[ndarray, " n"], weight: Float[ndarray, " n"], count: int
 ) -> tuple[Float64[ndarray, "M 3"], Float64[ndarray, " M"]]:
     """Weighted means per material, and the sums of weights."""
-    total = np.bincount(material, weight, count)
+    total = np.bincount(material, weight, count).astype(np.float64)
     sums = np.stack([np.bincount(material, weight * values[:, c], count) for c in range(3)], axis=1)
     return sums / np.maximum(total, 1e-30)[:, None], total

@@ -36,7 +36,7 @@ class NearPasses:
     """
 
     def __init__(
-        self, programs: Programs, surfels: SurfelLight, cells: Cells, receivers: list[tuple[Float[ndarray, "R 3"], Float[ndarray, "R 3"]]]
+        self, programs: Programs, surfels: SurfelLight, cells: Cells, receivers: list[tuple[Float[ndarray, "_ 3"], Float[ndarray, "_ 3"]]]
     ) -> None:
         self._programs, self._surfels, self._cells = programs, surfels, cells
         resources = Resources(programs.context)

@@ -116,7 +116,7 @@ def disc_factors(points: Float32[ndarray, "R 3"], normals: Float32[ndarray, "R 3
     reach = np.float32(np.sqrt(0.5)) * np.sqrt(areas)
     receiver, source = np.nonzero((squared < CLOSE**2 * areas) & (near > -reach) & (far > 0))
     if len(receiver):
-        tangent, bitangent = (axis.astype(np.float32)[source] for axis in frames(facing))
+        tangent, bitangent = (axis.astype(np.float32)[source] for axis in frames(sources.normals.astype(np.float64)))
         side, own, total = np.sqrt(areas)[source, None], vector[receiver, source], np.zeros(len(receiver), np.float32)
         steps = ((np.arange(PARTS) + 0.5) / PARTS - 0.5).astype(np.float32)
         for s in steps:
@@ -128,9 +128,7 @@ def disc_factors(points: Float32[ndarray, "R 3"], normals: Float32[ndarray, "R 3
     return factors
 
 
-def _discs(
-    near: Float32[ndarray, "*n"], far: Float32[ndarray, "*n"], squared: Float32[ndarray, "*n"], areas: Float32[ndarray, "*n"]
-) -> ndarray:
+def _discs(near: ndarray, far: ndarray, squared: ndarray, areas: ndarray) -> ndarray:
     """From the distances along the normals of receivers and sources, the square of the whole, and areas."""
     squared = np.maximum(squared, np.float32(1e-12))
     return np.maximum(near, 0) * np.maximum(far, 0) * areas / (squared * (np.float32(np.pi) * squared + areas))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32, Float64, Int
+from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
@@ -35,7 +35,6 @@ MAX_SAMPLES = 512  # of a texel whose samples still differ, mostly at shadow edg
 MANY_EDGES = 0.1  # of the lit texels, for which edges get MAX_SAMPLES: the noise of fewer counts less in the picture
 EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
 SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of it
-SOFT_STEPS = 4.0  # penumbrae have texels that differ little, and are many
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
 ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environment
@@ -145,7 +144,7 @@ class RayTracer:
             samples = self._first(start)
             self._add(sums, samples, light, range(self._few))
             weight += np.bincount(samples.texel, samples.weight, len(weight))
-        sums = sums.relative(self._texels, SOFT_STEPS if _has_size(light) else 1.0)
+        sums = sums.relative(self._texels)
         partly = (weight > 0) & (weight < self._few)
         refined = np.zeros(len(weight), bool)
         for _ in range(SPREAD_ROUNDS):
@@ -349,7 +348,7 @@ class RayTracer:
         return np.where(hit >= 0, self._receivers.triangles.material[np.maximum(hit, 0)], -1).reshape(len(numbers), -1)
 
 
-def _most_beside(values: Float[ndarray, " P"], height: int) -> ndarray:
+def _most_beside(values: Bool[ndarray, " P"] | Float[ndarray, " P"], height: int) -> ndarray:
     """The largest of each pixel and its neighbors."""
     from scipy import ndimage
 

@@ -48,8 +48,8 @@ class TexelSums:
         low, high = np.full(shape, np.inf, np.float32), np.zeros(shape, np.float32)
         return TexelSums(height, width, scale, sized, total, share, seen, weight, low, high)
 
-    def relative(self, texels: Int[ndarray, " T"], fine: float) -> TexelSums:
-        """The same with `scale` over the usual irradiance of `texels` by the samples so far, shadows included, times `fine`.
+    def relative(self, texels: Int[ndarray, " T"]) -> TexelSums:
+        """The same with `scale` over the usual irradiance of `texels` by the samples so far, shadows included.
 
         That is their root mean square, or the mean of those that are lit where it is less.
         """
@@ -58,7 +58,7 @@ class TexelSums:
         light = self._visible().max(axis=1)[texels] * self.scale[texels]
         lit = light > 0
         usual = min(float(np.sqrt((light**2).mean())), float(light[lit].mean())) if lit.any() else 1.0
-        return replace(self, scale=self.scale * (fine / usual), usual=usual)
+        return replace(self, scale=self.scale / usual, usual=usual)
 
     def add(
         self,

@@ -75,7 +75,7 @@ def _(evaluate: Evaluate) -> None:
             disc_factors(
                 np.zeros((1, 3), np.float32),
                 normals[i : i + 1],
-                Cells(toward[i : i + 1], facing[i : i + 1], areas[i : i + 1], normals, normals),
+                Cells(toward[i : i + 1], facing[i : i + 1], areas[i : i + 1], facing[i : i + 1], np.zeros(1, np.int64)),
             )[0]
             for i in range(200)
         ]

@@ -23,7 +23,14 @@ from srbf.visibility.surface_cells import Cells
 pytest.importorskip("embreex")
 
 ROOM = Room.box((3, 2, 2), 0.05, 0.6)  # 12,800 cells
-CELLS = Cells(ROOM.places, ROOM.normals, ROOM.areas, ROOM.albedo.astype(np.float32), np.arange(len(ROOM.places)))
+
+
+def cells_of(room: Room) -> Cells:
+    arrays = (array.astype(np.float32) for array in (room.places, room.normals, room.areas, room.albedo))
+    return Cells(*arrays, np.arange(len(room.places)))
+
+
+CELLS = cells_of(ROOM)
 NEAR = PointLight((0.06, 1.2, 0.8), falloff="inverse-square")
 EVEN = 0.06
 WHOLE = 0.03  # a disc's form factor is not that of a square right beside it
@@ -137,7 +144,7 @@ def test_an_asset_keeps_the_places(lit: Asset, tmp_path: Path) -> None:
 def test_a_cone_ends_within_cells() -> None:
     """The light of a narrow spot on a wall is that of its cone, wherever its edge is: 12 directions, of cells half as wide as the spot."""
     room = Room.box((3, 2, 2), 0.25, 0.6)
-    cells = Cells(room.places, room.normals, room.areas, room.albedo.astype(np.float32), np.arange(len(room.places)))
+    cells = cells_of(room)
     received = ReceivedLight(cells, EmbreeTriangles(room.corners))
     outer = 0.2
     for y in np.linspace(0.8, 1.2, 12):
