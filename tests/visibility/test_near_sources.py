@@ -26,8 +26,8 @@ ROOM = Room.box((3, 2, 2), 0.05, 0.6)  # 12,800 cells
 
 
 def cells_of(room: Room) -> Cells:
-    arrays = (array.astype(np.float32) for array in (room.places, room.normals, room.areas, room.albedo))
-    return Cells(*arrays, np.arange(len(room.places)))
+    places, normals, areas, albedo = (array.astype(np.float32) for array in (room.places, room.normals, room.areas, room.albedo))
+    return Cells(places, normals, areas, albedo, np.arange(len(places)))
 
 
 CELLS = cells_of(ROOM)
