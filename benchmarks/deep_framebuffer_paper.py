@@ -22,7 +22,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from deep_framebuffer import KINDS, error, placed
@@ -134,13 +133,13 @@ def passes(asset: Asset, light: Light) -> list[float]:
         whole = timed(lambda: light_on_clusters(*samples, occluders, [light]))
         indirect = timed(lambda: light_on_clusters(*samples, NOTHING, [light]))
         return [whole - indirect, direct, indirect, mixing]
-    ready: Any = _ready(asset)
-    pool = ready.received._cells
+    ready = _ready(asset)
+    pool = ready.cells
     irradiance = ready.received.irradiance(light).astype(np.float32)
-    bounced = radiosity_of(ready.exchange, ready.albedo, irradiance, told.get("bounces"))
+    bounced = radiosity_of(ready.exchange, ready.cells.albedo, irradiance, told.get("bounces"))
     whole, plain = timed(lambda: ready.received.irradiance(light)), ReceivedLight(pool, NOTHING)
     unshadowed = timed(lambda: plain.irradiance(light))
-    exchange = timed(lambda: radiosity_of(ready.exchange, ready.albedo, irradiance, told.get("bounces")))
+    exchange = timed(lambda: radiosity_of(ready.exchange, ready.cells.albedo, irradiance, told.get("bounces")))
     links = timed(lambda: [own @ bounced for own in (ready.view, ready.gloss) if own is not None])
     return [whole - unshadowed, direct, unshadowed + exchange, links + mixing]
 

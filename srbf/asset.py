@@ -349,6 +349,29 @@ class Asset:
         a_layer = sum(2 * level_bytes("half", *size) if form == "float" else level_bytes(form, *size) for size in sizes)
         return len(self.stored) * a_layer + (self.width * self.height if "cluster_index" in self.tables else 0)
 
+    def required_scene(self) -> bytes:
+        """scene.glb: what casts the shadows of lights inside; InputError where the asset lacks it.
+
+        Returns
+        -------
+        bytes
+            Binary glTF.
+
+        Raises
+        ------
+        InputError
+            Where there is none.
+
+        Examples
+        --------
+        >>> asset.required_scene()
+        Traceback (most recent call last):
+        srbf.errors.InputError: expected scene.glb in the asset, found none: lights need what casts shadows; fit again
+        """
+        if self.scene is None:
+            raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
+        return self.scene
+
     def resident_bytes(self) -> int:
         """Everything the folder holds, as GPU memory.
 

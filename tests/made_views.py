@@ -82,12 +82,12 @@ def with_lobes(asset: Asset) -> Asset:
     return replace(asset, manifest=manifest, tables=tables, images=images)
 
 
-def with_lobed(asset: Asset) -> Asset:
+def with_specular_albedo(asset: Asset) -> Asset:
     """An asset of a view whose lobes see surfels reflect more than other surfels do."""
     found = with_lobes(asset)
     color = np.random.default_rng(8).uniform(0, 0.5, (1, found.tables["pool"].shape[1], 4)).astype(np.float32)
     tables = {**found.tables, "pool": np.concatenate([found.tables["pool"], color])}
-    return replace(found, manifest={**found.manifest, "gather": {**found.manifest["gather"], "lobed": True}}, tables=tables)
+    return replace(found, manifest={**found.manifest, "gather": {**found.manifest["gather"], "specular_albedo": True}}, tables=tables)
 
 
 def with_backs(asset: Asset) -> Asset:

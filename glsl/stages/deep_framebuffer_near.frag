@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
 // Light from a group of bright surfels on receivers that see it through one face of a cube about it: the arithmetic of
-// srbf.visibility.near_sources. Blend ONE, ONE into a float target of a texel per receiver.
+// srbf.visibility.near_sources. Blend ONE, ONE into a float target of one texel for each receiver.
 precision highp float;
 precision highp int;
 precision highp sampler2D;

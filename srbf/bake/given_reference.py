@@ -44,6 +44,13 @@ class GivenReference:
     render_seconds: float
 
 
+def require_view(asset: Asset, scene: Path) -> None:
+    """InputError for a missing scene, and for an asset of another receiver than a view."""
+    require_scene(scene)
+    if asset.receiver_kind != "view" or not asset.receivers:
+        raise InputError(f"expected an asset of a view that was baked from a scene, found one of {asset.receiver_kind}")
+
+
 def changed_line(asset: Asset, scene: Path) -> str | None:
     """A line where the .blend is not the one that the asset was baked from."""
     baked = asset.manifest.get("source", {}).get("scene_sha256")
@@ -72,11 +79,9 @@ def render_given(
     InputError for lights that Cycles lacks, an asset of another receiver or transport than a view's, or a missing scene; BakeError where
     Blender fails; StoppedError.
     """
-    if asset.receiver_kind != "view" or not asset.receivers:
-        raise InputError("expected an asset of a view that was baked from a scene, found another; relight one of `light_set=gather`")
+    require_view(asset, scene)
     if not 1 <= samples <= MOST_SAMPLES:
         raise InputError(f"expected 1 to {MOST_SAMPLES} samples, found {samples}")
-    require_scene(scene)
     if profiles is None:
         lights_of(lights, GIVEN)
     else:

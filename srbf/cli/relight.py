@@ -12,7 +12,7 @@ import typer
 
 from srbf import methods
 from srbf.asset import Asset
-from srbf.bake.given_reference import MOST_SAMPLES
+from srbf.bake.given_reference import MOST_SAMPLES, require_view
 from srbf.cli.beside_cycles import compare, path_beside
 from srbf.cli.flags import flags_alone
 from srbf.cli.light_arguments import (
@@ -49,6 +49,7 @@ from srbf.relighting.scene_lights import lines_of, scene_lights
 from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
+REFERENCE_SAMPLES = 64  # of Cycles, unless told
 Viewer = tuple[float, float, float] | None
 Shadows = Literal["ray", "pca"]
 
@@ -184,8 +185,14 @@ def relight(
         ),
     ] = None,
     samples: Annotated[
-        int, typer.Option(metavar="N", parser=Number(whole=True, low=1, high=MOST_SAMPLES), help="With --reference: of Cycles.")
-    ] = 64,
+        int | None,
+        typer.Option(
+            metavar="N",
+            parser=Number(whole=True, low=1, high=MOST_SAMPLES),
+            help="With --reference: of Cycles; default: 64.",
+            show_default=False,
+        ),
+    ] = None,
     blender: Blender = None,
     renderer: Annotated[Literal["numpy", "gl"], typer.Option(help="Reference, or the shaders.")] = "numpy",
     exposure: Annotated[float, typer.Option(metavar="STOPS", parser=Number(low=-100, high=100), help="For PNG.")] = 0.0,
@@ -230,6 +237,9 @@ def relight(
         )
     if reference is not None and (lights is not None or at is not None or harmonics or not ambient):
         raise typer.BadParameter("expected --reference without --lights, --at, --harmonics and --no-ambient, found both; leave one out")
+    for flag, value in (("--samples", samples), ("--blender", blender)):
+        if reference is None and value is not None:
+            raise typer.BadParameter(f"expected --reference with {flag}, found none")
     if viewer is not None and renderer == "gl":
         raise typer.BadParameter("expected --renderer numpy with --viewer, found gl; leave it out")
     if fade is not None and (lights is None or renderer == "gl" or viewer is not None):
@@ -249,6 +259,8 @@ def relight(
     for written in [output] if reference is None else [output, path_beside(output)]:
         check_image_output(written, force)
     opened = _opened(asset, painted, ambient)
+    if reference is not None:
+        require_view(opened, reference)
     if own_lights:
         placed += scene_lights(opened).values()
         for line in lines_of(opened):
@@ -278,7 +290,7 @@ def relight(
         write_image(output, with_alpha(image, opacity, alpha), "float")
     note(f"wrote {output}")
     if reference is not None:
-        compare(opened, image, placed, reference, samples, output, blender, exposure)
+        compare(opened, image, placed, reference, REFERENCE_SAMPLES if samples is None else samples, output, blender, exposure)
 
 
 def _relight_frames(

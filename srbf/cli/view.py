@@ -66,6 +66,8 @@ def view(
         )
     capture = captures[0] if captures else None
     renders = None
+    if scene is None and blender is not None:
+        raise typer.BadParameter("expected --scene with --blender, found none")
     if scene is not None:
         if save is not None:
             raise typer.BadParameter("expected --scene without --save, found both: one file has no server that renders")

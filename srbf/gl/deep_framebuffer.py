@@ -36,8 +36,8 @@ class LinkTextures:
 
 
 @dataclass(frozen=True, eq=False)
-class Apart:
-    """Of light that bright surfels send in closed form, see `srbf.visibility.near_sources`: textures of a texel per surfel or cluster.
+class NearTextures:
+    """Light that bright surfels send in closed form, see `srbf.visibility.near_sources`: one texel for each surfel, or view cluster.
 
     `second`: direct irradiance on surfels without its part on the bright ones, and what these lay on the others; `taken`: what these
     reflect of it, which lobes gather along links all the same; `clusters`: what these lay on view clusters.
@@ -76,8 +76,8 @@ class LinkPasses:
         self._reflectance = textures.kept(reflectance.astype(np.float32))
         size = self._albedo.size
         self._radiosity = [programs.target(size), programs.target(size)]
-        lobed = tables["pool"][3, :, :3] if len(tables["pool"]) > 3 else None
-        self._lobed = None if lobed is None else (textures.kept(folded(lobed)), programs.target(size))
+        specular = tables["pool"][3, :, :3] if len(tables["pool"]) > 3 else None
+        self._specular = None if specular is None else (textures.kept(folded(specular)), programs.target(size))
         self.view_rows = own = -(-told["clusters"] // WIDTH)
         self._spans = [(self._view, 0, own)]  # links, and the rows of the target that they fill
         self._further: list[tuple[moderngl.TextureArray, int, moderngl.Texture]] = []  # neighbors of pixels, how many, and reflectance
@@ -100,29 +100,29 @@ class LinkPasses:
         over_pi = (reflectance / np.float32(np.pi)).astype(np.float32)
         self._further.append((self._textures.kept_layers(layers), len(layers), self._textures.kept(over_pi)))
 
-    def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer, apart: Apart | None = None) -> None:
+    def clusters(self, direct: moderngl.Texture, target: moderngl.Framebuffer, near: NearTextures | None = None) -> None:
         """Draw the irradiance of all view clusters, and behind it what lobes gather, into `target`, of `cluster_size`.
 
-        `direct`: irradiance on the surfels; `apart`: what bright surfels add to it.
+        `direct`: irradiance on the surfels; `near`: what bright surfels add to it.
         """
         if self._terms == 0:
             target.clear()
             return
-        bounced = self.bounced(direct, None if apart is None else apart.second)
+        bounced = self.bounced(direct, None if near is None else near.second)
         for links, first, count in self._spans:
             if links is not self._view:
-                bounced = self._seen_by_lobes(bounced, direct, apart)
+                bounced = self._seen_by_lobes(bounced, direct, near)
             bounced.use(2)
             target.viewport = (0, first, WIDTH, count)
             target.use()
             self._programs.run("deep_framebuffer_clusters.frag", {}, {**links.uniforms(0), "light": 2})
-        if apart is not None:
+        if near is not None:
             gl: Any = self._programs.context
             target.viewport = (0, 0, WIDTH, self.view_rows)
             target.use()
             gl.enable_only(gl.BLEND)
             gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
-            apart.clusters.use(0)
+            near.clusters.use(0)
             self._programs.run("add.frag", {}, {"light": 0})
             gl.enable_only(gl.NOTHING)
         target.viewport = (0, 0, *self.cluster_size)
@@ -145,18 +145,18 @@ class LinkPasses:
             (light, light_target), (other, other_target) = (other, other_target), (light, light_target)
         return other
 
-    def _seen_by_lobes(self, bounced: moderngl.Texture, direct: moderngl.Texture, apart: Apart | None) -> moderngl.Texture:
-        """What surfels reflect toward lobes: more than toward other surfels, where gloss that these do not see is apart."""
-        if self._lobed is not None:
-            albedo, (extra, target) = self._lobed
+    def _seen_by_lobes(self, bounced: moderngl.Texture, direct: moderngl.Texture, near: NearTextures | None) -> moderngl.Texture:
+        """What surfels reflect toward lobes: more than toward other surfels, where gloss that these do not see is near."""
+        if self._specular is not None:
+            albedo, (extra, target) = self._specular
             target.use()
             bounced.use(2)
-            (direct if apart is None else apart.second).use(3)
+            (direct if near is None else near.second).use(3)
             albedo.use(4)
             values = {**self._exchange.uniforms(0), "light": 2, "direct": 3, "albedo": 4, "first": 0}
             self._programs.run("deep_framebuffer_bounce.frag", {}, values)
             bounced = self._added(bounced, extra)
-        return bounced if apart is None else self._added(bounced, apart.taken)
+        return bounced if near is None else self._added(bounced, near.taken)
 
     def _added(self, one: moderngl.Texture, other: moderngl.Texture) -> moderngl.Texture:
         """The sum of two textures of surfels, in the one of `bounced` that is free."""

@@ -12,6 +12,7 @@ from srbf.arrays import Int
 from srbf.asset import GEOMETRY, SCENE_FILE
 from srbf.capture import Capture
 from srbf.encode.dilation import dilate
+from srbf.errors import InputError
 from srbf.light_domain import LightDomain
 
 OWN_LIGHTS = ("scene_lights", "scene_lights_left_out", "scene_profiles")  # keys of capture.json and asset.json
@@ -76,6 +77,14 @@ def needs_albedo(capture: Capture) -> bool:
 def carried_scene(capture: Capture) -> bytes | None:
     """scene.glb of an indirect capture: what casts the shadows of the light to be added."""
     return capture.scene() if capture.transport == "indirect" and "scene" in capture.manifest else None
+
+
+def required_scene(capture: Capture) -> bytes:
+    """`carried_scene`; InputError where there is none."""
+    scene = carried_scene(capture)
+    if scene is None:
+        raise InputError(f"expected scene.glb in {capture.folder}, found none: lights need what casts shadows; bake again")
+    return scene
 
 
 def _kept_apart(capture: Capture) -> dict[str, Any]:

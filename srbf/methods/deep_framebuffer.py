@@ -19,7 +19,7 @@ from srbf.encode.dilation import nearest_covered
 from srbf.errors import ImageError, InputError
 from srbf.light_domain import domain_of_capture
 from srbf.lights import WHITE, Light, PointLight, refuse_named
-from srbf.methods.carried import carried_images, carried_scene, common_manifest
+from srbf.methods.carried import carried_images, common_manifest, required_scene
 from srbf.methods.mixed_clusters import (
     BEHIND,
     MOST_NEAREST,
@@ -34,7 +34,7 @@ from srbf.methods.mixed_clusters import (
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GatherOperator
-from srbf.visibility.near_sources import NearSources
+from srbf.visibility.near_sources import NearPool
 from srbf.visibility.packed_links import COLUMNS, LINK_BYTES, link_count, packed, share_within, unpacked
 from srbf.visibility.received import ReceivedLight, occluders_of
 from srbf.visibility.sparse_links import SparseLinks, radiosity_of
@@ -143,9 +143,7 @@ class DeepFramebuffer(Method):
         if "links" not in capture.manifest.get("gather", {}):
             raise InputError(f"expected links to a pool in {capture.folder}, found gather samples; leave `method` and `budget` out")
         operator = GatherOperator.read(capture.folder)
-        scene = carried_scene(capture)
-        if scene is None:
-            raise InputError(f"expected scene.glb in {capture.folder}, found none: lights need what casts shadows; bake again")
+        scene = required_scene(capture)
         most = min(self.nearest, operator.nearest.shape[1])
         nearest = nearest_covered(capture.coverage())
         stored = neighbor_layers(capture, operator.nearest[:, :most], operator.weights[:, :most], nearest)
@@ -164,7 +162,7 @@ class DeepFramebuffer(Method):
             "view_rays": view.rays,
             "exchange_rays": operator.exchange.rays,
             **({} if bounces is None else {"bounces": bounces}),
-            **({} if operator.lobed is None else {"lobed": True}),
+            **({} if operator.specular_albedo is None else {"specular_albedo": True}),
         }
         tables = {"pool": operator.pool_image()}
         for name, links in (("view", view), ("exchange", operator.exchange)):
@@ -210,7 +208,7 @@ class DeepFramebuffer(Method):
     @classmethod
     def read_tables(cls, reader: AssetReader) -> dict[str, ndarray]:
         told = reader.manifest["gather"]
-        tables = {"pool": reader.table("pool", (4 if told.get("lobed") else 3, told["surfels"]), 4)}
+        tables = {"pool": reader.table("pool", (4 if told.get("specular_albedo") else 3, told["surfels"]), 4)}
         for name in ("view", "exchange", *(("gloss",) if "lobes" in told else ())):
             for part in ("links", "rows"):
                 pixels = reader.pixels(reader.manifest[f"{name}_{part}"]["file"], 3)
@@ -283,39 +281,34 @@ class _Ready:
     gloss: csr_array | None
     cells: Cells
     received: ReceivedLight
-    points: Float32[ndarray, "2 R 3"] | None
-    lobed: Float32[ndarray, "S 3"] | None
     occluders: EmbreeTriangles
+    points: Float32[ndarray, "2 R 3"] | None  # places (m) and normals of clusters and surfels
+    near: NearPool
+    specular_albedo: Float32[ndarray, "S 3"] | None
 
     def under(self, lights: Sequence[Light], bounces: int | None) -> Float64[ndarray, "C 3"]:
         """What view clusters and lobes gather under lights, whose brightest surfels light the clusters and other surfels in closed form."""
-        albedo = self.cells.albedo
-        direct, taken, whole = np.zeros((3, *albedo.shape), np.float32)
-        near = np.zeros((0 if self.points is None else self.points.shape[1], 3), np.float32)
+        albedo, clusters = self.cells.albedo, self.view.shape[0]
+        direct, taken = np.zeros((2, *albedo.shape), np.float32)  # irradiance of all lights, and its part on bright surfels
+        sent = np.zeros((clusters + len(albedo), 3), np.float32)  # what that part lays on clusters and surfels
         for light in lights:
             color = np.array(light.color, np.float32)
             irradiance = self.received.irradiance(replace(light, color=WHITE)).astype(np.float32)
-            whole += color * irradiance
-            if self.points is not None and bounces != 0:
-                first = albedo * irradiance
-                bright = NearSources.of(self.cells, first, light)
-                if bright.count:
-                    near += color * bright.irradiance(self.cells, first, self.points[0], self.points[1], self.occluders)
-                    taken[bright.surfels] += color * bright.parts[:, None] * first[bright.surfels]
-                    irradiance[bright.surfels] *= 1 - bright.parts[:, None]
             direct += color * irradiance
-        clusters = self.view.shape[0]
-        radiosity = radiosity_of(self.exchange, albedo, direct, bounces)
-        if near.any():
-            radiosity += radiosity_of(self.exchange, albedo, near[clusters:], None if bounces is None else bounces - 1)
-        found = (self.view @ radiosity).astype(np.float64)
-        found[: len(near[:clusters])] += near[:clusters]
+            if self.points is not None and bounces != 0:
+                bright = self.near.sources(albedo * irradiance, light)
+                if bright.count:
+                    sent += color * bright.irradiance(self.points[0], self.points[1], self.occluders)
+                    taken += color * bright.taken(irradiance)
+        radiosity = radiosity_of(self.exchange, albedo, direct - taken, bounces)
+        if taken.any():
+            radiosity += radiosity_of(self.exchange, albedo, sent[clusters:], None if bounces is None else bounces - 1)
+        found = (self.view @ radiosity + sent[:clusters]).astype(np.float64)
         if self.gloss is None:
             return found
-        seen = radiosity + taken
-        if self.lobed is not None and bounces != 0:
-            arriving = whole + self.exchange @ radiosity + (near[clusters:] if len(near) else 0)
-            seen = seen + self.lobed * arriving
+        seen = radiosity + albedo * taken
+        if self.specular_albedo is not None and bounces != 0:
+            seen = seen + self.specular_albedo * (direct + self.exchange @ radiosity + sent[clusters:])
         return np.concatenate([found, self.gloss @ seen])
 
 
@@ -324,11 +317,10 @@ _kept: OrderedDict[tuple[int, int], _Ready] = OrderedDict()
 
 def _ready(asset: Asset) -> _Ready:
     """Made once for an asset, and for those of some of its pixels."""
-    if asset.scene is None:
-        raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
-    key = (id(asset.tables["view_links"]), id(asset.scene))
+    scene = asset.required_scene()
+    key = (id(asset.tables["view_links"]), id(scene))
     found = _kept.get(key)
-    if found is None or found.tables["view_links"] is not asset.tables["view_links"] or found.scene is not asset.scene:
+    if found is None or found.tables["view_links"] is not asset.tables["view_links"] or found.scene is not scene:
         told, tables = asset.manifest["gather"], asset.tables
         cells = replace(Cells.of_image(tables["pool"][:2]), albedo=np.ascontiguousarray(tables["pool"][2, :, :3]))
         try:
@@ -339,14 +331,15 @@ def _ready(asset: Asset) -> _Ready:
             )
         except ValueError as error:
             raise ImageError(f"{error}; fit again") from error
-        occluders = occluders_of(asset.scene)
+        occluders = occluders_of(scene)
         points = None
         if POINTS in tables:
             own = np.stack([cells.places, cells.normals]).astype(np.float32)
             points = np.concatenate([tables[POINTS][:2], own], axis=1)
         lobes = gloss[0] if gloss else None
-        lobed = np.ascontiguousarray(tables["pool"][3, :, :3]) if len(tables["pool"]) > 3 else None
-        found = _Ready(tables, asset.scene, view, exchange, lobes, cells, ReceivedLight(cells, occluders), points, lobed, occluders)
+        specular = np.ascontiguousarray(tables["pool"][3, :, :3]) if len(tables["pool"]) > 3 else None
+        received = ReceivedLight(cells, occluders)
+        found = _Ready(tables, scene, view, exchange, lobes, cells, received, occluders, points, NearPool(cells), specular)
         _kept[key] = found
         while len(_kept) > KEPT:
             _kept.popitem(last=False)

@@ -18,7 +18,7 @@ from srbf.encode.dilation import nearest_covered
 from srbf.errors import InputError
 from srbf.light_domain import domain_of_capture
 from srbf.lights import Light, PointLight, refuse_named
-from srbf.methods.carried import carried_images, carried_scene, common_manifest
+from srbf.methods.carried import carried_images, common_manifest, required_scene
 from srbf.methods.mixed_clusters import (
     GLOSS_NEIGHBORS,
     MOST_NEAREST,
@@ -116,9 +116,7 @@ class GatherSamples(Method):
         if "samples" not in capture.manifest.get("gather", {}):
             raise InputError(f"expected gather samples in {capture.folder}, found links to a pool; bake with `gather`, a number of samples")
         found = GatheredSamples.read(capture.folder)
-        scene = carried_scene(capture)
-        if scene is None:
-            raise InputError(f"expected scene.glb in {capture.folder}, found none: lights need what casts shadows; bake again")
+        scene = required_scene(capture)
         most = min(self.nearest, found.nearest.shape[1])
         nearest = nearest_covered(capture.coverage())
         stored = neighbor_layers(capture, found.nearest[:, :most], found.weights[:, :most], nearest)
@@ -182,11 +180,11 @@ class GatherSamples(Method):
         told, tables = asset.manifest["gather"], asset.tables
         if not lights or told["bounces"] == 0:
             return np.zeros((told["clusters"] + told.get("lobes", 0), 3))
-        if asset.scene is None:
-            raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
         places = tables["sample_places_low"] + (tables["sample_places_high"].astype(np.uint16) << 8)
         box = np.array(told["box"], np.float64)
-        return light_on_clusters(places, box, tables["sample_normals"], tables["sample_reflectance"], occluders_of(asset.scene), lights)
+        return light_on_clusters(
+            places, box, tables["sample_normals"], tables["sample_reflectance"], occluders_of(asset.required_scene()), lights
+        )
 
     @classmethod
     def weighted(cls, asset: Asset, weights: Float64[ndarray, "b C 3"]) -> Float32[ndarray, "b H W 3"]:

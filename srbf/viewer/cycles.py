@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from srbf.asset import Asset
-from srbf.bake.given_reference import GivenReference, StoppedError, changed_line, render_given
-from srbf.bake.run import require_scene
+from srbf.bake.given_reference import GivenReference, StoppedError, changed_line, render_given, require_view
 from srbf.errors import InputError, SrbfError
 from srbf.io.image import write_image
 from srbf.light_entries import lights_of
@@ -30,9 +29,7 @@ class CyclesRenders:
     """
 
     def __init__(self, asset: Asset, scene: Path, blender: Path | None = None) -> None:
-        require_scene(scene)
-        if asset.receiver_kind != "view" or not asset.receivers:
-            raise InputError(f"expected an asset of a view for `scene`, found one of {asset.receiver_kind}; leave it out")
+        require_view(asset, scene)
         self._asset, self._scene, self._blender = asset, scene, blender
         self._mutex = threading.Lock()
         self._thread: threading.Thread | None = None

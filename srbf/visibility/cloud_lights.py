@@ -52,9 +52,7 @@ class CloudLights:
     @staticmethod
     def of_asset(asset: Asset) -> CloudLights:
         """Kept from call to call of one asset."""
-        if asset.scene is None:
-            raise InputError("expected scene.glb in the asset, found none: lights inside need what casts shadows; fit again")
-        return _of_tables(asset.scene, asset.tables["cells"].tobytes())
+        return _of_tables(asset.required_scene(), asset.tables["cells"].tobytes())
 
     def visible(self, origins: Float64[ndarray, "n 3"], targets: Float64[ndarray, "n 3"]) -> ndarray:
         """(n,) whether nothing stands between two places."""

@@ -44,8 +44,8 @@ class GatherOperator:
 
     Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
     lobes gather, where there are any. `behind`: as `nearest` and `weights`, of what falls on the backs of pixels that let light through.
-    `points`: places (m) and normals of the clusters, None of captures that have them not. `lobed`: what surfels reflect, beyond their
-    albedo, where a lobe sees them.
+    `points`: places (m) and normals of the clusters, None of older captures. `specular_albedo`: what surfels reflect, beyond their albedo,
+    where a lobe sees them.
     """
 
     cells: Cells
@@ -56,7 +56,7 @@ class GatherOperator:
     gloss: GlossyGather | None = None
     behind: tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]] | None = None
     points: Float32[ndarray, "2 C 3"] | None = None
-    lobed: Float32[ndarray, "S 3"] | None = None
+    specular_albedo: Float32[ndarray, "S 3"] | None = None
 
     @staticmethod
     def traced(
@@ -94,8 +94,8 @@ class GatherOperator:
         )
         gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2, passing=passing)
         points = np.stack([found.places, found.normals]).astype(np.float32)
-        lobed = None if pool.gloss is None or gloss is None else np.pad(pool.gloss, ((0, len(passing.surfels)), (0, 0)))
-        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points, lobed)
+        specular_albedo = None if pool.gloss is None or gloss is None else np.pad(pool.gloss, ((0, len(passing.surfels)), (0, 0)))
+        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points, specular_albedo)
 
     def write(self, folder: Path, key: str) -> None:
         """pool.exr and gather.npz; `key` tells what they are of."""
@@ -114,7 +114,7 @@ class GatherOperator:
 
     def pool_image(self) -> Float32[ndarray, "n S 4"]:
         """Rows (x, y, z, area), (normal, 0), (albedo, 0), and (what lobes see beyond it, 0) where there is any."""
-        colors = [self.cells.albedo, *([] if self.lobed is None else [self.lobed])]
+        colors = [self.cells.albedo, *([] if self.specular_albedo is None else [self.specular_albedo])]
         return np.concatenate([self.cells.image(), *(np.pad(color, ((0, 0), (0, 1)))[None] for color in colors)]).astype(np.float32)
 
     @staticmethod
@@ -144,8 +144,8 @@ class GatherOperator:
         points = arrays.get("points")
         if points is not None and points.shape != (2, view.rows, 3):
             raise ImageError(f"expected places of {view.rows} clusters in {path}, found {points.shape}; bake again with `force=True`")
-        lobed = np.ascontiguousarray(image[3, :, :3]) if len(image) > 3 else None
-        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points, lobed)
+        specular_albedo = np.ascontiguousarray(image[3, :, :3]) if len(image) > 3 else None
+        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points, specular_albedo)
 
 
 def is_gathered(folder: Path, key: str) -> bool:

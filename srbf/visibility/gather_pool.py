@@ -47,8 +47,8 @@ def pool_of(
     objects = objects[source]
     both = surfaces.both_sides()
     passed = None if transmission is None else np.tile(transmission[source], (2, 1))
-    shone = None if gloss is None or not (gloss > 0).any() else np.tile(gloss[source], (2, 1))
-    color = both.albedo + sum(part for part in (passed, shone) if part is not None)
+    shines = None if gloss is None or not (gloss > 0).any() else np.tile(gloss[source], (2, 1))
+    color = both.albedo + sum(part for part in (passed, shines) if part is not None)
     able = np.flatnonzero((color.max(axis=1) >= DARK) & (both.areas > 0))
     seen = looked_at(surfaces, points, normals, seed)
     gathered = (seen if lobes is None else seen + mirrored(surfaces, lobes, float(len(points)), seed))[able]
@@ -78,12 +78,12 @@ def pool_of(
     of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
     of_surfel[owner] = np.concatenate([objects, objects])[kept]
     dark = np.zeros((len(of_surfel), 3), np.float32)
-    own, lobed = (
+    own, specular = (
         None if part is None else grouped_cells(Fragments(sides.corners, part[kept].astype(np.float32)), owner).albedo
-        for part in (passed, shone)
+        for part in (passed, shines)
     )
     unseen = np.zeros(len(of_surfel), bool)
-    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own, lobed)
+    return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own, specular)
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

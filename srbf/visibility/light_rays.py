@@ -23,7 +23,7 @@ CastingLight = DirectionalLight | PointLight | AreaLight  # with a direct light 
 @dataclass(frozen=True)
 class LightRays:
     """n rays: unit vectors to the light, distance (m; None: endless), unshadowed irradiance (white light, without a spot's cone), what
-    a spot's cone and a profile let out, and weight in a texel's mean."""
+    a spot's cone and a profile let out, and weight in the mean of its texel."""
 
     direction: Float[ndarray, "n 3"]
     distance: Float64[ndarray, " n"] | None

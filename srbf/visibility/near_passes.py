@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32
+from srbf.arrays import Float
 from srbf.gl.deep_framebuffer import folded
 from srbf.gl.programs import Programs
 from srbf.lights import PointLight, triple
 from srbf.visibility.gl_resources import Resources
 from srbf.visibility.near_sources import MOST, NearSources, lift_above
-from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfel_light import SurfelLight
 
 if TYPE_CHECKING:
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class NearPasses:
-    """What `NearSources` lay on several sets of receivers, each a texture of a texel per receiver.
+    """What `NearSources` lay on several sets of receivers, each into a texture with one texel for each receiver.
 
     Parameters
     ----------
@@ -29,16 +28,14 @@ class NearPasses:
         Of the context, which is current whenever `draw` is called.
     surfels
         Whose shadow cube is drawn.
-    cells
-        N cells of the pool.
     receivers
         Places (m) and unit normals of each set.
     """
 
     def __init__(
-        self, programs: Programs, surfels: SurfelLight, cells: Cells, receivers: list[tuple[Float[ndarray, "_ 3"], Float[ndarray, "_ 3"]]]
+        self, programs: Programs, surfels: SurfelLight, receivers: list[tuple[Float[ndarray, "_ 3"], Float[ndarray, "_ 3"]]]
     ) -> None:
-        self._programs, self._surfels, self._cells = programs, surfels, cells
+        self._programs, self._surfels = programs, surfels
         resources = Resources(programs.context)
         programs.resources.callback(resources.close)
         self._lift = lift_above(np.concatenate([places for places, _ in receivers]))
@@ -48,15 +45,14 @@ class NearPasses:
             self._receivers.append([resources.texture(image) for image in pixels])
         self._sources = resources.texture(np.zeros((3, MOST, 4), np.float32))
 
-    def draw(self, near: NearSources, radiosity: Float32[ndarray, "S 3"], targets: list[moderngl.Framebuffer]) -> None:
-        """Add the light of `near`, whose surfels reflect `radiosity`, into a target for each set; blending is left on and additive."""
+    def draw(self, near: NearSources, targets: list[moderngl.Framebuffer]) -> None:
+        """Add the light of `near` into a target for each set; blending is left on and additive."""
         gl: Any = self._programs.context
         order = np.argsort(near.groups, kind="stable")
-        own = self._cells.at(near.surfels[order])
-        light = radiosity[near.surfels[order]] * near.parts[order, None]
+        own = near.cells.at(order)
         sources = np.zeros((3, MOST, 4), np.float32)
         sources[0, : near.count] = np.column_stack([own.places - self._surfels.center, own.areas])
-        sources[1, : near.count, :3], sources[2, : near.count, :3] = own.normals, light
+        sources[1, : near.count, :3], sources[2, : near.count, :3] = own.normals, near.radiosity[order]
         self._sources.write(sources)
         sizes = np.bincount(near.groups, minlength=len(near.places))
         for first, count, place in zip(np.cumsum(sizes) - sizes, sizes, near.places, strict=True):

@@ -29,62 +29,40 @@ ROWS = 1 << 12  # receivers at a time
 
 @dataclass(frozen=True, eq=False)
 class NearSources:
-    """n surfels of a pool, which part of the light of each is taken out of the links, and its group; `places` (m) where groups are seen."""
+    """n surfels of a pool, which part of the light of each is taken out of the links, `parts`, and the group that each is in.
+
+    `cells` (n) of them, the `radiosity` (n, 3) of these parts; `places` (G, 3), m, where groups are seen.
+    """
 
     surfels: Int[ndarray, " n"]
     parts: Float32[ndarray, " n"]
+    cells: Cells
+    radiosity: Float32[ndarray, "n 3"]
     groups: Int[ndarray, " n"]
     places: Float64[ndarray, "G 3"]
-
-    @staticmethod
-    def of(cells: Cells, radiosity: Float[ndarray, "S 3"], light: Light) -> NearSources:
-        """The brightest of a pool's `cells`, whose first reflection of a light this is, where they are far brighter than the mean.
-
-        None of two in one place, as of cloth. Groups are seen at places a little way from the surface to the light, where nothing is.
-        """
-        brightness = radiosity.mean(axis=1).astype(np.float64)
-        usual = float((brightness * cells.areas).sum() / max(cells.areas.sum(dtype=np.float64), 1e-30))
-        least = BRIGHT * usual
-        if len(brightness) > MOST:
-            least = max(least, float(np.partition(brightness, -MOST - 1)[-MOST - 1]))
-        bright = np.flatnonzero(brightness > least)
-        bright = bright[_alone(cells.places, bright)]
-        parts = np.clip(brightness[bright] / max(least, 1e-30) - 1, 0, 1).astype(np.float32)
-        places, normals = cells.places[bright].astype(np.float64), cells.normals[bright].astype(np.float64)
-        flux = brightness[bright] * cells.areas[bright]
-        groups = _grouped(places, normals, flux)
-        seen = []
-        for group in range(int(groups.max(initial=-1)) + 1):
-            own = np.flatnonzero(groups == group)
-            middle = np.average(places[own], axis=0, weights=flux[own])
-            nearest = own[((places[own] - middle) ** 2).sum(axis=1).argmin()]
-            toward, far = _toward(light, places[nearest], normals[nearest])
-            seen.append(places[nearest] + min(OFF * float(np.sqrt(cells.areas[bright[own]].sum())), far / 2) * toward)
-        return NearSources(bright, parts, groups, np.array(seen).reshape(-1, 3))
 
     @property
     def count(self) -> int:
         """How many surfels."""
         return len(self.surfels)
 
+    def taken(self, values: Float32[ndarray, "S 3"]) -> Float32[ndarray, "S 3"]:
+        """The parts that are taken out, of values on all surfels of the pool; 0 on others."""
+        found = np.zeros_like(values)
+        found[self.surfels] = self.parts[:, None] * values[self.surfels]
+        return found
+
     def irradiance(
-        self,
-        cells: Cells,
-        radiosity: Float32[ndarray, "S 3"],
-        points: Float[ndarray, "R 3"],
-        normals: Float[ndarray, "R 3"],
-        occluders: EmbreeTriangles,
+        self, points: Float[ndarray, "R 3"], normals: Float[ndarray, "R 3"], occluders: EmbreeTriangles
     ) -> Float32[ndarray, "R 3"]:
-        """What the parts taken out lay on receivers: points (m) and unit normals."""
+        """What these parts lay on receivers: points (m) and unit normals."""
         starts = (points + lift_above(points) * normals).astype(np.float32)
-        sources = cells.at(self.surfels)
-        light = (radiosity[self.surfels] * self.parts[:, None]).astype(np.float32)
         found = np.zeros((len(points), 3), np.float32)
         rows = range(0, len(points), ROWS)
 
         def part(number: int) -> None:
             own = slice(rows[number], rows[number] + ROWS)
-            factors = disc_factors(np.asarray(points[own], np.float32), np.asarray(normals[own], np.float32), sources)
+            factors = disc_factors(np.asarray(points[own], np.float32), np.asarray(normals[own], np.float32), self.cells)
             for group, place in enumerate(self.places):
                 members = np.flatnonzero(self.groups == group)
                 lit = np.flatnonzero(factors[:, members].any(axis=1))
@@ -92,10 +70,44 @@ class NearSources:
                 distance = np.linalg.norm(toward, axis=1)
                 hidden = occluders.occluded(starts[own][lit], toward / np.maximum(distance, 1e-30)[:, None], distance)
                 factors[np.ix_(lit[hidden], members)] = 0
-            found[own] = factors @ light
+            found[own] = factors @ self.radiosity
 
         each(part, len(rows))
         return found
+
+
+class NearPool:
+    """The surfels of a pool that may be near sources: none of two in one place, as of cloth."""
+
+    def __init__(self, cells: Cells) -> None:
+        self._cells = cells
+        self._area = max(float(cells.areas.sum(dtype=np.float64)), 1e-30)
+        _, number, counts = np.unique(cells.places, axis=0, return_inverse=True, return_counts=True)
+        self._alone = counts[number.ravel()] == 1
+
+    def sources(self, radiosity: Float32[ndarray, "S 3"], light: Light) -> NearSources:
+        """The brightest surfels, where they are far brighter than the mean, of the first reflection of a light.
+
+        Groups are seen at places a little way from the surface to the light, where nothing is.
+        """
+        brightness = radiosity.mean(axis=1).astype(np.float64)
+        least = BRIGHT * float((brightness * self._cells.areas).sum()) / self._area
+        if len(brightness) > MOST:
+            least = max(least, float(np.partition(brightness, -MOST - 1)[-MOST - 1]))
+        bright = np.flatnonzero((brightness > least) & self._alone)
+        parts = np.clip(brightness[bright] / max(least, 1e-30) - 1, 0, 1).astype(np.float32)
+        own = self._cells.at(bright)
+        places, normals = own.places.astype(np.float64), own.normals.astype(np.float64)
+        flux = brightness[bright] * own.areas
+        groups = _grouped(places, normals, flux)
+        seen = []
+        for group in range(int(groups.max(initial=-1)) + 1):
+            members = np.flatnonzero(groups == group)
+            middle = np.average(places[members], axis=0, weights=flux[members])
+            nearest = members[((places[members] - middle) ** 2).sum(axis=1).argmin()]
+            toward, far = _toward(light, places[nearest], normals[nearest])
+            seen.append(places[nearest] + min(OFF * float(np.sqrt(own.areas[members].sum())), far / 2) * toward)
+        return NearSources(bright, parts, own, parts[:, None] * radiosity[bright], groups, np.array(seen).reshape(-1, 3))
 
 
 def lift_above(points: Float[ndarray, "R 3"]) -> float:
@@ -143,12 +155,6 @@ def _toward(light: Light, place: Float64[ndarray, " 3"], normal: Float64[ndarray
     vector = np.array(light.position) - place
     far = float(np.linalg.norm(vector))
     return vector / max(far, 1e-30), far
-
-
-def _alone(places: Float[ndarray, "S 3"], chosen: Int[ndarray, " n"]) -> ndarray:
-    """(n,) which of the chosen share their place with no other: translucent surfels have a second one behind them."""
-    _, number, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
-    return counts[number.ravel()[chosen]] == 1
 
 
 def _grouped(places: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], flux: Float64[ndarray, " n"]) -> Int[ndarray, " n"]:

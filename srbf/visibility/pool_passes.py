@@ -13,13 +13,13 @@ from srbf.arrays import Float64
 from srbf.asset import Asset
 from srbf.errors import ImageError, InputError
 from srbf.gl.context import Limits
-from srbf.gl.deep_framebuffer import Apart, LinkPasses, folded
+from srbf.gl.deep_framebuffer import LinkPasses, NearTextures, folded
 from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.lights import WHITE, EnvironmentLight, Light, PointLight, refuse_named
 from srbf.visibility.near_passes import NearPasses
-from srbf.visibility.near_sources import NearSources
+from srbf.visibility.near_sources import NearPool
 from srbf.visibility.packed_links import unpacked
 from srbf.visibility.surface_cells import Cells
 from srbf.visibility.surfel_light import SurfelLight
@@ -87,20 +87,19 @@ class PoolPasses(Passes):
         if hasattr(self, "_links"):
             return
         asset = self._asset
-        if asset.scene is None:
-            raise InputError("expected scene.glb in the asset, found none: lights need what casts shadows; fit again")
         pool = asset.tables["pool"]
         cells = replace(Cells.of_image(pool[:2]), albedo=np.ascontiguousarray(pool[2, :, :3]))
         terms = bounce_terms(asset, cells)
         self._cells = cells
-        self._surfels = SurfelLight(self._programs, cells, asset.scene)
+        self._toward_lobes = pool[2:, :, :3].sum(axis=0)  # albedo, and what lobes see beyond it
+        self._surfels = SurfelLight(self._programs, cells, asset.required_scene())
         self._links = LinkPasses(asset, self._programs, self._textures, terms)
         self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
         self._near: NearPasses | None = None
         if "view_points" in asset.tables and terms:
             places, normals = asset.tables["view_points"]
-            receivers = [(cells.places, cells.normals), (places, normals)]
-            self._near = NearPasses(self._programs, self._surfels, cells, receivers)
+            self._near = NearPasses(self._programs, self._surfels, [(cells.places, cells.normals), (places, normals)])
+            self._pool = NearPool(cells)
             size = self._surfels.texture.size
             self._far, self._second, self._taken = (self._programs.target(size) for _ in range(3))
             self._near_clusters = self._programs.target((self._links.cluster_size[0], self._links.view_rows))
@@ -109,31 +108,28 @@ class PoolPasses(Passes):
         """The irradiance of all clusters under a light in white."""
         gl: Any = self._programs.context
         texture, target = self._free.pop() if self._free else self._programs.target(self._links.cluster_size)
-        direct, apart = self._surfels.draw(replace(light, color=WHITE)), None
+        direct, near = self._surfels.draw(replace(light, color=WHITE)), None
         if self._near is not None:
-            direct, apart = self._parted(light, direct, self._near)
+            direct, near = self._split(light, direct, self._near)
         gl.enable_only(gl.NOTHING)
-        self._links.clusters(direct, target, apart)
+        self._links.clusters(direct, target, near)
         self.computed += 1
         return light, texture, target
 
-    def _parted(self, light: Light, direct: moderngl.Texture, passes: NearPasses) -> tuple[moderngl.Texture, Apart | None]:
-        """Irradiance on the surfels without that of bright ones, and what these add; all of it where none is bright."""
+    def _split(self, light: Light, direct: moderngl.Texture, passes: NearPasses) -> tuple[moderngl.Texture, NearTextures | None]:
+        """Irradiance on the surfels without its part on bright ones, and what these add; all of it where none is bright."""
         count = len(self._cells.places)
-        irradiance = np.frombuffer(direct.read(), np.float32).reshape(-1, 4)[:count, :3].copy()
-        first = self._cells.albedo * irradiance
-        near = NearSources.of(self._cells, first, light)
+        irradiance = np.frombuffer(direct.read(), np.float32).reshape(-1, 4)[:count, :3]
+        near = self._pool.sources(self._cells.albedo * irradiance, light)
         if not near.count:
             return direct, None
-        taken = np.zeros_like(first)
-        reflected = self._cells.albedo + self._asset.tables["pool"][3, :, :3] if len(self._asset.tables["pool"]) > 3 else self._cells.albedo
-        taken[near.surfels] = near.parts[:, None] * (reflected * irradiance)[near.surfels]
-        irradiance[near.surfels] *= 1 - near.parts[:, None]
-        for (texture, _), values in ((self._far, irradiance), (self._second, irradiance), (self._taken, taken)):
+        taken = near.taken(irradiance)
+        colors = ((self._far, irradiance - taken), (self._second, irradiance - taken), (self._taken, self._toward_lobes * taken))
+        for (texture, _), values in colors:
             texture.write(folded(np.column_stack([values, np.zeros(count, np.float32)])))
         self._near_clusters[1].clear()
-        passes.draw(near, first, [self._second[1], self._near_clusters[1]])
-        return self._far[0], Apart(self._second[0], self._taken[0], self._near_clusters[0])
+        passes.draw(near, [self._second[1], self._near_clusters[1]])
+        return self._far[0], NearTextures(self._second[0], self._taken[0], self._near_clusters[0])
 
 
 def bounce_terms(asset: Asset, cells: Cells) -> int:

@@ -360,7 +360,7 @@ def _has_size(light: CastingLight) -> bool:
 
 
 def _balanced(turn: Float64[ndarray, "e 4"], count: int) -> Float64[ndarray, "s e 2"]:
-    """4 or 16 points of the unit square, one in each cell of a grid and their mean in its middle: a slope over a texel makes no noise."""
+    """4 or 16 points of the unit square, one in each cell of a grid, with their mean in its middle: a linear change makes no noise."""
     side = math.isqrt(count)
     cells = np.stack(np.divmod(np.arange(count // 2), side)[::-1], axis=-1)[:, None]
     jitter = np.stack([turn[:, :2], turn[:, 2:]])[np.arange(count // 2) % 2]

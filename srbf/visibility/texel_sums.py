@@ -9,21 +9,21 @@ from numpy import ndarray
 
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 
-REFINE_STEP = 0.005  # over usual irradiance: between samples of a texel, or between neighbors, from which a texel is refined
+REFINE_STEP = 0.005  # over the usual irradiance: between samples of one texel, or between neighbors, from which it is refined
 NEIGHBOR_STEP = 0.05  # between neighbors: a shadow edge may cross a corner without samples
-EDGE_STEP = 0.01  # between samples of a texel, from which it is refined once more
-SMOOTH, VERY_SMOOTH = 0.04, 0.1  # between samples of a texel, over the brightest: less is a slope, which few samples get right
+EDGE_STEP = 0.01  # between samples of one texel, from which it is refined once more
+SMOOTH, VERY_SMOOTH = 0.04, 0.1  # between samples of one texel, over the brightest: less is a gradient, which few samples get right
 MIN_DIFFUSE = 1e-12  # share
 COUNTS = 1e-5  # least importance of a sample whose difference to others counts
 
 
 @dataclass(frozen=True, eq=False)
 class TexelSums:
-    """Sums of P texels: light and shares, whose ratio times a texel's albedo is its radiance for any mixture; minimum and maximum.
+    """Sums of P texels: light and shares, whose ratio times the albedo is the radiance for any mixture; minimum and maximum.
 
     `scale` (P,): the irradiance that texels have unshadowed, at most, over the usual one, see `relative`; None, of a sun: 1. `sized`, of a
-    light with a size: samples have weights of their own; a texel's light is the weighted mean of what is visible, times the mean unshadowed
-    irradiance; minimum and maximum are those of what is visible, of other lights of their light.
+    light with a size: samples have weights of their own; the light of each texel is the weighted mean of what is visible, times the mean
+    unshadowed irradiance; minimum and maximum are those of what is visible, of other lights of their light.
     """
 
     height: int

@@ -261,6 +261,7 @@ def test_bad_captures_and_assets_leave_nothing(asset: Path, capture: Capture, tm
         (["--ambient-only", "--point", "0,0,1"], "expected --ambient-only without a light"),
         (["--ambient-only", "--no-ambient"], "expected --ambient-only or --no-ambient"),
         (["--lights", "frames.json", "--point", "0,0,1"], "put all lights into the file"),
+        (["--point", "0,0,1", "--samples", "9"], "expected --reference with --samples"),
     ],
 )
 def test_bad_lights(tmp_path: Path, arguments: list[str], words: str) -> None:
@@ -288,6 +289,16 @@ def test_the_light_of_the_scene_itself_is_left_out_where_asked(asset: Path, tmp_
 def test_the_ambient_light_alone_is_asked_for(asset: Path, tmp_path: Path) -> None:
     ok("relight", asset, "-o", tmp_path / "x.exr", "--ambient-only")
     np.testing.assert_array_equal(read_image(tmp_path / "x.exr"), methods.relight(Asset.open(asset), []))
+
+
+def test_a_reference_that_cannot_be_rendered_is_told_before_any_work(asset: Path, tmp_path: Path) -> None:
+    """Of a missing scene, and of an asset of another receiver; the picture is not written either."""
+    words = ["relight", asset, "-o", tmp_path / "x.exr", "--directional", "0,0,1", "--reference"]
+    assert "expected a .blend at" in refused(*words, tmp_path / "none.blend")
+    (tmp_path / "shot.blend").write_bytes(b"")
+    assert "expected an asset of a view" in refused(*words, tmp_path / "shot.blend")
+    assert "expected --scene with --blender" in misused("view", asset, "--blender", tmp_path)
+    assert not (tmp_path / "x.exr").exists()
 
 
 def test_a_full_or_read_only_target(asset: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_profiles import picture, uneven
 from made_rooms import Room
-from made_views import view_of_room, with_backs, with_lobed, with_lobes
+from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo
 from typer.testing import CliRunner
 
 from srbf import methods
@@ -82,7 +82,7 @@ def test_a_light_is_that_of_numpy(asset: Asset, relighter: Relighter, kind: str)
     np.testing.assert_allclose(relighter.relight([LIGHTS[kind]]), expected, atol=TOLERANCE * expected.max())
 
 
-@pytest.mark.parametrize("made", [with_lobes, with_lobed], ids=["diffuse", "glossy"])
+@pytest.mark.parametrize("made", [with_lobes, with_specular_albedo], ids=["diffuse", "glossy"])
 def test_lobes_gather_as_in_numpy(asset: Asset, context: Any, made: Any) -> None:
     """From surfels that reflect diffusely, and from those that reflect more toward lobes."""
     shiny = made(asset)
@@ -121,7 +121,7 @@ def test_walls_shade_surfels_as_rays_say(divided: Asset, context: Any, kind: str
 def test_bright_surfels_light_as_in_numpy(context: Any, tmp_path: Path) -> None:
     """A light 3 cm off a wall of many surfels, behind a wall with a door, with lobes: less than all is seen of the bright ones."""
     room = Room.box((3, 2, 2), 0.25, 0.6, wall=(1.5, 0.6, 1.4), lid=False)
-    asset = with_lobed(DeepFramebuffer().encode(view_of_room(tmp_path / "capture", room, 8000, 150, tested=0)))
+    asset = with_specular_albedo(DeepFramebuffer().encode(view_of_room(tmp_path / "capture", room, 8000, 150, tested=0)))
     light = PointLight((0.03, 1.1, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
     linked = {name: table for name, table in asset.tables.items() if name != "view_points"}
     bare = replace(asset, tables=linked | {"view_links": asset.tables["view_links"].copy()})

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_rooms import Room, room_of_surfels
-from made_views import surfaces_of, view_of_room, with_backs, with_lobed, with_lobes
+from made_views import surfaces_of, view_of_room, with_backs, with_lobes, with_specular_albedo
 
 from srbf import relight
 from srbf.asset import Asset
@@ -180,7 +180,7 @@ def test_light_from_behind_is_kept_in_files_and_at_some_pixels(asset: Asset, tmp
 
 def test_lobes_see_what_surfels_reflect_toward_them_alone(asset: Asset) -> None:
     """Half as much again as their albedo: half as much light again in lobes, and none in diffuse pixels."""
-    plain, more = with_lobes(asset), with_lobed(asset)
+    plain, more = with_lobes(asset), with_specular_albedo(asset)
     more.tables["pool"][3] = 0.5 * more.tables["pool"][2]
     dark = {"glossy": np.zeros_like(asset.images["albedo"])}
     light = [PointLight((1.2, 0.7, 1.1), (1, 0.5, 0.2), falloff="inverse-square")]

@@ -16,7 +16,7 @@ from srbf.lights import PointLight, SphereLight, SpotLight
 from srbf.methods import linear_response
 from srbf.methods.deep_framebuffer import POINTS, DeepFramebuffer
 from srbf.visibility.embree import EmbreeTriangles
-from srbf.visibility.near_sources import NearSources, disc_factors
+from srbf.visibility.near_sources import NearPool, disc_factors
 from srbf.visibility.received import ReceivedLight
 from srbf.visibility.surface_cells import Cells
 
@@ -31,6 +31,7 @@ def cells_of(room: Room) -> Cells:
 
 
 CELLS = cells_of(ROOM)
+POOL = NearPool(CELLS)
 NEAR = PointLight((0.06, 1.2, 0.8), falloff="inverse-square")
 EVEN = 0.06
 WHOLE = 0.03  # a disc's form factor is not that of a square right beside it
@@ -48,13 +49,13 @@ def test_all_around_a_point_shares_sum_to_one() -> None:
 
 
 def test_light_from_all_sides_alike_has_no_bright_surfels() -> None:
-    assert not NearSources.of(CELLS, np.ones((len(CELLS.places), 3), np.float32), NEAR).count
-    assert not NearSources.of(CELLS, first_reflection(PointLight((1.5, 1.0, 1.0), falloff="inverse-square")), NEAR).count
-    assert not NearSources.of(CELLS, np.zeros((len(CELLS.places), 3), np.float32), NEAR).count
+    assert not POOL.sources(np.ones((len(CELLS.places), 3), np.float32), NEAR).count
+    assert not POOL.sources(first_reflection(PointLight((1.5, 1.0, 1.0), falloff="inverse-square")), NEAR).count
+    assert not POOL.sources(np.zeros((len(CELLS.places), 3), np.float32), NEAR).count
 
 
 def test_beside_a_wall_they_are_the_cells_next_to_the_light() -> None:
-    near = NearSources.of(CELLS, first_reflection(NEAR), NEAR)
+    near = POOL.sources(first_reflection(NEAR), NEAR)
     away = np.linalg.norm(CELLS.places[near.surfels] - np.array(NEAR.position), axis=1)
     assert near.count > 10 and away.max() < 0.6
     assert (near.parts > 0).all() and (near.parts <= 1).all() and near.parts.max() == 1
@@ -66,7 +67,7 @@ def test_a_moving_light_takes_out_its_surfels_gradually() -> None:
     parts = []
     for step in (0, 1e-3):
         light: Any = replace(NEAR, position=(0.2 + step, 1.2, 0.8))
-        near = NearSources.of(CELLS, first_reflection(light), light)
+        near = POOL.sources(first_reflection(light), light)
         every = np.zeros(len(CELLS.places))
         every[near.surfels] = near.parts
         parts.append(every)
@@ -76,13 +77,11 @@ def test_a_moving_light_takes_out_its_surfels_gradually() -> None:
 def test_what_stands_between_shadows_them() -> None:
     """Behind a wall with a door there is less, above the wall all."""
     first = first_reflection(NEAR)
-    near = NearSources.of(CELLS, first, NEAR)
+    near = POOL.sources(first, NEAR)
     points, normals = np.array([[2.9, 1.2, 0.8], [2.9, 0.3, 1.8]]), np.array([[-1.0, 0, 0]] * 2)
     wall = np.array([[[1.5, 0.0, 0.0], [1.5, 4.0, 0.0], [1.5, 0.0, 4.0]], [[1.5, 4.0, 0.0], [1.5, 4.0, 4.0], [1.5, 0.0, 4.0]]], np.float32)
     aside = wall + np.array([0, 0, 1.25], np.float32)
-    open_, hidden, above = (
-        near.irradiance(CELLS, first, points, normals, EmbreeTriangles(corners)) for corners in (ROOM.corners, wall, aside)
-    )
+    open_, hidden, above = (near.irradiance(points, normals, EmbreeTriangles(corners)) for corners in (ROOM.corners, wall, aside))
     assert (open_ > 0).all() and not hidden.any()
     assert (above[0] == open_[0]).all() and not above[1].any()
 

@@ -54,7 +54,10 @@ export function missingLine({ manifest }: Asset): string {
 }
 
 /** Lights as designed, in place of those of the scene; of the others as many stay as there is room for. */
-export const redesigned = (asset: Asset, lights: readonly LightState[]): LightState[] => [...designedLights(asset), ...lights.filter(({ name }) => name === undefined)].slice(0, MOST_LIGHTS);
+export function redesign(asset: Asset, state: { lights: LightState[]; selected: number }): void {
+  state.lights = [...designedLights(asset), ...state.lights.filter(({ name }) => name === undefined)].slice(0, MOST_LIGHTS);
+  state.selected = Math.min(Math.max(state.selected, 0), state.lights.length - 1);
+}
 
 /** The scene's own lights, or one inside it; undefined: a sun. */
 export function firstLights(asset: Asset, { center, radius }: Bounds): LightState[] | undefined {

@@ -55,6 +55,13 @@ export function bearing(place: HTMLElement, direction: Triple | undefined, insid
   place.textContent = `azimuth ${azimuth.toFixed(1)}°, elevation ${elevation.toFixed(1)}°${inside ? "" : " · outside the captured domain"}`;
 }
 
+/** The slider between a reference and the picture, `at` of the width. */
+export function slider(place: HTMLElement, shown: boolean, at: number): void {
+  place.hidden = !shown;
+  for (const child of place.children) (child as HTMLElement).style.left = `${at * 100}%`;
+  (place.querySelector("i") as HTMLElement).ariaValueNow = String(Math.round(100 * at));
+}
+
 /** What false colors mean, up to `most`; hidden for a picture in true colors. */
 export function legend(place: HTMLElement, color: keyof typeof COLORS, most: number): void {
   const text = (x: number) => String(Number(x.toPrecision(3)));

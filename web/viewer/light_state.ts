@@ -116,6 +116,20 @@ export const namedState = (name: string): NamedState => ({ kind: "named", ...COM
 /** Whether a light is as the scene has it set. */
 export const isDesigned = ({ on, color, intensity }: NamedState): boolean => on && intensity === 1 && color === COMMON.color;
 
+/** The selected light of a kind, else the first one. */
+function chosen<T extends LightState>({ lights, selected }: Chosen, is: (light: LightState | undefined) => light is T): T | undefined {
+  const light = lights[selected];
+  return is(light) ? light : lights.find(is);
+}
+
+interface Chosen {
+  readonly lights: readonly LightState[];
+  readonly selected: number;
+}
+
+export const sunOf = (state: Chosen): DirectionalState | undefined => chosen(state, (light): light is DirectionalState => light?.kind === "directional");
+export const placedOf = (state: Chosen): PlacedState | undefined => chosen(state, isPlaced);
+
 export function isPlaced(light: LightState | undefined): light is PlacedState {
   return light?.kind === "point" || light?.kind === "spot" || light?.kind === "sphere" || light?.kind === "area";
 }

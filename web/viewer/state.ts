@@ -55,7 +55,7 @@ export interface State {
 
 /** What the page shows of an asset at first; `own`: lights that it has in place of a sun. */
 export function firstState(
-  { quantity, width, height }: { quantity: "irradiance" | "radiance"; width: number; height: number },
+  { quantity, width, height, scene_lights }: { quantity: "irradiance" | "radiance"; width: number; height: number; scene_lights?: readonly unknown[] },
   view: State["view"],
   own: LightState[] = [directionalState(rounded([-0.45, -0.5, 0.74]))],
 ): State {
@@ -65,7 +65,7 @@ export function firstState(
     selected: 0,
     surfaces: [],
     surface: "",
-    exposure: quantity === "radiance" || view === "scene" ? 1.65 : 0,
+    exposure: (quantity === "radiance" || view === "scene") && !scene_lights?.length ? 1.65 : 0, // the scene's own lights: as in Blender
     tone: "linear",
     show: "picture",
     map: 0,

@@ -3,11 +3,11 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesigned } from "./asset_lights";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesign } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
-import { bearing, legend, statusLine, titles } from "./captions";
+import { bearing, legend, slider, statusLine, titles } from "./captions";
 import { Comparison } from "./comparison";
 import { Copy } from "./copy";
 import { Cycles } from "./cycles";
@@ -15,7 +15,7 @@ import { droppedEnvironment, droppedFrames } from "./dropped";
 import type { Environment } from "./environment_file";
 import { dragSplit, dropFiles, pickFile } from "./gestures";
 import { History } from "./history";
-import { type DirectionalState, isAimed, isPlaced, lightOf, type PlacedState, rounded, shiningOf } from "./light_state";
+import { type DirectionalState, isAimed, isPlaced, lightOf, placedOf, type PlacedState, rounded, shiningOf, sunOf } from "./light_state";
 import { listen, tabled } from "./keys";
 import type { Keyframes } from "./keyframes";
 import { checkGpu, type Loaded } from "./loading";
@@ -76,7 +76,7 @@ export class Viewer {
     subjects: Subjects,
     renderer: WebGLRenderer,
   ) {
-    const { facts, model, references } = loaded;
+    const { facts, model, probes, references } = loaded;
     this.renderer = renderer;
     this.subjects = subjects;
     this.subject = first;
@@ -92,25 +92,20 @@ export class Viewer {
     this.state.asset = facts.assets.indexOf(first.facts);
     this.history = new History(this.state);
     const changed: Changed = (what = {}) => this.changed(what);
-    this.comparison = new Comparison(references, this.uniforms, this.copy, this.receivers, {
-      wait: () => this.wait(),
-      done: () => this.done(),
-      changed: () => this.changed({ lights: true }),
-      measured: () => this.status(),
-    });
-    if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { wait: () => this.wait(), done: () => this.done(), shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
+    const waits = { wait: () => this.wait(), done: () => this.done() };
+    this.comparison = new Comparison(references, this.uniforms, this.copy, this.receivers, { ...waits, changed: () => this.changed({ lights: true }), measured: () => this.status() });
+    if (facts.cycles) this.cycles = new Cycles(facts.cycles, asset.ambient, { ...waits, shown: () => this.showReference(), switched: () => this.panel.rebuild(), told: () => this.status() });
     model?.applyMatrix4(first.relighting.sceneFromModel());
     const { width, height, quantity } = asset.manifest;
     this.stage = new Stage(renderer, this.uniforms, { width, height }, this.state, this.receivers, facts.camera ?? undefined, model, quantity, changed);
     if (this.state.view === "scene" && !this.stage.canShowScene) this.state.view = "mesh";
-    const { probes } = loaded;
     if (probes && this.stage.canShowMesh) {
       this.ball = new Ball(renderer, new SrbfProbes(probes, { weights: weightsFor(probes, renderer) }), this.uniforms, asset, loaded.first.direct?.scene);
       this.stage.setBall(this.ball, quantity);
       dragBall(renderer.domElement, this.stage, this.state, roomOf(probes), changed);
     }
     this.directions = new DirectionWidget(element<HTMLCanvasElement>("directions"), this.state, asset.manifest.domain, directionPoints(this.loaded.references?.lights, this.subject.centers), changed);
-    this.measures = new Measures(this.state, this.comparison, this.directions, { wait: () => this.wait(), done: () => this.done(), changed });
+    this.measures = new Measures(this.state, this.comparison, this.directions, { ...waits, changed });
     this.panel = new Panel(element("chips"), element("controls"), this.state, this.panelFacts(), {
       changed,
       chooseAsset: () => this.chooseAsset(),
@@ -124,8 +119,7 @@ export class Viewer {
       renderReference: () => void this.cycles?.render(this.state.lights),
       stopReference: () => this.cycles?.stop(),
       redesign: () => {
-        this.state.lights = redesigned(this.subject.asset, this.state.lights);
-        this.state.selected = Math.min(Math.max(this.state.selected, 0), this.state.lights.length - 1);
+        redesign(this.subject.asset, this.state);
         changed({ lights: true, panel: true });
       },
       undo: () => this.step(this.history.undo()),
@@ -215,12 +209,10 @@ export class Viewer {
   }
 
   private firstState(): State {
-    const { manifest } = this.subject.asset;
-    const lights = firstLights(this.subject.asset, this.receivers.bounds);
-    const state = firstState(manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
-    if (this.subject.asset.manifest.scene_lights?.length) state.exposure = 0; // as in Blender
-    const { probes } = this.loaded;
-    if (probes) state.ball = firstBall(probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
+    const { asset } = this.subject;
+    const lights = firstLights(asset, this.receivers.bounds);
+    const state = firstState(asset.manifest, this.inScene ? "scene" : this.loaded.model ? "mesh" : "texels", lights);
+    if (this.loaded.probes) state.ball = firstBall(this.loaded.probes, lights?.find(isPlaced)?.position, this.receivers.bounds.radius);
     return state;
   }
 
@@ -371,20 +363,12 @@ export class Viewer {
 
   /** The light whose nearest baked one is compared with: the selected one, or the first that there is. */
   private comparable(): DirectionalState | PlacedState | undefined {
-    if (!this.inCloud) return this.sun();
-    const selected = this.state.lights[this.state.selected];
-    return isPlaced(selected) ? selected : this.state.lights.find(isPlaced);
+    return (this.inCloud ? placedOf : sunOf)(this.state);
   }
 
   /** Whether lights shine inside the scene. */
   private get inCloud(): boolean {
     return inside(this.subject.asset);
-  }
-
-  private sun(): DirectionalState | undefined {
-    const selected = this.state.lights[this.state.selected];
-    const sun = selected?.kind === "directional" ? selected : this.state.lights.find((light) => light.kind === "directional");
-    return sun?.kind === "directional" ? sun : undefined;
   }
 
   private present(): void {
@@ -406,13 +390,10 @@ export class Viewer {
     this.stage.draw(this.shining);
     this.directions.draw();
     this.panel.refresh();
-    const shown = this.comparison.direction ?? this.sun()?.direction;
+    const shown = this.comparison.direction ?? sunOf(this.state)?.direction;
     bearing(element("bearing"), shown, shown !== undefined && this.directions.inside(shown));
     legend(element("legend"), color, most * 2 ** -state.exposure);
-    const split = element("split");
-    split.hidden = !(comparing && state.compare === "slider");
-    for (const child of split.children) (child as HTMLElement).style.left = `${state.split * 100}%`;
-    (split.querySelector("i") as HTMLElement).ariaValueNow = String(Math.round(100 * state.split));
+    slider(element("split"), comparing && state.compare === "slider", state.split);
     this.status();
   }
 

@@ -18,7 +18,7 @@ interface Receivers {
   readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
 }
 
-/** Irradiance of a light that has bright surfels, a texel per surfel or cluster. */
+/** Irradiance of a light that has bright surfels: one texel for each surfel, or view cluster. */
 export interface Parted {
   /** On surfels, without its part on the bright ones. */
   readonly far: Texture;
