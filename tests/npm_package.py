@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
+from srbf.viewer.built_page import FILES, ROOT
+
 WEB = Path(__file__).resolve().parents[1] / "web"
 BUILD = WEB.parent / "build" / "web"
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -54,6 +56,14 @@ def built(script: str, npm: Callable[..., str], files: Iterable[Path], made: Ite
         if not mark.is_file() or mark.read_text() != digest.hexdigest() or not all(file.is_file() for file in made):
             npm("run", script, *arguments)
             mark.write_text(digest.hexdigest())
+
+
+@pytest.fixture(scope="session", name="built")
+def viewer_page(npm: Callable[..., str]) -> Path:
+    """The folder of the viewer's page, newer than every file that it is made of."""
+    files = [file for part in ("src", "build", "viewer") for file in (WEB / part).rglob("*") if file.is_file()]
+    built("build:viewer", npm, [WEB / "vite.viewer.config.ts", *files], [ROOT / name for name in FILES])
+    return ROOT
 
 
 def browser_program() -> str:

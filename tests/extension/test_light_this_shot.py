@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from npm_package import npm, viewer_page
 from typer.main import get_command
 
 from srbf.cli import app
@@ -16,6 +17,7 @@ from srbf.cli import app
 sys.path.append(str(Path(__file__).parents[1] / "bake"))
 from light_set_commands import scenes_in
 
+__all__ = ["npm", "viewer_page"]  # fixtures
 pytestmark = pytest.mark.blender
 ROOT = Path(__file__).parents[2]
 
@@ -69,6 +71,7 @@ def test_a_bake_that_fails_opens_no_page(in_blender, tmp_path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("built")
 def test_a_true_shot_is_served(in_blender, tmp_path) -> None:
     pytest.importorskip("embreex")
     scene = scenes_in(tmp_path)("room")

@@ -17,24 +17,15 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
-from npm_package import WEB, browser_program, built, driven, npm
+from npm_package import WEB, browser_program, driven, npm, viewer_page
 
-from srbf.viewer.built_page import FILES, ROOT
 from srbf.viewer.contents import contents_of
 from srbf.viewer.server import ViewerServer
 
 TESTS = Path(__file__).resolve().parents[1]
 sys.path.append(str(TESTS / "web"))
 
-__all__ = ["npm"]  # a fixture
-
-
-@pytest.fixture(scope="session", name="built")
-def viewer_page(npm: Callable[..., str]) -> Path:
-    """The page's folder, newer than every file that it is made of."""
-    files = [file for part in ("src", "build", "viewer") for file in (WEB / part).rglob("*") if file.is_file()]
-    built("build:viewer", npm, [WEB / "vite.viewer.config.ts", *files], [ROOT / name for name in FILES])
-    return ROOT
+__all__ = ["npm", "viewer_page"]  # fixtures
 
 
 class Browser:
