@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict, replace
 from typing import Any
 
+import made_profiles
 import numpy as np
 import pytest
 from made_rooms import Room
@@ -13,6 +14,7 @@ from made_views import view_of_room, with_backs, with_lobes, with_specular_albed
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.light_profile import Profile
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 
@@ -69,7 +71,16 @@ def url(browser: Any, asset: Asset) -> str:
 
 
 def told(*lights: Light) -> list[dict[str, Any]]:
-    return [{"kind": NAMES[type(light)], **asdict(light)} for light in lights]
+    return [{"kind": NAMES[type(light)], **asdict(light), **shape_of(light)} for light in lights]
+
+
+def shape_of(light: Light) -> dict[str, Any]:
+    profile = light.profile if isinstance(light, PointLight) else None
+    if profile is None:
+        return {}
+    height, width, _ = profile.table.shape
+    numbers = profile.table.ravel().tolist()
+    return {"profile": {"width": width, "height": height, "numbers": numbers, "projected": profile.projected}}
 
 
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
@@ -138,6 +149,27 @@ def test_a_light_that_stays_is_not_computed_again(browser: Any, url: str) -> Non
     for sets, computed in ((kept, 2), ([*kept, [moved]], 3), ([*kept, [moved], [point]], 4)):
         said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights) for lights in sets], weights="gpu")
         assert said["computed"] == computed
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
+def test_profiles_shape_the_light_on_surfels(browser: Any, asset: Asset, url: str, run: dict[str, str]) -> None:
+    """An uneven one, turned, of a point and of a sphere; a colored picture that a spot projects. One that stays is not computed again."""
+    point: Any = LIGHTS["point"]
+    sphere: Any = LIGHTS["sphere"]
+    spot: Any = LIGHTS["spot"]
+    coarse = Profile(made_profiles.uneven.table[::12, ::24])
+    lights: list[Light] = [
+        replace(point, profile=coarse, direction=(0.5, 0.2, -0.7), roll=0.6),
+        replace(sphere, profile=coarse, direction=(0.0, 0.0, 1.0), roll=-0.3),
+        replace(spot, profile=Profile(made_profiles.picture(), projected=True), roll=0.4),
+    ]
+    sets: list[list[Light]] = [*[[light] for light in lights], lights]
+    drawn = browser.lightmaps(asset=url, light_sets=[told(*own) for own in sets], **run)
+    for shown, own in zip(drawn, sets, strict=True):
+        expected = methods.relight(asset, own)
+        np.testing.assert_allclose(shown, expected, atol=CLOSE * expected.max(), err_msg=str(own))
+    said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights), told(lights[0])], weights="gpu")
+    assert said["computed"] == 3
 
 
 def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:

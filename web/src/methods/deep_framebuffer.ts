@@ -4,7 +4,6 @@ import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
 import { ACROSS, type Gather, gathered, type GatherManifest, readGather, weightRows } from "../gather";
 import { checkSize, type FloatImage, padToFour } from "../image";
-import { rgb } from "../light_values";
 import type { Triple } from "../matrix";
 import { without } from "../near_sources";
 import { Occluders } from "../occluders";
@@ -102,8 +101,7 @@ function projection(gather: Gather): Tables["projectedWeights"] {
   let known = new Map<string, Float64Array>(); // of white lights
   const white = (light: Placed): Float64Array => {
     occluders ??= new Occluders(corners);
-    const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    const irradiance = rgb(received, cells.count);
+    const irradiance = cells.under(light, occluders, FAR, cells.count);
     const distant = light.kind === "directional";
     const near = gather.near?.sources(irradiance, { place: distant ? light.direction : light.position, distant });
     return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, occluders) });
