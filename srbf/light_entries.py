@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from srbf import schemas
@@ -60,6 +61,16 @@ def entry_of(light: Light) -> dict[str, Any]:
             fields["profile"] = light.profile.file[0]
     kind = next((kind for kind, made in KINDS.items() if type(light) is made), "named")
     return {"kind": kind, **fields}
+
+
+def entry_with_file(light: Light, folder: Path, stem: str) -> dict[str, Any]:
+    """`entry_of` a light; the file of its profile is written into a folder, as `stem` and its own suffix."""
+    entry = entry_of(light)
+    if isinstance(light, PointLight) and light.profile is not None and light.profile.file is not None:
+        name, content = light.profile.file
+        entry["profile"] = f"{stem}{Path(name).suffix}"
+        (folder / entry["profile"]).write_bytes(content)
+    return entry
 
 
 def lights_of(

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float64
+from srbf.arrays import Float, Float32, Float64
 
 LEAST_ALPHA = 1e-3
 TABLE, TABLE_SAMPLES = 33, 4096  # of the lobe's own albedo, per side and sample
@@ -79,6 +79,33 @@ def fresnel(
     normal = np.clip((whole - part) / np.maximum(1 - part, 1e-6), 0, 1)
     term = (normal + (1 - normal) * schlick(VoH)[:, None]) / np.maximum(normal * (1 - part) + part, 1e-9)
     return whole * (1 - share + share * term)
+
+
+def reflected(
+    normals: Float[ndarray, "n 3"],
+    view: Float[ndarray, "n 3"],
+    directions: Float[ndarray, "n 3"],
+    color: Float[ndarray, "n 3"],
+    alpha: Float64[ndarray, " n"],
+    share: Float[ndarray, " n"],
+    spread: float = 0.0,
+) -> Float64[ndarray, "n 3"]:
+    """f NoL of lobes of whole albedo `color`, a `share` of which follows Schlick's term, toward unit `view` of light from `directions`.
+
+    `spread`: half the angle (rad) that the light fills, which widens a lobe by as much as the half vector turns.
+    """
+    normals, view = np.asarray(normals, np.float64), np.asarray(view, np.float64)
+    half = view + directions
+    half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-30)
+    NoV, NoL, NoH = (np.einsum("nc,nc->n", normals, other) for other in (view, directions, half))
+    NoV, VoH = np.maximum(NoV, 1e-3), np.einsum("nc,nc->n", view, half)
+    whole, grazing = albedo_terms(NoV, alpha)
+    return (lobe(NoL, NoV, NoH, np.hypot(alpha, spread / 2)) / whole)[:, None] * fresnel(VoH, color, share, grazing)
+
+
+def albedo_table() -> Float32[ndarray, "T T 2"]:
+    """The table of `albedo_terms`, for `glsl/gloss/lobe_albedo.glsl`: rows by cosine, columns by roughness, the two terms."""
+    return _table()[1].astype(np.float32)
 
 
 def _masking(cosine: ndarray, squared: ndarray) -> ndarray:

@@ -18,5 +18,5 @@ layout(location = 0) out vec4 response;
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec3 reflected = texelFetch(reflectance, min(at, textureSize(reflectance, 0) - 1), 0).rgb;
-    response = vec4(reflected * srbfNeighborLight(neighbors, layers, light, at), 1.0);
+    response = vec4(reflected * srbfNeighborLight(neighbors, 0, layers, light, at), 1.0);
 }

@@ -9,9 +9,14 @@ precision highp sampler2D;
 #include "combine/direct.glsl"
 #include "lights/light_vector.glsl"
 #include "lights/point_light_strength.glsl"
+#include "lights/profile.glsl"
 #include "shadow/cube_face.glsl"
 #include "shadow/point_shadow_place.glsl"
 #include "shadow/shadow_fraction.glsl"
+#ifdef SRBF_LOBES
+#include "gloss/texel_lobe.glsl"
+#include "surfels/tangents.glsl"
+#endif
 
 uniform sampler2D points;
 uniform sampler2D normals;
@@ -26,16 +31,75 @@ uniform float reach;
 uniform int face;         // of a cube; -1: the map holds all that the light shines on
 uniform float lambertian; // 1: a part of an area that shines towards the light's axis, by the cosine to it; 0: a point or spot light
 uniform float weight;
+uniform sampler2D profile;
+uniform bool profiled;    // whether the light has a profile
+uniform vec3 profileAcross;
+uniform vec3 profileUp;
+uniform float profileTangent;
+uniform vec4 ball;        // middle of a sphere, less the origin of the points, and its radius; radius 0 otherwise
+#ifdef SRBF_LOBES
+uniform sampler2D glossy;      // whole albedo of each texel's lobe
+uniform sampler2D lobes;       // its roughness, what share of it has a Fresnel term, above 0 where there is one
+uniform sampler2D lobeAlbedo;  // as srbfLobeAlbedo takes it
+uniform vec4 eye;              // a place, less the same origin as the points, and 1; or the unit direction to it, and 0
+uniform vec3 partAcross;       // sides of the part of an area that the look stands for, meters; 0 otherwise
+uniform vec3 partUp;
+uniform int ballPart;          // which of ballParts
+uniform int ballParts;
+#endif
 
 layout(location = 0) out vec4 response;
 
 const float STEEPEST = 16.0;  // meters per meter: a steeper receiver's plane is ignored
 const float BIAS = 0.5;       // map texels
+#ifdef SRBF_LOBES
+const float ROUGH = 0.35;     // roughness from which fewer places of a light do
+#endif
+
+#ifdef SRBF_LOBES
+// What the lobe reflects of the look's part of the light, nothing between: at several places of a light with a size, each as wide as its share.
+vec3 reflected(ivec2 at, vec3 point, vec3 normal, vec3 lightVector) {
+    const float GOLDEN_ANGLE = 2.39996323;
+    float roughness = texelFetch(lobes, at, 0).r;
+    int side = roughness < ROUGH ? 4 : 2;  // places per side of a part of an area
+    int count = 1;
+    float size = 0.0;  // of the piece of light about a place, meters across
+    vec3 middle = lightVector;
+    vec3 discAcross;  // of a ball's disc, as the receiver sees it
+    vec3 discUp;
+    srbfTangents(srbfLightDirection(ball.xyz - point), discAcross, discUp);
+    if (ball.w > 0.0) {
+        count = side * side / 2;
+        size = ball.w * sqrt(3.14159265 / float(count * ballParts));
+        middle = ball.xyz - point;
+    } else if (partAcross != vec3(0.0)) {
+        count = side * side;
+        size = sqrt(length(partAcross) * length(partUp)) / float(side);
+    }
+    vec3 total = vec3(0.0);
+    for (int i = 0; i < count; ++i) {
+        vec3 toPlace = middle;
+        if (ball.w > 0.0) {
+            float number = float(i * ballParts + ballPart) + 0.5;
+            float away = ball.w * sqrt(number / float(count * ballParts));
+            toPlace += away * (cos(GOLDEN_ANGLE * number) * discAcross + sin(GOLDEN_ANGLE * number) * discUp);
+        } else if (count > 1) {
+            vec2 part = (vec2(float(i % side), float(i / side)) + 0.5) / float(side) - 0.5;
+            toPlace += part.x * partAcross + part.y * partUp;
+        }
+        vec3 toLight = srbfLightDirection(toPlace);
+        float strength = srbfPointLightStrength(pointLight, ball.w > 0.0 ? middle : toPlace) * mix(1.0, max(dot(-toLight, pointLight.axis), 0.0), lambertian);
+        total += srbfTexelLobe(glossy, lobes, lobeAlbedo, at, point, normal, eye, toLight, 0.5 * size / max(length(toPlace), 1e-6)) * strength;
+    }
+    return total / float(count);
+}
+#endif
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy);
     vec3 normal = texelFetch(normals, at, 0).xyz;
-    vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, texelFetch(points, at, 0).xyz);
+    vec3 point = texelFetch(points, at, 0).xyz;
+    vec3 lightVector = srbfLightVector(pointLight.position, pointLight.positionLow, point);
     vec3 fromLight = -lightVector;
     bool seen = face < 0 ? dot(fromLight, ahead) > 0.0 : srbfCubeFace(fromLight) == face;
     if (!seen) {
@@ -51,5 +115,11 @@ void main() {
     vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
     visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
+    if (profiled) {
+        visibility *= srbfProfile(profile, ball.w > 0.0 ? point - ball.xyz : fromLight, pointLight.axis, profileAcross, profileUp, profileTangent);
+    }
     response = vec4(srbfDirect(normal, toLight, visibility) * strength * weight, 1.0);
+#ifdef SRBF_LOBES
+    response.rgb += reflected(at, point, normal, lightVector) * visibility * weight;
+#endif
 }

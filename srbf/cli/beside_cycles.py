@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -17,8 +16,8 @@ from srbf.cli.terminal import note, progress_bar
 from srbf.errors import MissingLibraryError
 from srbf.evaluation.flip import Flip
 from srbf.io.image import write_image
-from srbf.light_entries import entry_of
-from srbf.lights import Light, PointLight
+from srbf.light_entries import entry_with_file
+from srbf.lights import Light
 
 PEAK = 0.999  # quantile of the reference
 
@@ -42,7 +41,7 @@ def compare(
     if (line := changed_line(asset, scene)) is not None:
         note(line)
     with progress_bar("Cycles") as update, tempfile.TemporaryDirectory(prefix="srbf-") as folder:
-        entries = [_with_file(light, Path(folder), f"{number}") for number, light in enumerate(lights)]
+        entries = [entry_with_file(light, Path(folder), f"{number}") for number, light in enumerate(lights)]
         made = render_given(asset, scene, entries, samples, update, lambda line: None, blender, profiles=Path(folder))
     covered = asset.covered
     relit, reference = image[covered].astype(np.float64), made.image[covered].astype(np.float64)
@@ -55,13 +54,3 @@ def compare(
     write_image(path_beside(output), made.image, "float")
     note(f"wrote {path_beside(output)}: {samples} samples in {made.render_seconds:.1f} s, {made.seconds:.1f} s with opening the scene")
     note(f"relative rmse {np.sqrt(mean / power):.2%}, psnr {psnr:.2f} dB{flip}")
-
-
-def _with_file(light: Light, folder: Path, stem: str) -> dict[str, Any]:
-    """The entry of a light; the file of its profile is written into a folder."""
-    entry = entry_of(light)
-    if isinstance(light, PointLight) and light.profile is not None and light.profile.file is not None:
-        name, content = light.profile.file
-        entry["profile"] = f"{stem}{Path(name).suffix}"
-        (folder / entry["profile"]).write_bytes(content)
-    return entry

@@ -113,10 +113,10 @@ def read_profile(path: Path) -> Profile:
     return Profile(pixels, projected=True, file=(path.name, path.read_bytes()))
 
 
-def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
+def read_frames(path: Path, falloff: Falloff = "linear", known: Profiles | None = None) -> list[list[Light]]:
     """The lights of every frame of a FRAMES.json; files are found beside it. ManifestError, InputError on bad ones.
 
-    `falloff`: of point and spot lights that do not say it.
+    `falloff`: of point and spot lights that do not say it; `known`: the profile of a name without a file there, of the scene's own lights.
     """
     document = files.read_json(path)
     schemas.check(document, "frames", str(path))
@@ -124,7 +124,8 @@ def read_frames(path: Path, falloff: Falloff = "linear") -> list[list[Light]]:
 
     @functools.cache
     def profile(name: str) -> Profile:
-        return read_profile(path.parent / name)
+        own = path.parent / name
+        return read_profile(own) if known is None or own.is_file() else known(name)
 
     for number, frame in enumerate(document["frames"]):
         try:

@@ -45,7 +45,7 @@ from srbf.relighting import probe_light
 from srbf.relighting.alpha import Alpha, alpha_of, with_alpha, write_png
 from srbf.relighting.direct_light import Added, Direct, chosen
 from srbf.relighting.relighter import Relighter
-from srbf.relighting.scene_lights import lines_of, scene_lights
+from srbf.relighting.scene_lights import lines_of, profiles_of, scene_lights
 from srbf.visibility.embree import has_embree
 
 FRAMES_MARKER = "0000.exr"
@@ -252,7 +252,8 @@ def relight(
         raise typer.BadParameter("expected straight alpha for a PNG, whose format knows no other, found premultiplied; write an EXR")
     if lights is not None:
         opened = _opened(asset, painted, ambient)
-        frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff)
+        known = profiles_of(opened) if "scene_profiles" in opened.manifest else None
+        frames = read_frames(lights, falloff or domain_of_asset(opened.manifest).falloff, known)
         _relight_frames(opened, output, frames, direct, renderer, alpha, force, seen_from, fade, 1 / fps, shadows, harmonics)
         return
     placed += map(read_environment, environment or [])

@@ -6,7 +6,7 @@ import functools
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
-from srbf.light_entries import lights_of
+from srbf.light_entries import Profiles, lights_of
 from srbf.light_profile import Profile
 from srbf.lights import Light
 
@@ -40,16 +40,21 @@ def scene_lights(asset: Asset) -> dict[str, Light]:
     listed = asset.manifest.get("scene_lights", [])
     if not listed:
         raise InputError("expected an asset that lists its scene's lights, found none; bake a scene with lights with `light_set=gather`")
-    texts = asset.manifest.get("scene_profiles", {})
+    lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}", profiles=profiles_of(asset))
+    return dict(zip((one["name"] for one in listed), lights, strict=True))
+
+
+def profiles_of(asset: Asset) -> Profiles:
+    """The profile of a name that the scene's own lights have for it; InputError for other names, and for a damaged file."""
+    texts: dict[str, str] = asset.manifest.get("scene_profiles", {})
 
     @functools.cache
     def profile(name: str) -> Profile:
         if name not in texts:
-            raise InputError(f"expected the profile {name!r} among its `scene_profiles`, found none; fit again")
+            raise InputError(f"expected a profile of the asset's scene ({', '.join(texts) or 'which has none'}), found {name!r}")
         return Profile.of_ies(texts[name].encode(), name)
 
-    lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}", profiles=profile)
-    return dict(zip((one["name"] for one in listed), lights, strict=True))
+    return profile
 
 
 def lines_of(asset: Asset) -> list[str]:

@@ -9,11 +9,12 @@ from pathlib import Path
 
 from srbf.asset import MANIFEST, Asset
 from srbf.capture import Capture
+from srbf.channels import GLOSS
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.light_domain import domain_of_asset
 from srbf.methods import method_of
-from srbf.viewer import page_manifest
+from srbf.viewer import light_tables, page_manifest
 from srbf.viewer.built_page import page_files
 from srbf.viewer.cycles import PLACE, CyclesRenders
 from srbf.viewer.measures import Measures
@@ -62,10 +63,6 @@ def contents_of(
     compared = references if references is not None and references.compared else None
     if references is not None and compared is None:
         notes.append("the page compares directional and point lights with a capture: of this one it uses the spectrum alone")
-    if any("gloss_links" in asset.tables for asset in assets):
-        notes.append("the page shows what surfaces reflect diffusely: `srbf relight` adds what gloss reflects")
-    if any("behind_neighbors" in asset.tables for asset in assets):
-        notes.append("the page shows translucent surfaces by what they reflect: `srbf relight` adds what they let through")
     if renders is not None and renders.changed:
         notes.append(renders.changed)
     shown = shown_mesh(assets[0], mesh, notes)
@@ -82,7 +79,15 @@ def contents_of(
         if compared is not None:
             errors = f"{CAPTURE}errors-{i}.json"
             contents[errors] = partial(measures.errors, i)
-        told.append(page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors))
+        profiles = {}
+        for number, (profile, made) in enumerate(light_tables.profiles_of(asset).items()):
+            profiles[profile] = f"profile-{i}-{number}.exr"
+            contents[profiles[profile]] = made
+        own = page_manifest.described(asset, name, place, f"spectrum-{i}.json", errors)
+        if set(GLOSS) <= asset.images.keys():
+            contents[light_tables.LOBE_ALBEDO] = light_tables.lobe_albedo
+            own["lobe_albedo"] = light_tables.LOBE_ALBEDO
+        told.append({**own, "profiles": profiles})
     if shown is not None:
         contents[page_manifest.MESH] = shown
     if probed is not None and probes is not None:

@@ -13,7 +13,9 @@ from srbf.asset import Asset
 from srbf.bake.given_reference import GivenReference, StoppedError, changed_line, render_given, require_view
 from srbf.errors import InputError, SrbfError
 from srbf.io.image import write_image
-from srbf.light_entries import lights_of
+from srbf.light_entries import entry_with_file, lights_of
+from srbf.lights import Light
+from srbf.relighting.scene_lights import profiles_of
 
 PLACE = "cycles"  # what the page posts to, and the folder of what it gets
 MOST_BYTES = 1 << 20  # of a request
@@ -50,7 +52,7 @@ class CyclesRenders:
             lights, samples = asked["lights"], asked["samples"]
             if not (isinstance(lights, list) and len(lights) <= MOST_LIGHTS and isinstance(samples, int)):
                 raise InputError(f"expected at most {MOST_LIGHTS} `lights` and a number of `samples`, found others")
-            lights_of(lights, "the page's lights")
+            lights = lights_of(lights, "the page's lights", profiles=profiles_of(self._asset))
         except (ValueError, KeyError, TypeError, SrbfError) as error:
             return HTTPStatus.BAD_REQUEST, {"error": " ".join(str(error).split())}
         with self._mutex:
@@ -85,12 +87,16 @@ class CyclesRenders:
             write_image(path, self._image.image, "float")
             return path.read_bytes()
 
-    def _render(self, number: int, lights: list[dict[str, Any]], samples: int, halt: threading.Event) -> None:
+    def _render(self, number: int, lights: list[Light], samples: int, halt: threading.Event) -> None:
         def progress(done: int, total: int) -> None:
             self._tell(number, state="rendering", done=done, samples=total)
 
         try:
-            found = render_given(self._asset, self._scene, lights, samples, progress, blender=self._blender, stop=halt)
+            with tempfile.TemporaryDirectory(prefix="srbf-") as folder:
+                entries = [entry_with_file(light, Path(folder), f"{i}") for i, light in enumerate(lights)]
+                found = render_given(
+                    self._asset, self._scene, entries, samples, progress, blender=self._blender, stop=halt, profiles=Path(folder)
+                )
         except StoppedError:
             self._tell(number, state="stopped")
         except SrbfError as error:

@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight
-from srbf.microfacets import albedo_terms, alpha_of, fresnel, lobe
+from srbf.microfacets import alpha_of, reflected
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.rays import RayTracer, Samples
@@ -60,13 +60,7 @@ class GlossyPixels:
         self, pixels: Int[ndarray, " n"], points: ndarray, normals: ndarray, directions: Float64[ndarray, "n 3"]
     ) -> Float64[ndarray, "n 3"]:
         """f NoL of the lobes of some pixels, at points with normals, of light from unit `directions`."""
-        view, normals = self.view(points), np.asarray(normals, np.float64)
-        half = view + directions
-        half /= np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-30)
-        NoV, NoL, NoH = (np.einsum("nc,nc->n", normals, other) for other in (view, directions, half))
-        NoV, VoH, alpha = np.maximum(NoV, 1e-3), np.einsum("nc,nc->n", view, half), self.alpha[pixels]
-        whole, grazing = albedo_terms(NoV, alpha)
-        return (lobe(NoL, NoV, NoH, alpha) / whole)[:, None] * fresnel(VoH, self.color[pixels], self.share[pixels], grazing)
+        return reflected(normals, self.view(points), directions, self.color[pixels], self.alpha[pixels], self.share[pixels])
 
 
 class GlossyRays:

@@ -92,10 +92,11 @@ def _(evaluate: Evaluate) -> None:
     chosen, weights = rng.integers(0, clusters, (layers, side, side)), rng.integers(0, 256, (layers, side, side))
     weights[:, 0, 0] = 0  # a pixel of nothing
     neighbors = np.stack([chosen & 255, chosen >> 8, weights], axis=-1) / 255
+    neighbors = np.concatenate([np.ones_like(neighbors[:1]), neighbors])  # a layer before
     at = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2)
     found = evaluate(
         "methods/deep_framebuffer.glsl",
-        f"vec4(srbfNeighborLight(neighbors, {layers}, light, ivec2(a.xy)), 0.0)",
+        f"vec4(srbfNeighborLight(neighbors, 1, {layers}, light, ivec2(a.xy)), 0.0)",
         vec4(at.astype(np.float32), np.zeros(len(at))),
         images={"neighbors": neighbors.astype(np.float32), "light": folded(light)},
     )

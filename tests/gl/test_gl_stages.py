@@ -45,6 +45,7 @@ DEFINES: dict[str, list[dict[str, object]]] = {
     **{f"{method}projected.frag": PROJECTED for method in METHODS[1:]},
     **{f"{method}{kind}.frag": LIT_PLANES if method else LIT_MAPS for method in METHODS for kind in ("lights", "lightmap")},
     **{f"{method}accumulate.frag": UNITS for method in METHODS},
+    **{stage: [{}, {"SRBF_LOBES": 1}] for stage in ("direct.frag", "direct_point.frag")},
     "neural_map_distant.frag": [NETWORK | {"SRBF_DISTANT": 4}],
     "neural_map_points.frag": [
         NETWORK | point_lights for point_lights in ({"SRBF_POINT_LIGHTS": 1}, {"SRBF_POINT_LIGHTS": 8, "SRBF_DEPTH": 1})

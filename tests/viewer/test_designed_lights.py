@@ -7,12 +7,14 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import pytest
+from made_profiles import UNEVEN
 from made_rooms import Room
 from made_views import view_of_room
 from test_page import HEIGHT, WIDTH, ZOOM
@@ -20,6 +22,7 @@ from test_shot import EXPOSURE, shows
 
 from srbf.asset import Asset
 from srbf.cli.light_arguments import read_frames
+from srbf.light_profile import axes_of
 from srbf.lights import AreaLight, PointLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.scene_lights import scene_lights
@@ -62,6 +65,26 @@ print("TOLD" + json.dumps({
              [c.name for c in o.users_collection], getattr(o.data, "size", 0), getattr(o.data, "shape", "")]
     for o in bpy.data.objects
 }))
+"""
+
+TEXTURED = """
+import json, sys, bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+made = bpy.data.objects.new("Washer", bpy.data.lights.new("Washer", "POINT"))
+bpy.context.scene.collection.objects.link(made)
+made.data.use_nodes = True
+tree = made.data.node_tree
+shader = next(node for node in tree.nodes if node.type == "EMISSION")
+texture = tree.nodes.new("ShaderNodeTexIES")
+texture.inputs["Strength"].default_value = 2
+shader.inputs["Color"].default_value = (0.5, 0.2, 0.1, 1)
+tree.links.new(texture.outputs["Fac"], shader.inputs["Strength"])
+exec(open(sys.argv[1]).read())
+bpy.context.view_layer.update()
+told = made.data
+from_nodes = [link.from_node.type for link in tree.links if link.to_socket == shader.inputs["Strength"]]
+print("TOLD" + json.dumps([told.energy, list(told.color), [list(row) for row in made.matrix_world], from_nodes,
+                           list(shader.inputs["Color"].default_value), told.use_nodes]))
 """
 
 
@@ -141,20 +164,41 @@ def test_more_lights_than_the_page_takes_are_named(chromium: Any, asset: Asset, 
     assert "lights past 16: Bulb 16, Bulb 17" in chromium("run", script="document.getElementById('status').textContent")
 
 
-def test_profiles_are_named_as_missing_and_refused_in_frames(
-    chromium: Any, asset: Asset, serve: Callable[..., str], tmp_path: Path
-) -> None:
-    shaped = [{"name": "Washer", "light": {**LIGHTS[0]["light"], "profile": "Downlight.ies", "roll": 0.5}}, *LIGHTS[1:]]
-    before, asset.manifest["scene_lights"] = asset.manifest["scene_lights"], shaped
-    asset.save(tmp_path / "shaped")
-    asset.manifest["scene_lights"] = before
-    chromium("open", url=serve(tmp_path / "shaped"), width=WIDTH, height=HEIGHT)
+@pytest.fixture
+def shaped(asset: Asset, tmp_path: Path) -> Path:
+    """An asset one of whose scene's lights has an IES file."""
+    washer = {**LIGHTS[0]["light"], "profile": "Downlight.ies", "direction": [0.6, 0.0, -0.8], "roll": 0.5}
+    own = {"scene_lights": [{"name": "Washer", "light": washer}, *LIGHTS[1:]], "scene_profiles": {"Downlight.ies": UNEVEN}}
+    replace(asset, manifest={**asset.manifest, **own}).save(tmp_path / "shaped")
+    return tmp_path / "shaped"
+
+
+def test_frames_take_profiles_of_the_scene_alone(chromium: Any, shaped: Path, serve: Callable[..., str]) -> None:
+    chromium("open", url=serve(shaped), width=WIDTH, height=HEIGHT)
     assert names(chromium)[0] == "Washer"
-    status = "document.getElementById('status').textContent"
-    assert "lights shown without their IES profiles: Washer" in chromium("run", script=status)
-    frames = json.dumps({"frames": [{"lights": [shaped[0]["light"]]}]})
-    chromium("drop", name="FRAMES.json", bytes=base64.b64encode(frames.encode()).decode())
-    assert "expected lights without a profile" in chromium("run", script="document.getElementById('toast').textContent")
+    for profile, said in (("Downlight.ies", ""), ("Other.ies", "expected a profile of Downlight.ies")):
+        frames = json.dumps({"frames": [{"lights": [{**LIGHTS[0]["light"], "profile": profile, "roll": 0.25}]}]})
+        chromium("drop", name="FRAMES.json", bytes=base64.b64encode(frames.encode()).decode())
+        assert said in chromium("run", script="document.getElementById('toast').textContent")
+    (light,) = chromium.state()["lights"]
+    assert light["profile"] == "Downlight.ies" and light["roll"] == pytest.approx(np.degrees(0.25), abs=1e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.blender
+def test_the_script_keeps_the_texture_of_a_light_with_a_profile(
+    chromium: Any, shaped: Path, serve: Callable[..., str], tmp_path: Path
+) -> None:
+    """Its strength is what the page says over that of the texture; the object is turned so that the profile is."""
+    chromium("open", url=serve(shaped), width=WIDTH, height=HEIGHT)
+    script = tmp_path / "lights.py"
+    script.write_bytes(chromium.file("Lights for Blender (Python)"))
+    done = subprocess.run([sys.executable, "-c", TEXTURED, str(script)], capture_output=True, text=True, check=True)
+    energy, color, matrix, strength, emission, nodes = json.loads(done.stdout.split("TOLD")[1].splitlines()[0])
+    assert nodes and strength == ["TEX_IES"] and emission == [1, 1, 1, 1]
+    assert 2 * energy * np.array(color) == pytest.approx(4 * np.pi * np.array(LIGHTS[0]["light"]["color"]), rel=1e-5)
+    expected = np.stack(axes_of((0.6, 0.0, -0.8), 0.5), axis=1) * [1, 1, -1]
+    np.testing.assert_allclose(np.array(matrix)[:3, :3], expected, atol=1e-5)
 
 
 def test_frames_have_their_names_and_exact_colors(chromium: Any, asset: Asset, page: Callable[..., None], tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from srbf.cli.light_arguments import read_frames
 from srbf.io.image import encode_srgb, read_image, write_image
 from srbf.lights import DirectionalLight, EnvironmentLight, Light
 from srbf.methods import linear_response, relight
+from srbf.relighting.scene_lights import profiles_of
 
 ZOOM = 16
 WIDTH, HEIGHT = 800, 520
@@ -39,10 +40,11 @@ def shows(chromium: Any, asset: Asset, lights: list[Light], exposure: float = 0.
     return bool((np.abs(chromium.texels(asset.width, asset.height, ZOOM) - expected) <= STEP).all())
 
 
-def lights_of(chromium: Any, folder: Path, button: str = "Lights (FRAMES.json)") -> list[list[Light]]:
+def lights_of(chromium: Any, folder: Path, button: str = "Lights (FRAMES.json)", known: Asset | None = None) -> list[list[Light]]:
+    """`known`: the asset whose scene's profiles they may have."""
     path = folder / "FRAMES.json"
     path.write_bytes(chromium.file(button))
-    return read_frames(path)
+    return read_frames(path, known=None if known is None else profiles_of(known))
 
 
 @pytest.fixture

@@ -151,9 +151,11 @@ def test_the_page_is_served_the_places_that_bright_surfels_light(asset: Asset, t
     assert "asset/view_points.exr" in contents_of([tmp_path / "asset"])
 
 
-def test_the_page_says_that_it_shows_no_gloss_and_no_light_from_behind(asset: Asset, tmp_path: Path) -> None:
-    made = {"plain": asset, "shiny": with_lobes(asset), "thin": with_backs(asset)}
-    for name, one in made.items():
+def test_the_page_is_served_what_lobes_and_backs_need(asset: Asset, tmp_path: Path) -> None:
+    for name, one in {"plain": asset, "shiny": with_lobes(asset), "thin": with_backs(asset)}.items():
         one.save(tmp_path / name)
-    notes = {name: json.loads(read(contents_of([tmp_path / name])[page_manifest.NAME]))["notes"] for name in made}
-    assert not notes["plain"] and any("gloss" in note for note in notes["shiny"]) and any("let through" in note for note in notes["thin"])
+    found = {name: contents_of([tmp_path / name]) for name in ("plain", "shiny", "thin")}
+    told = {name: json.loads(read(contents[page_manifest.NAME])) for name, contents in found.items()}
+    assert not any(one["notes"] for one in told.values())
+    assert told["shiny"]["assets"][0]["lobe_albedo"] in found["shiny"] and "lobe_albedo" not in told["plain"]["assets"][0]
+    assert {"asset/glossy.exr", "asset/gloss_neighbors.png"} <= found["shiny"].keys() and "asset/transmission.exr" in found["thin"]

@@ -6,19 +6,22 @@ import json
 from dataclasses import asdict, replace
 from typing import Any
 
+import made_profiles
 import numpy as np
 import pytest
 from made_rooms import Room
-from made_views import view_of_room
+from made_views import view_of_room, with_backs, with_lobes, with_specular_albedo
 
 from srbf import methods
 from srbf.asset import Asset
+from srbf.light_profile import Profile
 from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 
 pytest.importorskip("embreex")
 
 CLOSE = 2e-3  # of the largest value; 3e-4 measured in SwiftShader, of bounces that are left out
+SEEN = 5e-3  # of lobes, which see few surfels: one of them at the edge of a shadow counts for more
 RIM = 1e-2  # of a directional light, at whose edge of a shadow one of 700 surfels is lit in part
 LIGHTS: dict[str, Light] = {
     "point": PointLight((0.8, 0.7, 1.1), (1, 0.5, 0.2), falloff="inverse-square"),
@@ -36,6 +39,12 @@ NAMES: dict[type[Light], str] = {
 }
 
 
+RUNS = [
+    *[{"run": "three-lightmap", "weights": weights} for weights in ("gpu", "cpu")],
+    *[{"run": "nodes-lightmap", "weights": "cpu", "backend": backend} for backend in ("webgl", "webgpu")],
+]
+
+
 @pytest.fixture(scope="module")
 def asset(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     """Of a room without a lid."""
@@ -51,22 +60,30 @@ def divided(tmp_path_factory: pytest.TempPathFactory) -> Asset:
 
 
 @pytest.fixture(scope="module")
+def shiny(divided: Asset) -> Asset:
+    """With lobes that see surfels reflect more than other surfels do, and pixels that let light through."""
+    return with_backs(with_specular_albedo(divided))
+
+
+@pytest.fixture(scope="module")
 def url(browser: Any, asset: Asset) -> str:
     return browser.serve(asset)
 
 
 def told(*lights: Light) -> list[dict[str, Any]]:
-    return [{"kind": NAMES[type(light)], **asdict(light)} for light in lights]
+    return [{"kind": NAMES[type(light)], **asdict(light), **shape_of(light)} for light in lights]
 
 
-@pytest.mark.parametrize(
-    "run",
-    [
-        *[{"run": "three-lightmap", "weights": weights} for weights in ("gpu", "cpu")],
-        *[{"run": "nodes-lightmap", "weights": "cpu", "backend": backend} for backend in ("webgl", "webgpu")],
-    ],
-    ids=lambda run: "-".join(run.values()),
-)
+def shape_of(light: Light) -> dict[str, Any]:
+    profile = light.profile if isinstance(light, PointLight) else None
+    if profile is None:
+        return {}
+    height, width, _ = profile.table.shape
+    numbers = profile.table.ravel().tolist()
+    return {"profile": {"width": width, "height": height, "numbers": numbers, "projected": profile.projected}}
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
 def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run: dict[str, str]) -> None:
     """Of every kind of light, then all, then all in other colors, then none."""
     point: Any = LIGHTS["point"]
@@ -78,6 +95,31 @@ def test_the_picture_is_that_of_numpy(browser: Any, asset: Asset, url: str, run:
         expected = methods.relight(asset, lights)
         tolerance = RIM if any(isinstance(light, DirectionalLight) for light in lights) else CLOSE
         np.testing.assert_allclose(picture, expected, atol=tolerance * max(expected.max(), 1e-9), err_msg=str(lights))
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
+def test_lobes_and_backs_show_what_numpy_says(browser: Any, shiny: Asset, run: dict[str, str]) -> None:
+    """Under a light in the open, one close to a wall, whose light bright surfels send, and both; with few bounces, all, and none."""
+    close = PointLight((0.03, 1.2, 0.9), (1, 0.5, 0.2), falloff="inverse-square")
+    sets: list[list[Light]] = [[LIGHTS["point"]], [close], [close, LIGHTS["area"]]]
+    told_bounces = (1, 12, 0) if run["run"] == "three-lightmap" else (12,)
+    for bounces in told_bounces:
+        limited = replace(shiny, manifest={**shiny.manifest, "gather": {**shiny.manifest["gather"], "bounces": bounces}})
+        drawn = browser.lightmaps(asset=browser.serve(limited), light_sets=[told(*lights) for lights in sets], **run)
+        for picture, lights in zip(drawn, sets, strict=True):
+            expected = methods.relight(limited, lights)
+            assert (expected.max() > 0) == (bounces > 0)
+            np.testing.assert_allclose(picture, expected, atol=SEEN * max(expected.max(), 1e-9), err_msg=str(lights))
+    for lights in sets:
+        seen, others = (methods.relight(one, lights) for one in (shiny, with_backs(with_lobes(divided_of(shiny)))))
+        assert np.abs(seen - others).max() > 10 * CLOSE * seen.max()
+
+
+def divided_of(shiny: Asset) -> Asset:
+    """Without what only lobes see."""
+    pool = shiny.tables["pool"][:3]
+    gather = {key: value for key, value in shiny.manifest["gather"].items() if key != "specular_albedo"}
+    return replace(shiny, manifest={**shiny.manifest, "gather": gather}, tables={**shiny.tables, "pool": pool})
 
 
 @pytest.mark.parametrize("weights", ["gpu", "cpu"])
@@ -109,6 +151,27 @@ def test_a_light_that_stays_is_not_computed_again(browser: Any, url: str) -> Non
         assert said["computed"] == computed
 
 
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
+def test_profiles_shape_the_light_on_surfels(browser: Any, asset: Asset, url: str, run: dict[str, str]) -> None:
+    """An uneven one, turned, of a point and of a sphere; a colored picture that a spot projects. One that stays is not computed again."""
+    point: Any = LIGHTS["point"]
+    sphere: Any = LIGHTS["sphere"]
+    spot: Any = LIGHTS["spot"]
+    coarse = Profile(made_profiles.uneven.table[::12, ::24])
+    lights: list[Light] = [
+        replace(point, profile=coarse, direction=(0.5, 0.2, -0.7), roll=0.6),
+        replace(sphere, profile=coarse, direction=(0.0, 0.0, 1.0), roll=-0.3),
+        replace(spot, profile=Profile(made_profiles.picture(), projected=True), roll=0.4),
+    ]
+    sets: list[list[Light]] = [*[[light] for light in lights], lights]
+    drawn = browser.lightmaps(asset=url, light_sets=[told(*own) for own in sets], **run)
+    for shown, own in zip(drawn, sets, strict=True):
+        expected = methods.relight(asset, own)
+        np.testing.assert_allclose(shown, expected, atol=CLOSE * expected.max(), err_msg=str(own))
+    said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights), told(lights[0])], weights="gpu")
+    assert said["computed"] == 3
+
+
 def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:
     said = browser.response("nodes-lightmap", asset=url, lightSets=[[]], weights="gpu", backend="webgl")
     assert 'weights: "cpu"' in said["error"]
@@ -124,8 +187,10 @@ def test_a_manifest_without_what_it_needs_is_refused(browser: Any, asset: Asset,
 
 
 @pytest.mark.parametrize("run", ["babylon-material", "playcanvas-material"])
-def test_other_engines_show_what_rays_on_the_host_say(browser: Any, asset: Asset, url: str, run: str) -> None:
+def test_other_engines_show_what_rays_on_the_host_say(browser: Any, asset: Asset, run: str) -> None:
     lights = [LIGHTS["point"], LIGHTS["spot"]]
+    asset = with_backs(with_specular_albedo(asset))
+    url = browser.serve(asset)
     shown = browser.picture(run, asset=url, lights=lights, color=(1.0, 1.0, 1.0), half=(1.0, 1.0, 0.0))
     expected, covered = methods.relight(asset, lights), asset.images["coverage"] > 0.5
     np.testing.assert_allclose(shown[covered], expected[covered], atol=CLOSE * expected.max())

@@ -5,7 +5,7 @@ import { decodeFloat, decodeHalf } from "./exr";
 import { AssetFiles, type Fetch, fetched } from "./files";
 import { checkSize, type FloatImage, padToFour } from "./image";
 import { decodeKtx2 } from "./ktx2";
-import { checkStack, type LayerStack } from "./layers";
+import { checkStack, extended, type LayerStack } from "./layers";
 import { checkManifest, isPicture, type LayerEntry, layersOf, type Manifest, methodOf } from "./manifest";
 import { IDENTITY, type Matrix4 } from "./matrix";
 import type { Method, ReadOptions, Tables } from "./methods/method";
@@ -66,13 +66,14 @@ export async function loadAsset(url: string, options: LoadOptions = {}): Promise
     readAlpha(files, manifest),
     readProbes(files, manifest),
   ]);
+  const further = tables.furtherLayers ?? [];
   return {
     manifest,
     method,
     tables,
-    layers,
-    scale: fours(entries, "scale"),
-    bias: fours(entries, "bias"),
+    layers: extended(layers, further, place),
+    scale: fours(entries, "scale", further.length, 1),
+    bias: fours(entries, "bias", further.length, 0),
     position,
     ambient,
     alpha,
@@ -123,8 +124,9 @@ async function readAlpha(files: AssetFiles, manifest: Manifest): Promise<FloatIm
   return data.every((share) => share === 1) ? undefined : { kind: "float", width, height, channels: 1, data };
 }
 
-function fours(entries: LayerEntry[], key: "scale" | "bias"): Float32Array {
-  const out = new Float32Array(4 * entries.length);
+/** `further`: layers that come after the entries', with this value. */
+function fours(entries: LayerEntry[], key: "scale" | "bias", further: number, value: number): Float32Array {
+  const out = new Float32Array(4 * (entries.length + further)).fill(value, 4 * entries.length);
   entries.forEach((entry, i) => out.set(entry[key], 4 * i));
   return out;
 }

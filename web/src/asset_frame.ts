@@ -37,6 +37,9 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   const taken: readonly string[] = TAKEN[domain];
   const other = lights.find((light) => !taken.includes(light.kind));
   if (other) throw new SrbfError(`expected lights of ${taken.join(", ")} for this asset, found a ${other.kind} one; bake the scene with that light set`);
+  if (domain === "directions" && lights.some((light) => isPunctual(light) && light.profile)) {
+    throw new SrbfError("expected lights without a profile for this asset, found one; capture the scene with --light-set surfels or gather");
+  }
   function* distant(): Generator<DistantLight> {
     for (const light of lights) {
       if (light.kind === "directional") yield [moved(light, assetFromWorld).direction, light.color];

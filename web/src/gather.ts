@@ -12,7 +12,7 @@ import { readOccluders } from "./triangles";
 
 /** Keys of asset.json. */
 export interface GatherManifest extends Manifest {
-  gather?: { surfels: number; clusters: number; view_rays: number; exchange_rays: number; bounces?: number };
+  gather?: { surfels: number; clusters: number; view_rays: number; exchange_rays: number; bounces?: number; lobes?: number; gloss_rays?: number; specular_albedo?: boolean };
   pool?: { file: string };
   view_links?: { file: string };
   view_rows?: { file: string };
@@ -20,6 +20,15 @@ export interface GatherManifest extends Manifest {
   exchange_rows?: { file: string };
   /** Places and normals of the view's clusters: without, all light comes by links. */
   view_points?: { file: string };
+  /** Of a view with specular lobes: links of these, and the lobes of its pixels. */
+  gloss_links?: { file: string };
+  gloss_rows?: { file: string };
+  gloss_neighbors?: { file: string };
+  /** The clusters behind pixels that let light through. */
+  behind_neighbors?: { file: string };
+  /** Reflectance of the pixels' lobes, and what they let through. */
+  glossy?: string;
+  transmission?: string;
 }
 
 /** Sparse links of `count` rows, as the shader pack's `srbfLinkedLight` takes them. */
@@ -40,6 +49,10 @@ export interface Gather {
   readonly albedo: Float32Array;
   readonly exchange: PackedLinks;
   readonly view: PackedLinks;
+  /** Specular lobes of the view's pixels, where it has any. */
+  readonly gloss?: PackedLinks;
+  /** What lobes see surfels reflect beside their albedo, (S, 3). */
+  readonly specular?: Float32Array;
   /** Bounces that are added up. */
   readonly terms: number;
   /** What bright surfels light in closed form. */
@@ -49,45 +62,64 @@ export interface Gather {
 export const ACROSS = 256; // rows, or clusters, next to each other in a texture
 const [NEGLIGIBLE, MOST_TERMS] = [1e-4, 64]; // of all light, that a bounce adds and is the last; of a scene whose bounces nobody has limited
 
+/** A part of the light that the brightest surfels send in closed form. */
+export interface NearLight {
+  /** Irradiance on the surfels without its part on the bright ones, (S, 3). */
+  readonly far: Float64Array;
+  /** What that part lays on the clusters and, after these, on the surfels, which has been reflected once already. */
+  readonly sent: Float64Array;
+}
+
+/** Rows of ACROSS texels that the irradiance of the clusters fills, and those after them that what lobes gather fills. */
+export function weightRows({ view, gloss }: Gather): [clusters: number, lobes: number] {
+  return [Math.ceil(view.count / ACROSS), Math.ceil((gloss?.count ?? 0) / ACROSS)];
+}
+
 /** @throws SrbfError on damaged files, and on links that do not fit the pool. */
 export async function readGather(files: AssetFiles, manifest: GatherManifest): Promise<Gather> {
-  const { surfels, clusters, view_rays, exchange_rays, bounces } = manifest.gather as Required<GatherManifest>["gather"];
+  const { surfels, clusters, view_rays, exchange_rays, bounces, lobes, gloss_rays, specular_albedo } = manifest.gather as Required<GatherManifest>["gather"];
   const file = (manifest.pool as { file: string }).file;
   const scene = manifest.scene as string;
   const places = manifest.view_points?.file;
-  const [pool, corners, view, exchange, points] = await Promise.all([
+  const [pool, corners, view, exchange, points, gloss] = await Promise.all([
     files.bytes(file).then((buffer) => decodeFloat(buffer, file)),
     files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
     readLinks(files, manifest, "view", clusters, view_rays, surfels),
     readLinks(files, manifest, "exchange", surfels, exchange_rays, surfels),
     places === undefined ? undefined : files.bytes(places).then((buffer) => decodeFloat(buffer, places)),
+    lobes ? readLinks(files, manifest, "gloss", lobes, gloss_rays as number, surfels) : undefined,
   ]);
-  if (pool.width !== surfels || pool.height < 3) throw new SrbfError(`expected ${surfels} x 3 numbers in ${file}, found ${pool.width} x ${pool.height}`);
+  const least = specular_albedo ? 4 : 3;
+  if (pool.width !== surfels || pool.height < least) throw new SrbfError(`expected ${surfels} x ${least} numbers in ${file}, found ${pool.width} x ${pool.height}`);
   const first = pool.data.slice(0, 8 * surfels);
-  const albedo = new Float32Array(3 * surfels);
-  for (let i = 0; i < surfels; ++i) {
-    first[4 * (surfels + i) + 3] = i;
-    for (let c = 0; c < 3; ++c) albedo[3 * i + c] = pool.data[4 * (2 * surfels + i) + c];
-  }
+  for (let i = 0; i < surfels; ++i) first[4 * (surfels + i) + 3] = i;
+  const colors = (row: number) => Float32Array.from({ length: 3 * surfels }, (_, i) => pool.data[4 * (row * surfels + Math.floor(i / 3)) + (i % 3)]);
+  const albedo = colors(2);
+  const specular = specular_albedo ? colors(3) : undefined;
   const cells = new Cells({ kind: "float", width: surfels, height: 2, channels: 4, data: first }, file);
-  const terms = termsOf(exchange, albedo, bounces ?? MOST_TERMS);
+  const most = bounces ?? MOST_TERMS;
+  const terms = Math.max(termsOf(exchange, albedo, most), Math.min(specular ? 1 : 0, most)); // lobes see what is not diffuse
   const near = points && terms ? new NearPool(cells, albedo, points, clusters, places as string) : undefined;
-  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, terms, near };
+  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, gloss, specular, terms, near };
 }
 
-/**
- * What the clusters receive from surfels of this direct irradiance, all bounces included; both (n, 3). `near`: what bright surfels lay on the
- * clusters and, after these, on the surfels, which has been reflected once already.
- */
-export function gathered({ exchange, view, albedo, terms }: Gather, irradiance: Float64Array, near?: Float64Array): Float64Array {
-  const own = near?.subarray(3 * view.count);
+/** What the clusters and, from the next row of ACROSS on, the lobes receive from surfels of a direct irradiance (S, 3), all bounces included. */
+export function gathered(gather: Gather, irradiance: Float64Array, near?: NearLight): Float64Array {
+  const { exchange, view, gloss, albedo, specular, terms } = gather;
+  const [far, own] = [near?.far ?? irradiance, near?.sent.subarray(3 * view.count)];
   let radiosity = new Float64Array(irradiance.length);
   for (let term = 0; term < terms; ++term) {
     const arriving = term ? linked(exchange, radiosity) : radiosity;
-    radiosity = irradiance.map((direct, i) => albedo[i] * (direct + arriving[i] + (term && own ? own[i] : 0)));
+    radiosity = far.map((direct, i) => albedo[i] * (direct + arriving[i] + (term && own ? own[i] : 0)));
   }
-  const received = linked(view, radiosity);
-  return near ? received.map((x, i) => x + near[i]) : received;
+  const [rows, lobeRows] = weightRows(gather);
+  const out = new Float64Array(3 * ACROSS * (rows + lobeRows));
+  linked(view, radiosity).forEach((x, i) => (out[i] = x + (near ? near.sent[i] : 0)));
+  if (!gloss) return out;
+  const seen = radiosity.map((x, i) => x + albedo[i] * (irradiance[i] - far[i]));
+  if (specular && terms) linked(exchange, radiosity).forEach((x, i) => (seen[i] += specular[i] * (irradiance[i] + x + (own ? own[i] : 0))));
+  out.set(linked(gloss, seen), 3 * ACROSS * rows);
+  return out;
 }
 
 /** Light along links, (count, 3) from (S, 3): `srbfLinkedLight` of every row. */
@@ -116,7 +148,7 @@ function termsOf(exchange: PackedLinks, albedo: Float32Array, most: number): num
   return most;
 }
 
-async function readLinks(files: AssetFiles, manifest: GatherManifest, name: "view" | "exchange", count: number, rays: number, surfels: number): Promise<PackedLinks> {
+async function readLinks(files: AssetFiles, manifest: GatherManifest, name: "view" | "exchange" | "gloss", count: number, rays: number, surfels: number): Promise<PackedLinks> {
   const of = async (part: "links" | "rows") => {
     const { file } = manifest[`${name}_${part}`] as { file: string };
     return decodePng(await files.bytes(file), file);

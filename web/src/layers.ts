@@ -36,3 +36,14 @@ export function checkStack(stack: LayerStack, expected: Omit<LayerStack, "levels
   }
   return stack;
 }
+
+/** Further layers of bytes after those of a stack. @throws SrbfError on a stack of another encoding. */
+export function extended(stack: LayerStack, further: readonly Uint8Array[], where: string): LayerStack {
+  if (further.length === 0) return stack;
+  if (stack.encoding !== "uint8") throw new SrbfError(`expected layers of uint8 in ${where}, found ${stack.encoding}; fit the asset again`);
+  const [own] = stack.levels;
+  const all = new Uint8Array(own.length + further.reduce((sum, layer) => sum + layer.length, 0));
+  all.set(own);
+  further.reduce((at, layer) => (all.set(layer, at), at + layer.length), own.length);
+  return { ...stack, count: stack.count + further.length, levels: [all] };
+}

@@ -3,6 +3,7 @@
  * z up. The arithmetic is that of `srbf/lights.py`, in double precision.
  */
 import { SrbfError } from "./errors";
+import { type Profile, profileAxes, rollOf } from "./light_profile";
 import { carried, cross, determinant, type Matrix4, type Triple, turned } from "./matrix";
 
 export const DEFAULT_RADIUS = 1e-4; // meters: least distance to a receiver, so that a point light in a surface stays finite
@@ -23,6 +24,12 @@ interface Punctual {
   /** `linear`: a0/|L|, the article's; `inverse-square`: its square. */
   readonly falloff: "linear" | "inverse-square";
   readonly radius: number;
+  /** What share of its strength goes into each direction; without, the same. */
+  readonly profile?: Profile;
+  /** Where a profile's axis points from the light, unit; straight down unless given. A spot's is its own. */
+  readonly direction?: Triple;
+  /** Turns a profile about its axis, counterclockwise for one who looks against the light, rad. */
+  readonly roll?: number;
 }
 
 export interface PointLight extends Punctual {
@@ -82,6 +89,7 @@ export function directionalLight(direction: Triple, color: Triple = WHITE): Dire
 
 /** @throws SrbfError on numbers that are not finite, or a0 or radius not above 0. */
 export function pointLight(position: Triple, options: Partial<Omit<Punctual, "position">> = {}): PointLight {
+  refuseProjected(options);
   return { kind: "point", ...punctual(position, options) };
 }
 
@@ -96,11 +104,13 @@ export function spotLight(
   if (!(0 <= inner && inner <= outer && outer <= Math.PI)) {
     throw new SrbfError(`expected spot half-angles 0 <= inner <= outer <= pi rad, found inner ${inner}, outer ${outer}`);
   }
+  if (options.profile?.projected && !(outer < Math.PI / 2)) throw new SrbfError(`expected a spot of an outer half-angle below pi / 2 to project an image, found ${outer}`);
   return { kind: "spot", ...punctual(position, options), direction: unit(direction), inner, outer };
 }
 
 /** Inverse-square unless `falloff` says otherwise; inside the sphere as strong as on its surface. @throws SrbfError as `pointLight`, and on a size not above 0. */
 export function sphereLight(position: Triple, size: number, options: Partial<Omit<Punctual, "position">> = {}): SphereLight {
+  refuseProjected(options);
   if (!(size > 0 && Number.isFinite(size))) throw new SrbfError(`expected size above 0, found ${size}`);
   const own = punctual(position, { falloff: "inverse-square", ...options });
   return { kind: "sphere", ...own, size, radius: Math.max(own.radius, size) };
@@ -139,8 +149,12 @@ export function moved<L extends Light>(light: L, matrix: Matrix4): L {
     return { ...light, position: carried(matrix, light.position), u: turned(matrix, light.u), v: turned(matrix, light.v), a0: light.a0 * scale };
   }
   const out = { ...light, position: carried(matrix, light.position), a0: light.a0 * scale, radius: light.radius * scale };
-  if (light.kind === "sphere") return { ...out, size: light.size * scale };
-  return light.kind === "spot" ? { ...out, direction: unit(turned(matrix, light.direction)) } : out;
+  if (light.direction && (light.kind === "spot" || light.profile)) {
+    const direction = unit(turned(matrix, light.direction));
+    const roll = light.profile ? { roll: rollOf(direction, turned(matrix, profileAxes(light.direction, light.roll ?? 0)[0])) } : {};
+    Object.assign(out, { direction, ...roll });
+  }
+  return light.kind === "sphere" ? { ...out, size: light.size * scale } : out;
 }
 
 export function isPunctual(light: Light): light is PunctualLight {
@@ -164,7 +178,13 @@ function punctual(position: Triple, options: Partial<Omit<Punctual, "position">>
     if (!(Number.isFinite(value) && value > 0)) throw new SrbfError(`expected ${name} above 0, found ${value}`);
   }
   if (falloff !== "linear" && falloff !== "inverse-square") throw new SrbfError(`expected a falloff of linear, inverse-square, found ${falloff}`);
-  return { position: finite(position, "position"), color: finite(color, "color"), a0, falloff, radius };
+  const { profile, direction = [0, 0, -1], roll = 0 } = options;
+  if (!Number.isFinite(roll)) throw new SrbfError(`expected a finite roll, found ${roll}`);
+  return { position: finite(position, "position"), color: finite(color, "color"), a0, falloff, radius, ...(profile ? { profile, direction: unit(direction), roll } : {}) };
+}
+
+function refuseProjected({ profile }: { profile?: Profile }): void {
+  if (profile?.projected) throw new SrbfError("expected a spot of an outer half-angle below pi / 2 to project an image, found another light");
 }
 
 function finite(v: Triple, name: string): Triple {

@@ -54,6 +54,8 @@ export interface Manifest {
   direct?: { sun_angle?: number; footprint?: number };
   /** The scene's own lights, as FRAMES.json writes lights, and those that it has no light for. */
   scene_lights?: { name: string; light: Record<string, unknown>; note?: string }[];
+  /** The text of their IES files, by the name that a light's `profile` has. */
+  scene_profiles?: Record<string, string>;
   scene_lights_left_out?: { name: string; reason: string }[];
   asset_from_world?: Matrix4;
   sha256?: Record<string, string>;

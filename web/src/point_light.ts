@@ -1,4 +1,5 @@
 /** Members of the shaders' SrbfPointLight: `srbf/gl/uniforms.py`. */
+import { type Profile, profileAxes } from "./light_profile";
 import type { PunctualLight } from "./lights";
 import type { Triple } from "./matrix";
 
@@ -24,13 +25,30 @@ export function pointLightUniforms(light: PunctualLight): PointLightUniforms {
     position: high,
     positionLow: light.position.map((x, i) => x - high[i]) as unknown as Triple,
     color: light.color,
-    axis: light.kind === "spot" ? light.direction : [0, 0, 1],
+    axis: (light.kind === "spot" || light.profile ? light.direction : undefined) ?? [0, 0, 1],
     a0: light.a0,
     radius: light.radius,
     versineInner: light.kind === "spot" ? versine(light.inner) : 3,
     versineOuter: light.kind === "spot" ? versine(light.outer) : 4,
     falloff: light.falloff === "inverse-square" ? 1 : 0,
   };
+}
+
+/** What shaders know of a light's profile beside its texture, of a light in the asset's frame. */
+export interface ProfileLook {
+  readonly profile: Profile;
+  /** Its x and y, unit. */
+  readonly across: Triple;
+  readonly up: Triple;
+  /** Half of a projected image's width 1 m ahead; 0 of a profile by angles. */
+  readonly tangent: number;
+}
+
+/** Undefined of a light without a profile. */
+export function profileLook(light: PunctualLight): ProfileLook | undefined {
+  if (!light.profile) return undefined;
+  const [across, up] = profileAxes(light.direction ?? [0, 0, -1], light.roll ?? 0);
+  return { profile: light.profile, across, up, tangent: light.kind === "spot" && light.profile.projected ? Math.tan(light.outer) : 0 };
 }
 
 /**

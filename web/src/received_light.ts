@@ -1,9 +1,11 @@
 /** What a light lays on the patches of a scene's surfaces, by one shadow ray to each of their cells: `srbf/visibility/received.py`. */
 import { SrbfError } from "./errors";
 import type { FloatImage } from "./image";
-import { type AreaLight, type PunctualLight, unit } from "./lights";
+import { rgb } from "./light_values";
+import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from "./lights";
 import { cross, type Triple } from "./matrix";
 import type { Occluders } from "./occluders";
+import { profileLook } from "./point_light";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
 export const SIDE = 4; // points per side of an area light
@@ -52,20 +54,34 @@ export class Cells {
     this.owners.forEach((owner, i) => (this.patchAreas[owner] += this.areas[i]));
   }
 
-  /** Mean irradiance of every patch under a white point, spot or sphere light, (K,). */
-  underPoint(light: PunctualLight, occluders: Occluders): Float64Array {
+  /** Mean irradiance of every patch under a light in white, (n, 3), 0 past the K patches; `far`: how far a distant light's shadow rays go, m. */
+  under(light: PunctualLight | AreaLight | DirectionalLight, occluders: Occluders, far: number, n = this.patches): Float64Array {
+    if (light.kind === "area") return rgb(this.underArea(light, occluders), n);
+    if (light.kind === "directional") return rgb(this.underDistant(light.direction, occluders, far), n);
+    if (!light.profile || light.profile.gray) return rgb(this.underPoint(light, occluders), n);
+    const colors = [0, 1, 2].map((c) => this.underPoint(light, occluders, c));
+    return Float64Array.from({ length: 3 * n }, (_, i) => colors[i % 3][Math.floor(i / 3)] ?? 0);
+  }
+
+  /** Mean irradiance of every patch under a white point, spot or sphere light, (K,); `c`: which color of a profile. */
+  private underPoint(light: PunctualLight, occluders: Occluders, c = 0): Float64Array {
+    const shape = profileLook(light);
+    const along = light.direction ?? [0, 0, -1];
     const out = new Float64Array(this.patches);
     const cone = light.kind === "spot" ? { inner: Math.cos(light.inner), outer: Math.cos(light.outer), axis: light.direction } : undefined;
     this.add(out, light.position, occluders, (squared, ux, uy, uz, least) => {
       const near = Math.max(squared, light.radius ** 2, least);
       const strength = light.falloff === "inverse-square" ? light.a0 ** 2 / near : light.a0 / Math.sqrt(near);
-      return cone ? strength * smooth(-(ux * cone.axis[0] + uy * cone.axis[1] + uz * cone.axis[2]), cone.inner, cone.outer) : strength;
+      const lit = cone ? strength * smooth(-(ux * cone.axis[0] + uy * cone.axis[1] + uz * cone.axis[2]), cone.inner, cone.outer) : strength;
+      if (!shape || lit <= 0) return lit;
+      const away = ([x, y, z]: Triple) => -(ux * x + uy * y + uz * z);
+      return lit * shape.profile.at(away(shape.across), away(shape.up), away(along), shape.tangent, c);
     }, cone && cone.outer > WIDEST ? NEAR_CONE : NEAR);
     return this.means(out);
   }
 
   /** Mean irradiance of every patch under a white one-sided Lambertian rectangle: the mean of a grid of its points. */
-  underArea({ position, u, v, a0 }: AreaLight, occluders: Occluders): Float64Array {
+  private underArea({ position, u, v, a0 }: AreaLight, occluders: Occluders): Float64Array {
     const out = new Float64Array(this.patches);
     const [fx, fy, fz] = unit(cross(u, v));
     for (let i = 0; i < SIDE ** 2; ++i) {
@@ -77,7 +93,7 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a white directional light. */
-  underDistant(direction: Triple, occluders: Occluders, far: number): Float64Array {
+  private underDistant(direction: Triple, occluders: Occluders, far: number): Float64Array {
     const out = new Float64Array(this.patches);
     const [dx, dy, dz] = direction;
     for (let i = 0; i < this.count; ++i) {

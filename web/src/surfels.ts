@@ -3,6 +3,7 @@ import type { LightsInAssetFrame } from "./asset_frame";
 import type { LightValues } from "./light_values";
 import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from "./lights";
 import { cross, type Triple } from "./matrix";
+import { type ProfileLook, profileLook } from "./point_light";
 import { type Cells, SIDE } from "./received_light";
 
 export interface Surfels {
@@ -84,6 +85,8 @@ export interface Look {
   readonly cone?: readonly [number, number];
   /** Whether it shines by the cosine to `axis`, as a part of an area. */
   readonly lambertian: boolean;
+  /** A profile about `axis`. */
+  readonly shape?: ProfileLook;
 }
 
 export type Placed = PunctualLight | AreaLight | DirectionalLight;
@@ -102,7 +105,8 @@ export function looksOf(light: Placed, middle: Triple): Look[] {
     return points.map((point) => ({ ...plain, place: away(point), color, axis, a0, lambertian: true }));
   }
   const { position, color, a0, radius, falloff } = light;
-  const look = { ...plain, place: away(position), color, a0, radius, falloff };
+  const shape = profileLook(light);
+  const look = { ...plain, place: away(position), color, a0, radius, falloff, ...(shape ? { shape, axis: light.direction as Triple } : {}) };
   return [light.kind === "spot" ? { ...look, axis: light.direction, cone: [light.inner, light.outer] } : look];
 }
 

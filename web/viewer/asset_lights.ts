@@ -1,5 +1,5 @@
 /** Which lights an asset can be relit by, and where those inside its scene may be. */
-import { type Asset, lightDomainOf, type Triple } from "../src";
+import { type Asset, lightDomainOf, type Manifest, type Triple } from "../src";
 import { ends, heat } from "./direction_widget";
 import { isPlaced, type LightState, linearColor, namedState, type PlacedState, pointState } from "./light_state";
 import { stateOf } from "./keyframes";
@@ -23,11 +23,11 @@ export function kindsOf(asset: Asset): readonly AddedKind[] {
   return asset.position ? ["directional", "point", "spot", "environment"] : ["directional", "environment"];
 }
 
-/** An entry without its profile, which the page does not show: see `missingLine`. */
-const plain = ({ profile: _, ...light }: Record<string, unknown>) => light;
-
 /** The lights that the scene has by itself, all of them, as it has them set. @throws SrbfError on damaged ones. */
-export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(plain(light), `light ${name} of the asset`, "inverse-square"), name }) as LightState);
+export const designedLights = ({ manifest }: Asset): LightState[] => (manifest.scene_lights ?? []).map(({ name, light }) => ({ ...stateOf(light, `light ${name} of the asset`, "inverse-square", profileNames(manifest)), name }) as LightState);
+
+/** The names of the profiles that lights of an asset may have: those of its scene's own lights. */
+export const profileNames = ({ scene_profiles }: Manifest): string[] => Object.keys(scene_profiles ?? {});
 
 /** The scene's own lights as asset.json has them. */
 export type Designed = readonly { name: string; light: Record<string, unknown> }[];
@@ -35,7 +35,7 @@ export type Designed = readonly { name: string; light: Record<string, unknown> }
 /** The linear color of a light: that of asset.json where it is as designed, since the page rounds colors to bytes. */
 export function exactColor(light: LightState, designed: Designed): Triple {
   const own = light.name === undefined || light.kind === "named" ? undefined : designed.find(({ name }) => name === light.name);
-  const before = own && stateOf(plain(own.light), own.name, "inverse-square");
+  const before = own && stateOf(own.light, own.name, "inverse-square", [own.light.profile as string]);
   return own && before?.color === light.color && before.intensity === light.intensity ? (own.light.color as Triple) : linearColor(light);
 }
 
@@ -43,9 +43,7 @@ export function exactColor(light: LightState, designed: Designed): Triple {
 export function missingLine({ manifest }: Asset): string {
   const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
-  const shaped = (manifest.scene_lights ?? []).filter(({ light }) => light.profile !== undefined).map(({ name }) => name);
   return [
-    shaped.length ? `lights shown without their IES profiles: ${shaped.join(", ")}` : "",
     beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
     left.length ? `lights left out: ${left.join(", ")}` : "",
   ]

@@ -1,5 +1,6 @@
 /** The page's lights as a Python script that makes them in Blender. Units as in `blender_bake/light.py`. */
 import type { Triple } from "../src";
+import { profileAxes } from "../src/light_profile";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import { type Designed, exactColor } from "./asset_lights";
@@ -16,7 +17,7 @@ export function blenderRig(lights: readonly LightState[], designed: Designed = [
   const told = lights.flatMap((light, i) => {
     if (light.kind === "environment" || light.kind === "named") return [];
     const name = light.name ?? `srbf ${light.kind} ${i + 1}`;
-    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
+    return [{ name, own: light.name !== undefined, type: TYPES[light.kind], profile: "profile" in light ? (light.profile ?? null) : null, ...colored(exactColor(light, designed), wattsOf(light)), hidden: !shining.has(light), ...placed(light) }];
   });
   const kept = new Set(lights.map(({ name }) => name));
   const removed = designed.flatMap(({ name }) => (kept.has(name) ? [] : [name]));
@@ -53,9 +54,12 @@ def own(name, kind):
 
 
 def set_own(light, told):
-    """Set what the page shows of a light: its angle, a spot's size and a disk's shape stay."""
+    """Set what the page shows of a light: its angle, a spot's size, a disk's shape and the nodes of an IES texture stay."""
     data, settings = light.data, dict(told["settings"])
-    data.use_nodes = False
+    if told["profile"] is None:
+        data.use_nodes = False
+    else:
+        told = {**told, "energy": told["energy"] / keep_texture(data)}
     for name, plain in (("exposure", 0), ("use_temperature", False), ("normalize", True)):
         if hasattr(data, name):
             setattr(data, name, plain)
@@ -66,6 +70,22 @@ def set_own(light, told):
         data.shape = "ELLIPSE" if data.shape == "ELLIPSE" or abs(settings["size"] - settings["size_y"]) > 1e-5 else "DISK"
         settings = {"size": settings["size"] / ROUND, "size_y": settings["size_y"] / ROUND}
     fill(light, told, settings)
+
+
+def keep_texture(data):
+    """Leave white light that the IES texture of a light shapes; what the texture multiplies by."""
+    data.use_nodes = True
+    tree = data.node_tree
+    texture = next((node for node in tree.nodes if node.type == "TEX_IES"), None)
+    shader = next((node for node in tree.nodes if node.type == "EMISSION"), None)
+    if texture is None or shader is None:
+        data.use_nodes = False
+        return 1
+    for link in [one for one in tree.links if one.to_socket == shader.inputs["Color"]]:
+        tree.links.remove(link)
+    shader.inputs["Color"].default_value = (1, 1, 1, 1)
+    tree.links.new(texture.outputs["Fac"], shader.inputs["Strength"])
+    return texture.inputs["Strength"].default_value or 1
 
 
 def fill(light, told, settings):
@@ -116,17 +136,24 @@ function placed(light: Made): { matrix: number[][]; settings: Record<string, unk
     return { matrix: matrix(across, up, back, [0, 0, 0]), settings: { angle: 0 } };
   }
   if (light.kind === "point" || light.kind === "sphere") {
-    return { matrix: matrix([1, 0, 0], [0, 1, 0], [0, 0, 1], light.position), settings: { shadow_soft_size: light.kind === "sphere" ? light.size : 0 } };
+    const frame = light.profile === undefined ? undefined : profileFrame(unit(light.direction ?? [0, 0, -1]), light.roll);
+    return { matrix: matrix(...(frame ?? [[1, 0, 0], [0, 1, 0], [0, 0, 1]]), light.position), settings: { shadow_soft_size: light.kind === "sphere" ? light.size : 0 } };
   }
   const back = unit(aim(light)).map((x) => -x) as unknown as Triple; // Blender's lights shine along -z
   if (light.kind === "spot") {
     const [inner, outer] = [light.inner, light.outer].map((degrees) => Math.cos((degrees * Math.PI) / 180));
-    const [across, up] = levelSides(back);
+    const [across, up] = light.profile === undefined ? levelSides(back) : profileFrame(unit(aim(light)), light.roll);
     const settings = { shadow_soft_size: 0, spot_size: (light.outer * Math.PI) / 90, spot_blend: Math.min(1, (inner - outer) / Math.max(1 - outer, 1e-9)) };
     return { matrix: matrix(across, up, back, light.position), settings };
   }
   const across = unit(sides(light)[0]);
   return { matrix: matrix(across, cross(back, across), back, light.position), settings: { shape: "RECTANGLE", size: light.width, size_y: light.height } };
+}
+
+/** Columns of a light whose profile looks along its -z. */
+function profileFrame(direction: Triple, roll = 0): [Triple, Triple, Triple] {
+  const [across, up] = profileAxes(direction, (roll * Math.PI) / 180);
+  return [across, up, direction.map((x) => -x) as unknown as Triple];
 }
 
 function matrix(x: Triple, y: Triple, z: Triple, at: Triple): number[][] {

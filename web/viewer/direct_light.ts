@@ -13,7 +13,17 @@ export interface DirectInputs {
   coverage?: FloatImage;
   /** Of radiance assets. */
   albedo?: FloatImage;
+  /** Of views with gloss: whole albedo of the lobes, their roughness and share with a Fresnel term, the pack's table of lobes, and the camera. */
+  gloss?: { glossy: FloatImage; lobe: FloatImage; table: FloatImage; camera: ViewCamera };
+  /** What pixels of a view let through. */
+  through?: FloatImage;
   scene: Object3D;
+}
+
+/** The camera of the bake, as asset.json has it under `direct`: rows of its matrix. */
+export interface ViewCamera {
+  type: string;
+  matrix_world: number[][];
 }
 
 /** Where light is added: the size of its picture, and what a texel makes of irradiance, RGBA. */
@@ -21,12 +31,15 @@ interface Surface {
   width: number;
   height: number;
   reflectance: Float32Array;
+  /** What it makes of irradiance on its back. */
+  through?: Float32Array;
+  gloss?: DirectInputs["gloss"];
 }
 
 const [SIDES, RINGS] = [32, 16]; // of a ball that casts shadows
 
 export class DirectLight {
-  private readonly lit: LitTexels;
+  private readonly lit: readonly LitTexels[];
   private readonly ball = new SphereGeometry(1, SIDES, RINGS);
   private readonly sum: WebGLRenderTarget;
   private readonly suns: () => SunShadows;
@@ -40,7 +53,9 @@ export class DirectLight {
     const { normal, coverage, scene } = inputs;
     const position = asset.position as FloatImage;
     const receivers = factor > 1 ? fineReceivers(asset, position, normal, coverage, factor) : directReceivers(asset, position, normal, coverage, direct?.footprint ?? 1);
-    return new DirectLight(asset, receivers, { width: factor * width, height: factor * height, reflectance: reflectance(asset, inputs.albedo, factor) }, scene, renderer);
+    const surface = { width: factor * width, height: factor * height, reflectance: reflectance(asset, inputs.albedo, factor) };
+    const further = factor > 1 ? {} : { gloss: inputs.gloss, through: inputs.through && reflectance(asset, inputs.through, 1) };
+    return new DirectLight(asset, receivers, { ...surface, ...further }, scene, renderer);
   }
 
   /** Of `width` x `height` white points that move, in the frame of `asset`: put them somewhere first. @throws as `ofAsset`. */
@@ -61,7 +76,8 @@ export class DirectLight {
     const { width, height } = surface;
     const texture = (data: Float32Array): DataTexture => floatTexture(data, width, height);
     const corners = this.receivers.corners.map(({ points, normals }) => ({ points: texture(points), normals: texture(normals) }));
-    this.lit = { corners, reflectance: texture(surface.reflectance) };
+    const front = { corners, reflectance: texture(surface.reflectance), lobes: surface.gloss && lobesOf(surface.gloss, this.receivers.center) };
+    this.lit = [front, ...(surface.through ? [behind(front, this.receivers, surface.through, texture)] : [])];
     this.sum = renderTarget(width, height, RGBAFormat, FloatType);
     const { bounds, center } = this.receivers;
     this.ball.setAttribute("corner", this.ball.getAttribute("position").clone());
@@ -75,7 +91,7 @@ export class DirectLight {
   /** Put the points of `ofPoints` there, in the asset's frame. */
   move(points: readonly Triple[], normals: readonly Triple[]): void {
     const [own] = this.receivers.corners;
-    const [textures] = this.lit.corners;
+    const [textures] = this.lit[0].corners;
     points.forEach((point, i) => {
       own.points.set(point, 4 * i);
       own.normals.set(normals[i], 4 * i);
@@ -141,6 +157,20 @@ function reflectance(asset: Asset, albedo: FloatImage | undefined, factor: numbe
     }
   }
   return out;
+}
+
+/** What lobes reflect, as uniforms of the pack's stages. */
+function lobesOf({ glossy, lobe, table, camera }: NonNullable<DirectInputs["gloss"]>, center: Triple): LitTexels["lobes"] {
+  const { type, matrix_world: rows } = camera;
+  const eye = type === "PERSP" ? [...rows.slice(0, 3).map((row, i) => row[3] - center[i]), 1] : [...rows.slice(0, 3).map((row) => row[2]), 0];
+  const texture = ({ data, width, height }: FloatImage) => floatTexture(data, width, height);
+  return { glossy: texture(glossy), lobes: texture(lobe), lobeAlbedo: texture(table), eye };
+}
+
+/** The same texels lit from behind, of what they let through. */
+function behind({ corners }: LitTexels, receivers: DirectReceivers, through: Float32Array, texture: (data: Float32Array) => DataTexture): LitTexels {
+  const turned = receivers.corners.map(({ normals }) => texture(normals.map((x) => -x)));
+  return { corners: corners.map(({ points }, i) => ({ points, normals: turned[i] })), reflectance: texture(through) };
 }
 
 function once<T>(make: () => T): () => T {

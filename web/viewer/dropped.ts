@@ -7,9 +7,9 @@ import { MOST_LIGHTS, type State } from "./state";
 
 const FRAMES_PER_SECOND = 24;
 
-/** Keyframes that play from now on; `usual`: the falloff of lights that do not say. @throws SrbfError on other files. */
-export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square"): Promise<Keyframes> {
-  const keyframes = new Keyframes(readFrames(await file.text(), file.name, usual), state);
+/** Keyframes that play from now on; `usual`: the falloff of lights that do not say; `profiles`: names that they may have. @throws SrbfError on other files. */
+export async function droppedFrames(file: File, state: State, usual: "linear" | "inverse-square", profiles: readonly string[]): Promise<Keyframes> {
+  const keyframes = new Keyframes(readFrames(await file.text(), file.name, usual, profiles), state);
   keyframes.show(0);
   const { length } = keyframes.frames;
   Object.assign(state, { path: "frames", seconds: Math.max(0.1, length / FRAMES_PER_SECOND), playing: length > 1 });

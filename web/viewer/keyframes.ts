@@ -7,8 +7,11 @@ import { MOST_LIGHTS, type State } from "./state";
 
 type Entry = Record<string, unknown>;
 
-/** Frames of a file's text; `usual`: the falloff of point lights that do not say. @throws SrbfError in one line on anything else. */
-export function readFrames(text: string, name: string, usual: "linear" | "inverse-square" = "linear"): LightState[][] {
+/**
+ * Frames of a file's text; `usual`: the falloff of point lights that do not say; `profiles`: names that they may have. @throws SrbfError in one line on
+ * anything else.
+ */
+export function readFrames(text: string, name: string, usual: "linear" | "inverse-square" = "linear", profiles: readonly string[] = []): LightState[][] {
   let json: { frames?: { lights?: Entry[] }[] };
   try {
     json = JSON.parse(text);
@@ -19,7 +22,7 @@ export function readFrames(text: string, name: string, usual: "linear" | "invers
   if (!Array.isArray(frames) || frames.length === 0) throw new SrbfError(`expected a list of frames in ${name}, found none`);
   return frames.map((frame, i) => {
     if (!Array.isArray(frame?.lights)) throw new SrbfError(`expected lights in frame ${i} of ${name}, found none`);
-    return frame.lights.map((light) => stateOf(light, `frame ${i} of ${name}`, usual));
+    return frame.lights.map((light) => stateOf(light, `frame ${i} of ${name}`, usual, profiles));
   });
 }
 
@@ -69,8 +72,8 @@ export class Keyframes {
   }
 }
 
-/** The state of a light of FRAMES.json. @throws SrbfError that names `where`. */
-export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square"): LightState {
+/** The state of a light of FRAMES.json, whose profile is one of `profiles`. @throws SrbfError that names `where`. */
+export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-square", profiles: readonly string[] = []): LightState {
   const bad = (expected: string, found: unknown): never => {
     throw new SrbfError(`expected ${expected} in ${where}, found ${JSON.stringify(found) ?? "none"}`);
   };
@@ -84,7 +87,7 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
     if (!Number.isFinite(value)) bad(`a number of ${key}`, value);
     return value as number;
   };
-  if (entry.profile !== undefined) bad("lights without a profile, which srbf relight takes and the page does not,", entry.profile);
+  if (entry.profile !== undefined && !profiles.includes(entry.profile as string)) bad(profiles.length ? `a profile of ${profiles.join(", ")}` : "lights without a profile, since this asset has none,", entry.profile);
   const color = triple("color", [1, 1, 1]);
   if (color.some((x) => x < 0)) bad("colors of 0 or more", color);
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
@@ -97,11 +100,13 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   if (entry.kind !== "point" && entry.kind !== "spot" && entry.kind !== "sphere") return bad("lights of named, directional, point, spot, sphere, area", entry.kind);
   const falloff = (entry.falloff ?? usual) === "inverse-square" ? "inverse-square" : "linear";
   const position = triple("position");
-  const point = { ...common, position: rounded(position), a0: round(number("a0", 1)), falloff, radius: round(number("radius", DEFAULT_RADIUS)) } as const;
+  const axis = triple("direction", [0, 0, -1]);
+  const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
+  const shape = entry.profile === undefined ? {} : { profile: entry.profile as string, roll: degrees("roll"), ...(entry.kind === "spot" ? {} : { direction: axis }) };
+  const point = { ...common, position: rounded(position), a0: round(number("a0", 1)), falloff, radius: round(number("radius", DEFAULT_RADIUS)), ...shape } as const;
   if (entry.kind === "point") return { kind: "point", ...point };
   if (entry.kind === "sphere") return { kind: "sphere", ...point, size: round(number("size", 0.05)) };
-  const axis = triple("direction");
-  const degrees = (key: string) => round((number(key, 0) * 180) / Math.PI);
+  triple("direction");
   const target = rounded([position[0] + axis[0], position[1] + axis[1], position[2] + axis[2]]);
   return { kind: "spot", ...point, target, inner: degrees("inner"), outer: degrees("outer") };
 }

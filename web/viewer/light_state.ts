@@ -1,5 +1,5 @@
 /** Lights as the page and its URL hold them: numbers are rounded when they are set, so that page, URL and FRAMES.json agree. */
-import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, sphereLight, spotLight, SrbfError, type Triple } from "../src";
+import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, type Profile, sphereLight, spotLight, SrbfError, type Triple } from "../src";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import type { Environment } from "./environment_file";
@@ -23,6 +23,10 @@ interface PointLight extends Common {
   a0: number;
   falloff: "linear" | "inverse-square";
   radius: number;
+  /** The name of the profile that shapes it, about `direction` (of a spot its aim, else straight down unless given), turned by `roll` (degrees). */
+  profile?: string;
+  direction?: Triple;
+  roll?: number;
 }
 
 export interface DirectionalState extends Common {
@@ -160,8 +164,11 @@ export function linearColor(light: Common): Triple {
   return [channel(1), channel(3), channel(5)];
 }
 
-/** The library's light; undefined where it is off, or its environment map has not been dropped yet. @throws SrbfError on invalid numbers. */
-export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>): Light | undefined {
+/**
+ * The library's light; undefined where it is off, or its environment map has not been dropped yet. @throws SrbfError on invalid numbers, and on a profile
+ * that is not among `profiles`.
+ */
+export function lightOf(state: LightState, environments: ReadonlyMap<string, Environment>, profiles: ReadonlyMap<string, Profile> = new Map()): Light | undefined {
   if (!state.on) return undefined;
   const color = linearColor(state);
   if (state.kind === "directional") return directionalLight(state.direction, color);
@@ -172,10 +179,18 @@ export function lightOf(state: LightState, environments: ReadonlyMap<string, Env
   if (state.kind === "named") return namedLight(state.name, color);
   if (state.kind === "area") return areaLight(state.position, ...sides(state), { color, a0: state.a0 });
   const { position, a0, falloff, radius } = state;
-  if (state.kind === "point") return pointLight(position, { color, a0, falloff, radius });
-  if (state.kind === "sphere") return sphereLight(position, state.size, { color, a0, falloff, radius });
+  const fade = { color, a0, falloff, radius, ...shapeOf(state, profiles) };
+  if (state.kind === "point") return pointLight(position, fade);
+  if (state.kind === "sphere") return sphereLight(position, state.size, fade);
   const cone = { inner: (state.inner * Math.PI) / 180, outer: (state.outer * Math.PI) / 180 };
-  return spotLight(position, aim(state), cone, { color, a0, falloff, radius });
+  return spotLight(position, aim(state), cone, fade);
+}
+
+function shapeOf({ profile, direction, roll = 0 }: PointLight, profiles: ReadonlyMap<string, Profile>): { profile?: Profile; direction?: Triple; roll?: number } {
+  if (profile === undefined) return {};
+  const found = profiles.get(profile);
+  if (!found) throw new SrbfError(`expected a profile of this asset (${[...profiles.keys()].join(", ") || "which has none"}), found ${JSON.stringify(profile)}`);
+  return { profile: found, direction, roll: (roll * Math.PI) / 180 };
 }
 
 /** The two sides of an area, m. */
@@ -228,6 +243,9 @@ export function checkLight(value: unknown): LightState {
   } else if (light.kind === "point" || light.kind === "spot" || light.kind === "sphere") {
     triple("position");
     for (const key of light.kind === "sphere" ? ["a0", "radius", "size"] : ["a0", "radius"]) if (!((light[key] as number) > 0 && Number.isFinite(light[key]))) bad(`a number above 0 of ${key}`);
+    if (light.profile !== undefined && (typeof light.profile !== "string" || light.profile === "")) bad("a name of profile");
+    if (light.direction !== undefined) triple("direction");
+    if (light.roll !== undefined && !Number.isFinite(light.roll)) bad("a number of roll");
     if (light.falloff !== "linear" && light.falloff !== "inverse-square") bad("linear or inverse-square of falloff");
     if (light.kind === "spot") {
       triple("target");

@@ -1,12 +1,12 @@
 /** What the page loads before it shows anything, and its progress. */
 import type { BufferGeometry, Material, Mesh, Object3D, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { type Asset, type FloatImage, lightDomainOf, loadAsset, SrbfError } from "../src";
+import { type Asset, type FloatImage, lightDomainOf, loadAsset, type Manifest, Profile, SrbfError } from "../src";
 import { decodeFloat } from "../src/exr";
 import { fetched } from "../src/files";
 import { insidePath } from "../src/manifest";
 import type { CyclesFacts } from "./cycles";
-import type { DirectInputs } from "./direct_light";
+import type { DirectInputs, ViewCamera } from "./direct_light";
 import type { FittedCamera } from "./frames";
 import { References } from "./reference";
 
@@ -18,6 +18,10 @@ export interface AssetFacts {
   bytes_per_texel: number;
   spectrum: string;
   errors: string | null;
+  /** The table of `srbf.microfacets.albedo_table`, of views with gloss. */
+  lobe_albedo?: string | null;
+  /** Tables of `srbf.light_profile.Profile`, by the names that the scene's own lights have for them. */
+  profiles?: Record<string, string>;
 }
 
 /** viewer.json: `srbf/viewer/page_manifest.py`. */
@@ -42,6 +46,8 @@ export interface LoadedAsset {
   coverage?: FloatImage;
   /** For an indirect asset whose direct light can be added. */
   direct?: DirectInputs;
+  /** By the names that lights have for them. */
+  profiles: ReadonlyMap<string, Profile>;
 }
 
 export interface Loaded {
@@ -93,7 +99,22 @@ export async function loadOne(facts: AssetFacts, progress: (done: number, what: 
   const asset = await loadAsset(facts.folder, { fetch: counting, verify: globalThis.isSecureContext, exact: true });
   const { coverage: name } = asset.manifest;
   const coverage = name === undefined ? undefined : await readImage(facts.folder, name, counting);
-  return { facts, asset, coverage, direct: await readDirect(asset, coverage, facts.folder, counting) };
+  const table = (url: string) => fetched(counting, url).then(async (response) => decodeFloat(await response.arrayBuffer(), url));
+  const profiles = await Promise.all(Object.entries(facts.profiles ?? {}).map(async ([own, url]) => [own, new Profile(await table(url))] as const));
+  const direct = await readDirect(asset, coverage, facts.folder, counting);
+  if (direct) Object.assign(direct, await readLobes(asset, facts, counting, table));
+  return { facts, asset, coverage, direct, profiles: new Map(profiles) };
+}
+
+/** What direct light needs of a view's gloss, and of what it lets through. */
+async function readLobes({ manifest }: Asset, facts: AssetFacts, fetcher: Fetcher, table: (url: string) => Promise<FloatImage>): Promise<Partial<DirectInputs>> {
+  const { glossy, lobe, transmission, direct, quantity } = manifest as Manifest & { glossy?: string; lobe?: string; transmission?: string; direct?: { camera?: ViewCamera } };
+  const own = (name: string) => readImage(facts.folder, name, fetcher);
+  const through = transmission && quantity === "radiance" ? await own(transmission) : undefined;
+  const camera = direct?.camera;
+  if (!glossy || !lobe || !camera || !facts.lobe_albedo) return { through };
+  const [colors, lobes, albedo] = await Promise.all([own(glossy), own(lobe), table(facts.lobe_albedo)]);
+  return { through, gloss: { glossy: colors, lobe: lobes, table: albedo, camera } };
 }
 
 async function readImage(folder: string, name: string, fetcher: Fetcher): Promise<FloatImage> {

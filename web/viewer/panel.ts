@@ -288,6 +288,19 @@ export class Panel {
       folder.add(light, "falloff", { "1/d": "linear", "1/d²": "inverse-square" }).name("Falloff").onChange(this.relight);
       folder.add(light, "radius", 0.0001, radius, 0.0001).name(light.kind === "sphere" ? "Least distance (m)" : "Radius (m)").onChange(this.relight);
     }
+    if (light.kind !== "area" && light.profile !== undefined) {
+      const proxy = {
+        profile: light.profile,
+        get turn() {
+          return light.roll ?? 0;
+        },
+        set turn(value: number) {
+          light.roll = value;
+        },
+      };
+      folder.add(proxy, "profile").name("Profile").disable();
+      folder.add(proxy, "turn", -180, 180, 1).name("Turn of the profile (°)").onChange(this.relight);
+    }
     if (light.kind === "sphere") folder.add(light, "size", step, radius, step).name("Size (m)").onChange(this.relight);
     if (isAimed(light)) {
       coordinates("Aim", () => light.target, (place) => (light.target = place));

@@ -8,6 +8,9 @@ import shadowVertex from "../../glsl/stages/point_shadow.vert";
 import heightFragment from "../../glsl/stages/point_shadow_nearness.frag";
 import transmittanceFragment from "../../glsl/stages/point_shadow_transmittance.frag";
 import { type AreaLight, pointLightUniforms, type PunctualLight, type Triple } from "../src";
+import { profileLook } from "../src/point_light";
+import { floatTexture } from "../src/three/float_textures";
+import { ProfileTextures } from "../src/three/profile_textures";
 import { unit } from "../src/lights";
 import { cross } from "../src/matrix";
 import type { Caster } from "./shadow_casters";
@@ -39,14 +42,25 @@ export class PointShadows {
     face: { value: -1 },
     lambertian: { value: 0 },
     pointLight: { value: {} as object },
+    profiled: { value: false },
+    profile: { value: floatTexture(new Float32Array(4), 1, 1) },
+    profileAcross: { value: [1, 0, 0] as number[] },
+    profileUp: { value: [0, 1, 0] as number[] },
+    profileTangent: { value: 0 },
+    partAcross: { value: [0, 0, 0] as number[] },
+    partUp: { value: [0, 0, 0] as number[] },
+    ball: { value: [0, 0, 0, 0] as number[] },
+    ballPart: { value: 0 },
+    ballParts: { value: SPHERE_LOOKS },
   };
+  private readonly profiles = new ProfileTextures();
   private readonly fine: ShadowMaps;
   private readonly coarse: ShadowMaps;
 
   /** Lights and casters are relative to `center`, in the asset's frame. */
   constructor(
     renderer: WebGLRenderer,
-    lit: LitTexels,
+    lit: readonly LitTexels[],
     casters: readonly Caster[],
     private readonly center: Triple,
   ) {
@@ -58,16 +72,27 @@ export class PointShadows {
 
   /** Add the light of `light`, in the asset's frame, to `sum`. */
   add(sum: WebGLRenderTarget, light: PunctualLight | AreaLight): void {
+    const { uniforms } = this;
+    const shape = light.kind === "area" ? undefined : profileLook(light);
+    uniforms.profiled.value = shape !== undefined;
+    if (shape) for (const [name, value] of Object.entries(this.profiles.uniforms(shape))) uniforms[name as "profile"].value = value as never;
+    uniforms.partAcross.value = uniforms.partUp.value = [0, 0, 0];
+    uniforms.ball.value = [0, 0, 0, 0];
     if (light.kind === "area") {
       const { position, u, v, a0, color } = light;
       const direction = unit(cross(u, v));
       const base = { kind: "spot", direction, inner: Math.PI / 2, outer: Math.PI / 2, falloff: "inverse-square", radius: NEAREST, a0 } as const;
       const steps = Array.from({ length: GRID }, (_, i) => (i + 0.5) / GRID - 0.5);
       const places = steps.flatMap((s) => steps.map((t) => [0, 1, 2].map((k) => position[k] + s * u[k] + t * v[k]) as unknown as Triple));
+      [uniforms.partAcross.value, uniforms.partUp.value] = [u, v].map((side) => side.map((x) => x / GRID));
       for (const place of places) this.cube(sum, { ...base, position: place, color: shared(color, places.length) }, COARSE, 1);
     } else if (light.kind === "sphere") {
       const places = looks(light.position, light.size);
-      for (const position of places) this.cube(sum, { ...light, kind: "point", position, color: shared(light.color, places.length) }, COARSE);
+      uniforms.ball.value = [...light.position.map((x, k) => x - this.center[k]), light.size];
+      places.forEach((position, i) => {
+        uniforms.ballPart.value = i;
+        this.cube(sum, { ...light, kind: "point", position, color: shared(light.color, places.length) }, COARSE);
+      });
     } else if (light.kind === "spot" && light.outer <= WIDEST) this.cone(sum, light);
     else this.cube(sum, light, FINE);
   }

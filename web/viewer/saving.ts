@@ -47,11 +47,13 @@ function values(light: LightState, color: Triple): Record<string, unknown> {
     const [u, v] = sides(light);
     return { kind: "area", position: light.position, u, v, color, a0: light.a0 };
   }
-  const { position, a0, falloff, radius } = light;
-  if (light.kind === "sphere") return { kind: "sphere", position, size: light.size, color, a0, falloff, radius };
-  if (light.kind === "point") return { kind: "point", position, color, a0, falloff, radius };
+  const { position, a0, falloff, radius, profile, direction, roll = 0 } = light;
+  const shape = profile === undefined ? {} : { profile, roll: (roll * Math.PI) / 180, ...(direction && light.kind !== "spot" ? { direction } : {}) };
+  const fade = { color, a0, falloff, radius, ...shape };
+  if (light.kind === "sphere") return { kind: "sphere", position, size: light.size, ...fade };
+  if (light.kind === "point") return { kind: "point", position, ...fade };
   const [inner, outer] = [(light.inner * Math.PI) / 180, (light.outer * Math.PI) / 180];
-  return { kind: "spot", position, direction: aim(light), inner, outer, color, a0, falloff, radius };
+  return { kind: "spot", position, direction: aim(light), inner, outer, ...fade };
 }
 
 function download(name: string, blob: Blob): void {

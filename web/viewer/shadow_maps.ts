@@ -39,6 +39,8 @@ export type Uniforms = Record<string, IUniform>;
 export interface LitTexels {
   readonly corners: readonly { points: DataTexture; normals: DataTexture }[];
   readonly reflectance: DataTexture;
+  /** What texels reflect toward the eye beside that: uniforms of the pack's stages with SRBF_LOBES. */
+  readonly lobes?: { readonly glossy: DataTexture; readonly lobes: DataTexture; readonly lobeAlbedo: DataTexture; readonly eye: readonly number[] };
 }
 
 /** Shaders of one kind of projection. */
@@ -56,14 +58,13 @@ export class ShadowMaps {
   private readonly occluders = new Scene();
   private readonly walls = new Scene();
   private readonly translucent = new Scene();
-  private readonly quad = new Scene();
   private readonly camera = new Camera();
-  private readonly lookup: RawShaderMaterial;
+  private readonly lookups: readonly { own: LitTexels; material: RawShaderMaterial; quad: Scene }[];
 
   /** `projection`: uniforms of all stages, set before every `add`; `nothing`: what a height map holds where there is nothing. */
   constructor(
     private readonly renderer: WebGLRenderer,
-    private readonly lit: LitTexels,
+    lit: readonly LitTexels[],
     casters: readonly Caster[],
     stages: Stages,
     projection: Uniforms,
@@ -82,26 +83,32 @@ export class ShadowMaps {
       const passing = new RawShaderMaterial({ glslVersion: GLSL3, vertexShader, fragmentShader: stages.transmittance, uniforms, ...blending("multiply") });
       this.translucent.add(unculled(geometry, passing));
     }
-    this.lookup = new RawShaderMaterial({
-      glslVersion: GLSL3,
-      vertexShader: fullscreenVertex,
-      fragmentShader: colored(stages.direct),
-      uniforms: {
-        ...projection,
-        points: { value: null },
-        normals: { value: null },
-        heights: { value: this.heights.texture },
-        wallHeights: { value: this.wallHeights.texture },
-        transmittance: { value: this.transmittances.texture },
-        reflectance: { value: lit.reflectance },
-        weight: { value: [0, 0, 0] },
-      },
-      ...blending("add"),
-    });
     const corner = new BufferGeometry();
     corner.setAttribute("corner", new BufferAttribute(new Float32Array([-1, -1, 3, -1, -1, 3]), 2));
     corner.setDrawRange(0, 3);
-    this.quad.add(unculled(corner, this.lookup));
+    this.lookups = lit.map((own) => {
+      const material = new RawShaderMaterial({
+        glslVersion: GLSL3,
+        vertexShader: fullscreenVertex,
+        fragmentShader: colored(stages.direct),
+        defines: own.lobes ? { SRBF_LOBES: 1 } : {},
+        uniforms: {
+          ...projection,
+          points: { value: null },
+          normals: { value: null },
+          heights: { value: this.heights.texture },
+          wallHeights: { value: this.wallHeights.texture },
+          transmittance: { value: this.transmittances.texture },
+          reflectance: { value: own.reflectance },
+          weight: { value: [0, 0, 0] },
+          ...Object.fromEntries(Object.entries(own.lobes ?? {}).map(([name, value]) => [name, { value }])),
+        },
+        ...blending("add"),
+      });
+      const quad = new Scene();
+      quad.add(unculled(corner, material));
+      return { own, material, quad };
+    });
   }
 
   /** Draw the maps, and add the light of a light of `color` to `sum`. */
@@ -117,14 +124,15 @@ export class ShadowMaps {
       renderer.setRenderTarget(this.transmittances);
       renderer.render(this.translucent, this.camera);
     }
-    const { uniforms } = this.lookup;
-    const { corners } = this.lit;
-    uniforms.weight.value = color.map((value) => value / corners.length);
     renderer.setRenderTarget(sum);
-    for (const { points, normals } of corners) {
-      uniforms.points.value = points;
-      uniforms.normals.value = normals;
-      renderer.render(this.quad, this.camera);
+    for (const { own, material, quad } of this.lookups) {
+      const { uniforms } = material;
+      uniforms.weight.value = color.map((value) => value / own.corners.length);
+      for (const { points, normals } of own.corners) {
+        uniforms.points.value = points;
+        uniforms.normals.value = normals;
+        renderer.render(quad, this.camera);
+      }
     }
   }
 }

@@ -1,6 +1,6 @@
 /** The assets that the page can switch between, each loaded when it is first chosen; and the direct light of indirect ones. */
 import type { Texture, WebGLRenderer } from "three";
-import type { Asset, FloatImage, Light, Triple } from "../src";
+import type { Asset, FloatImage, Light, Profile, Triple } from "../src";
 import { carried } from "../src/matrix";
 import { alphaTexture } from "../src/three/textures";
 import type { BallState } from "./ball_state";
@@ -16,6 +16,8 @@ export class Subject {
   readonly facts: AssetFacts;
   readonly asset: Asset;
   readonly coverage?: FloatImage;
+  /** Of its scene's own lights, by the names that they have for them. */
+  readonly profiles: ReadonlyMap<string, Profile>;
   /** The picture's alpha: a view's coverage, 1 everywhere for other assets. */
   readonly alpha: Texture;
   readonly relighting: ViewerRelighting;
@@ -31,6 +33,7 @@ export class Subject {
     this.facts = loaded.facts;
     this.asset = loaded.asset;
     this.coverage = loaded.coverage;
+    this.profiles = loaded.profiles;
     const floats = drawsFloats(renderer);
     this.relighting = new ViewerRelighting(loaded.asset, { source: "lightmap", target: floats ? "float" : "half", filter: "linear", weights: weightsFor(loaded.asset, renderer) });
     this.alpha = this.relighting.textures.alpha ?? alphaTexture({ kind: "float", width: 1, height: 1, channels: 1, data: new Float32Array([1]) });

@@ -20,7 +20,7 @@ export class SunShadows {
   /** `bounds`: points, xyz, that the maps must hold; `angle` of the sun's disc, rad. */
   constructor(
     renderer: WebGLRenderer,
-    lit: LitTexels,
+    lit: readonly LitTexels[],
     casters: readonly Caster[],
     private readonly bounds: Float32Array,
     private readonly angle: number,

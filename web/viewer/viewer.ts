@@ -3,7 +3,7 @@ import { NoToneMapping, WebGLRenderer } from "three";
 import { type Asset, type Light, lightDomainOf, type Triple } from "../src";
 import { SrbfProbes } from "../src/three";
 import { Address } from "./address";
-import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, redesign } from "./asset_lights";
+import { capturedPlaces, firstLights, inside, kindsOf, middleOf, missingLine, outsideLine, profileNames, redesign } from "./asset_lights";
 import { Ball } from "./ball";
 import { dragBall } from "./ball_drag";
 import { firstBall, roomOf } from "./ball_state";
@@ -354,7 +354,7 @@ export class Viewer {
       this.comparison.off();
       this.directions.marked = -1;
       if (this.state.compare !== "off" && !this.besideCycles) say(this.loaded.references ? `comparing needs a ${this.inCloud ? "point" : "directional"} light: add one` : "nothing to compare with yet: let Cycles render", "hint");
-      return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
+      return [...shiningOf(this.state.lights).flatMap((light) => lightOf(light, this.environments, this.subject.profiles) ?? []), ...emitting(this.subject.asset, this.state.surfaces)];
     }
     const light = this.comparison.light(compared);
     this.directions.marked = this.comparison.compared;
@@ -471,7 +471,7 @@ export class Viewer {
   /** Play the frames of a file from now on. */
   private frames(file: File): Promise<void> {
     return this.slowly(async () => {
-      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear");
+      this.keyframes = await droppedFrames(file, this.state, this.inCloud ? "inverse-square" : "linear", profileNames(this.subject.asset.manifest));
       this.panel.setFacts(this.panelFacts());
     });
   }

@@ -3,7 +3,7 @@ import { type EnvironmentManifest, EnvironmentTable } from "../environment_table
 import { SrbfError } from "../errors";
 import { decodeFloat } from "../exr";
 import type { AssetFiles } from "../files";
-import { type LightValues, readLightValues, readTable, rgb, summed, type TableEntry } from "../light_values";
+import { type LightValues, readLightValues, readTable, summed, type TableEntry } from "../light_values";
 import type { Triple } from "../matrix";
 import { Occluders } from "../occluders";
 import { checkPositionTable, type PositionManifest, PositionTable } from "../position_table";
@@ -52,11 +52,11 @@ export const lightCloud: Method = {
     let version = 0; // of the surfaces
     let known = new Map<string, Float64Array>(); // weights of white lights: those that have not moved are not computed again
     const weightsOf = (light: Placed): Float64Array => {
-      const isotropic = light.kind === "point" || light.kind === "sphere";
+      const isotropic = (light.kind === "point" || light.kind === "sphere") && !light.profile;
       const asBaked = surfaces?.change === undefined; // the table knows no other surfaces
       if (table && asBaked && isotropic && light.falloff === "inverse-square" && !(exact && rays)) return table.at(light.position).weights.map((weight) => weight * light.a0 ** 2);
       if (rays) return rays.weights(light);
-      throw new SrbfError(`expected an asset of patches with cells.exr and scene.glb for a ${light.kind} light, found none: its table of positions holds inverse-square point lights`);
+      throw new SrbfError(`expected an asset of patches with cells.exr and scene.glb for a ${light.kind} light${"profile" in light ? " with a profile" : ""}, found none: its table of positions holds inverse-square point lights`);
     };
     return {
       ...parts,
@@ -125,9 +125,9 @@ class Rays {
   weights(light: Placed): Float64Array {
     const { occluders, surfaces } = this;
     const { cells, reflectance, tables } = this.surfels;
-    const received = light.kind === "area" ? cells.underArea(light, occluders) : light.kind === "directional" ? cells.underDistant(light.direction, occluders, FAR) : cells.underPoint(light, occluders);
-    if (surfaces?.change) return summed(valuesOf(this.surfels), surfaces.received(rgb(received, tables[0].count)));
-    const reflected = reflectance ? rgb(received, tables[0].count).map((e, i) => e * reflectance[i]) : received;
+    const received = cells.under(light, occluders, FAR, tables[0].count);
+    if (surfaces?.change) return summed(valuesOf(this.surfels), surfaces.received(received));
+    const reflected = reflectance ? received.map((e, i) => e * reflectance[i]) : received;
     return tables.reduce((weights, table) => summed(table, weights), reflected);
   }
 }

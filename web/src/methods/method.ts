@@ -57,6 +57,8 @@ export interface Tables {
   readonly integers: Readonly<Record<string, number>>;
   /** Textures that are fetched by texel, never filtered. */
   readonly textures: Readonly<Record<string, FloatImage | HalfImage | ByteImage>>;
+  /** Layers (RGBA bytes) that its shader finds after the stored ones, of methods whose layers are bytes. */
+  readonly furtherLayers?: readonly Uint8Array[];
   /** Where the shader takes the projected weights from, as `srbfWeights`: an array of `width` vec4, or an RGBA32F texture. */
   readonly weights: { readonly kind: "uniform" | "texture"; readonly width: number; readonly height: number };
   /** Names of its lights, of assets of named ones. */

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What one look of a light lays on each cell of a scene's surfaces, added to that of the looks before: the arithmetic of srbf/visibility/received.py.
 // SRBF_SOURCES: what a group of bright surfels lays there, seen from one place: that of srbf/visibility/near_sources.py.
-// SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
+// SRBF_PROFILE: the light has a profile. SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
 // depths (or their means, VSM). SRBF_MEAN_NORMALS: normals may be means over several faces. SRBF_REVERSED: the engine's depth is 1 where it is nearest.
 precision highp float;
 precision highp int;
@@ -20,6 +20,9 @@ precision highp samplerCubeShadow;
 #ifdef SRBF_SOURCES
 #include "surfels/disc_factor.glsl"
 #endif
+#ifdef SRBF_PROFILE
+#include "surfels/profiled_irradiance.glsl"
+#endif
 
 uniform sampler2D places;   // less the middle of all cells, meters; area
 uniform sampler2D normals;  // unit; share of the patch's area
@@ -34,6 +37,12 @@ uniform int falloff;
 uniform float versineInner;
 uniform float versineOuter;
 uniform float lambertian;
+#ifdef SRBF_PROFILE
+uniform sampler2D profile;
+uniform vec3 profileAcross;
+uniform vec3 profileUp;
+uniform float profileTangent;
+#endif
 #ifdef SRBF_SOURCES
 uniform sampler2D sources;  // rows: place and area, normal, radiosity, of one surfel a column
 uniform int first;          // column of the group's first surfel
@@ -79,7 +88,11 @@ vec3 unshadowed(vec4 cell, vec3 normal) {
     return color * max(dot(normal, light), 0.0);
 #else
     SrbfPointLight pointLight = SrbfPointLight(light, vec3(0.0), color, axis, a0, radius, versineInner, versineOuter, falloff);
+#ifdef SRBF_PROFILE
+    return color * srbfProfiledIrradiance(cell, normal, pointLight, profile, profileAcross, profileUp, profileTangent);
+#else
     return color * srbfCellIrradiance(cell, normal, pointLight, lambertian);
+#endif
 #endif
 }
 

@@ -1,5 +1,6 @@
 /**
- * The irradiance of a deep framebuffer's view clusters, computed by the GPU: direct light on its surfels, bounces between them, links to the clusters.
+ * The irradiance of a deep framebuffer's view clusters, and what lobes gather, computed by the GPU: direct light on its surfels, bounces between them, links to
+ * clusters and lobes.
  * A light that has not moved is kept, so that another color, or another light, costs one small pass. Of one that has moved, direct light is read back
  * where bright surfels light in closed form, which the CPU finds.
  */
@@ -8,7 +9,7 @@ import bounceStage from "../../../glsl/stages/deep_framebuffer_bounce.frag";
 import clustersStage from "../../../glsl/stages/deep_framebuffer_clusters.frag";
 import sumStage from "../../../glsl/stages/deep_framebuffer_sum.frag";
 import { SrbfError } from "../errors";
-import { ACROSS, type Gather, type PackedLinks } from "../gather";
+import { ACROSS, type Gather, type PackedLinks, weightRows } from "../gather";
 import type { ShapeLights } from "../shape_weights";
 import type { Triple } from "../matrix";
 import { packedCells } from "../surfels";
@@ -26,13 +27,18 @@ export class GatherWeights {
   private readonly direct: SurfelIrradiance;
   private readonly near?: NearIrradiance;
   private readonly albedo: DataTexture;
+  /** What lobes see surfels reflect beside that, and a target for it. */
+  private readonly specular?: { albedo: DataTexture; target: WebGLRenderTarget };
   private readonly links: DataTexture[];
   private readonly radiosity: [WebGLRenderTarget, WebGLRenderTarget];
+  /** Rows of the clusters, and of the lobes after them. */
+  private readonly rows: [number, number];
   /** The sum of all lights, the first; and what is drawn in turn with it. */
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
   private readonly size: [number, number];
   private readonly bounce: FullscreenPass;
   private readonly clusters: FullscreenPass;
+  private readonly lobes?: FullscreenPass;
   private readonly sum: FullscreenPass;
   /** Irradiance of the clusters by lights in white. */
   private known = new Map<string, WebGLRenderTarget>();
@@ -45,17 +51,24 @@ export class GatherWeights {
     const cells = packedCells(gather.surfels);
     this.middle = cells.middle;
     this.direct = new SurfelIrradiance(gather.surfels, cells, shadowSize, { SRBF_MEAN_NORMALS: 1 });
-    if (gather.near) this.near = new NearIrradiance(gather.near, cells, this.direct);
-    const albedo = new Float32Array(4 * cells.width * cells.height);
-    for (let i = 0; i < gather.surfels.cells.count; ++i) albedo.set(gather.albedo.subarray(3 * i, 3 * i + 3), 4 * i);
-    this.albedo = floatTexture(albedo, cells.width, cells.height);
+    if (gather.near) this.near = new NearIrradiance(gather, gather.near, cells, this.direct);
+    const colors = (values: Float32Array) => {
+      const texels = new Float32Array(4 * cells.width * cells.height);
+      for (let i = 0; i < gather.surfels.cells.count; ++i) texels.set(values.subarray(3 * i, 3 * i + 3), 4 * i);
+      return floatTexture(texels, cells.width, cells.height);
+    };
+    this.albedo = colors(gather.albedo);
+    if (gather.specular) this.specular = { albedo: colors(gather.specular), target: floatTarget(cells.width, cells.height) };
     this.radiosity = [floatTarget(cells.width, cells.height), floatTarget(cells.width, cells.height)];
-    this.size = [ACROSS, Math.ceil(gather.view.count / ACROSS)];
+    this.rows = weightRows(gather);
+    this.size = [ACROSS, this.rows[0] + this.rows[1]];
     this.sums = [floatTarget(...this.size), floatTarget(...this.size)];
-    const [exchange, view] = [gather.exchange, gather.view].map(linkUniforms);
-    this.links = [exchange, view].flatMap(({ links, rows }) => [links.value, rows.value]);
+    const [exchange, view] = [gather.exchange, gather.view].map((links) => linkUniforms(links));
+    const gloss = gather.gloss && linkUniforms(gather.gloss, this.rows[0]);
+    this.links = [exchange, view, ...(gloss ? [gloss] : [])].flatMap(({ links, rows }) => [links.value, rows.value]);
     this.bounce = new FullscreenPass(bounceStage, { ...exchange, light: { value: null }, direct: { value: null }, albedo: { value: this.albedo }, first: { value: 1 } });
     this.clusters = new FullscreenPass(clustersStage, { ...view, light: { value: null } });
+    if (gloss) this.lobes = new FullscreenPass(clustersStage, { ...gloss, light: { value: null } });
     this.sum = new FullscreenPass(sumStage, { former: { value: null }, light: { value: null }, color: { value: [0, 0, 0] } });
   }
 
@@ -96,6 +109,7 @@ export class GatherWeights {
     const targets = [...this.radiosity, ...this.sums, ...this.known.values(), ...this.unused];
     this.near?.dispose();
     for (const one of [this.direct, this.albedo, ...this.links, ...targets, this.bounce, this.clusters, this.sum]) one.dispose();
+    for (const one of [this.lobes, this.specular?.albedo, this.specular?.target]) one?.dispose();
   }
 
   private add(renderer: WebGLRenderer, former: Texture, light: Texture, color: number[], target: WebGLRenderTarget): void {
@@ -111,22 +125,54 @@ export class GatherWeights {
     const near = this.near?.draw(renderer, direct, looks);
     let [light, next] = this.radiosity;
     for (let term = 0; term < this.gather.terms; ++term) {
-      this.bounce.uniforms.direct.value = near ? (term ? near.second : near.far) : direct.texture;
-      this.bounce.uniforms.light.value = light.texture;
-      this.bounce.uniforms.first.value = term ? 0 : 1;
-      this.bounce.draw(renderer, next);
+      this.reflect(renderer, near ? (term ? near.second : near.far) : direct.texture, light.texture, this.albedo, term === 0, next);
       [light, next] = [next, light];
     }
     if (this.gather.terms === 0) {
       renderer.setRenderTarget(light);
       renderer.clear(true, false, false);
     }
+    const [rows] = this.rows;
     this.clusters.uniforms.light.value = light.texture;
     const [, linked] = this.sums;
-    this.clusters.draw(renderer, near ? linked : target);
-    if (near) this.add(renderer, linked.texture, near.clusters, [1, 1, 1], target);
+    within(near ? linked : target, 0, rows, (part) => this.clusters.draw(renderer, part));
+    if (near) within(target, 0, rows, (part) => this.add(renderer, linked.texture, near.clusters, [1, 1, 1], part));
+    if (this.lobes) this.gatherGloss(renderer, this.lobes, light, near?.second ?? direct.texture, near?.taken, target);
     ++this.computed;
     return target;
+  }
+
+  /** What surfels of an `albedo` reflect of direct irradiance, and unless they are the `first` of the `light` of others. */
+  private reflect(renderer: WebGLRenderer, direct: Texture, light: Texture, albedo: Texture, first: boolean, target: WebGLRenderTarget): void {
+    for (const [name, value] of Object.entries({ direct, light, albedo, first: first ? 1 : 0 })) this.bounce.uniforms[name].value = value;
+    this.bounce.draw(renderer, target);
+  }
+
+  /** What lobes gather: surfels reflect more toward them than toward others. `arriving`: on the surfels, beside links; `taken`: what bright ones reflect of what links lack. */
+  private gatherGloss(renderer: WebGLRenderer, lobes: FullscreenPass, radiosity: WebGLRenderTarget, arriving: Texture, taken: Texture | undefined, target: WebGLRenderTarget): void {
+    let [seen, next] = radiosity === this.radiosity[0] ? this.radiosity : [this.radiosity[1], this.radiosity[0]];
+    const more = (light: Texture) => {
+      this.add(renderer, seen.texture, light, [1, 1, 1], next);
+      [seen, next] = [next, seen];
+    };
+    if (this.specular && this.gather.terms) {
+      this.reflect(renderer, arriving, seen.texture, this.specular.albedo, false, this.specular.target);
+      more(this.specular.target.texture);
+    }
+    if (taken) more(taken);
+    lobes.uniforms.light.value = seen.texture;
+    const [before, own] = this.rows;
+    within(target, before, own, (part) => lobes.draw(renderer, part));
+  }
+}
+
+/** Draw into some rows of a target alone. */
+function within(target: WebGLRenderTarget, first: number, rows: number, draw: (target: WebGLRenderTarget) => void): void {
+  target.viewport.set(0, first, target.width, rows);
+  try {
+    draw(target);
+  } finally {
+    target.viewport.set(0, 0, target.width, target.height);
   }
 }
 
@@ -135,6 +181,9 @@ function keyOf(looks: readonly ShadowedLook[]): string | undefined {
   return looks.some(({ shadow }) => shadow) ? undefined : JSON.stringify(looks.map((look) => ({ ...look, color: 1 })));
 }
 
-function linkUniforms({ links, rows, rays }: PackedLinks) {
-  return { links: { value: tableTexture(links) }, rows: { value: tableTexture(rows) }, rays: { value: rays } };
+/** `before`: rows of the target before theirs. */
+function linkUniforms({ links, rows, rays }: PackedLinks, before = 0) {
+  const data = new Float32Array(4 * ACROSS * before + rows.data.length);
+  data.set(rows.data, 4 * ACROSS * before);
+  return { links: { value: tableTexture(links) }, rows: { value: tableTexture({ ...rows, height: rows.height + before, data }) }, rays: { value: rays } };
 }

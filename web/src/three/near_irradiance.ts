@@ -3,7 +3,7 @@
  * each set of receivers. Direct light on the surfels is read back, since which of them are bright is found on the CPU.
  */
 import type { DataTexture, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
-import { ACROSS } from "../gather";
+import { ACROSS, type Gather } from "../gather";
 import type { Triple } from "../matrix";
 import { MOST, type NearPool, type NearSources, without } from "../near_sources";
 import type { Look, PackedCells } from "../surfels";
@@ -26,10 +26,13 @@ export interface Parted {
   readonly second: Texture;
   /** What they lay on view clusters. */
   readonly clusters: Texture;
+  /** What the bright ones reflect toward lobes, of the part of their irradiance that links lack. */
+  readonly taken?: Texture;
 }
 
 export class NearIrradiance {
   private readonly far: DataTexture;
+  private readonly taken?: DataTexture;
   private readonly sources: DataTexture;
   private readonly textures: DataTexture[];
   private readonly surfels: Receivers;
@@ -38,6 +41,7 @@ export class NearIrradiance {
 
   /** `cells`: of the pool, as `direct` has them, in the pool's order: each is its own patch. */
   constructor(
+    private readonly gather: Gather,
     private readonly pool: NearPool,
     private readonly cells: PackedCells,
     private readonly direct: SurfelIrradiance,
@@ -45,6 +49,7 @@ export class NearIrradiance {
     const { width, height } = cells;
     this.read = new Float32Array(4 * width * height);
     this.far = floatTexture(new Float32Array(4 * width * height), width, height);
+    if (gather.gloss) this.taken = floatTexture(new Float32Array(4 * width * height), width, height);
     this.sources = floatTexture(new Float32Array(12 * MOST), MOST, 3);
     const rows = Math.ceil(pool.clusters / ACROSS);
     this.textures = [pool.places, pool.normals].map((values, row) => {
@@ -65,8 +70,15 @@ export class NearIrradiance {
     const near = pool.sources(values, { place: this.placeOf(looks), distant: looks[0].distant });
     if (!near) return undefined;
     const far = this.far.image.data as unknown as Float32Array;
-    without(near, values).forEach((x, i) => (far[4 * Math.floor(i / 3) + (i % 3)] = x));
+    const toLobes = this.taken?.image.data as unknown as Float32Array | undefined;
+    const { albedo, specular } = this.gather;
+    without(near, values).forEach((x, i) => {
+      const at = 4 * Math.floor(i / 3) + (i % 3);
+      far[at] = x;
+      if (toLobes) toLobes[at] = (albedo[i] + (specular?.[i] ?? 0)) * (values[i] - x);
+    });
     this.far.needsUpdate = true;
+    if (this.taken) this.taken.needsUpdate = true;
     this.setSources(near);
     const [blank] = this.clusters.sums;
     renderer.setRenderTarget(blank);
@@ -80,11 +92,12 @@ export class NearIrradiance {
       second = added(renderer, this.surfels, second, values);
       clusters = added(renderer, this.clusters, clusters, values);
     }
-    return { far: this.far, second, clusters };
+    return { far: this.far, second, clusters, taken: this.taken };
   }
 
   dispose(): void {
     const sets = [this.surfels, this.clusters].flatMap(({ pass, sums }) => [pass, ...sums]);
+    this.taken?.dispose();
     for (const one of [this.far, this.sources, ...this.textures, ...sets]) one.dispose();
   }
 

@@ -7,6 +7,7 @@ import { type ShadowedLook, shadowUniforms } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
+import { ProfileTextures } from "./profile_textures";
 
 /** A pass of surfel_irradiance.glsl. */
 export function irradiancePass(uniforms: Record<string, IUniform>, defines: Record<string, number>): FullscreenPass {
@@ -20,6 +21,7 @@ export class SurfelIrradiance {
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
   readonly maps: OccluderMaps;
   private readonly passes = new Map<string, FullscreenPass>();
+  private readonly profiles = new ProfileTextures();
 
   /** `shadowSize`: texels per side of a face of the shadow maps; `defines` of surfel_irradiance.glsl. */
   constructor(
@@ -49,12 +51,12 @@ export class SurfelIrradiance {
   }
 
   dispose(): void {
-    for (const one of [this.places, this.normals, ...this.sums, this.maps, ...this.passes.values()]) one.dispose();
+    for (const one of [this.places, this.normals, ...this.sums, this.maps, ...this.passes.values(), this.profiles]) one.dispose();
   }
 
   private add(renderer: WebGLRenderer, look: ShadowedLook, former: Texture, next: WebGLRenderTarget): void {
     const shadow = look.shadow ? shadowUniforms(renderer, look.shadow, this.cells.middle) : undefined;
-    const defines = { ...this.defines, ...(look.distant ? { SRBF_DISTANT: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
+    const defines = { ...this.defines, ...(look.distant ? { SRBF_DISTANT: 1 } : {}), ...(look.shape ? { SRBF_PROFILE: 1 } : {}), SRBF_SHADOW: 1, ...shadow?.defines };
     const key = JSON.stringify(defines);
     let pass = this.passes.get(key);
     if (!pass) {
@@ -73,6 +75,7 @@ export class SurfelIrradiance {
       versineInner: look.cone ? versine(look.cone[0]) : 3,
       versineOuter: look.cone ? versine(look.cone[1]) : 4,
       lambertian: look.lambertian ? 1 : 0,
+      ...(look.shape ? this.profiles.uniforms(look.shape) : {}),
       ...own,
       ...shadow?.values,
     };
@@ -81,7 +84,7 @@ export class SurfelIrradiance {
   }
 
   private uniforms(): Record<string, IUniform> {
-    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up"];
+    const names = ["former", "light", "color", "axis", "a0", "radius", "falloff", "versineInner", "versineOuter", "lambertian", "nearness", "reach", "across", "up", "profile", "profileAcross", "profileUp", "profileTangent"];
     const shadows = ["sceneFromCell", "shadowMatrix", "shadowBias", "shadowNormalBias", "shadowIntensity", "shadowDepths", "shadowMap"];
     const uniforms: Record<string, IUniform> = Object.fromEntries([...names, ...shadows].map((name) => [name, { value: null }]));
     return { ...uniforms, places: { value: this.places }, normals: { value: this.normals }, lift: { value: this.lift }, sceneFromCell: { value: new Matrix4() } };

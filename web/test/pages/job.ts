@@ -1,5 +1,5 @@
 /** Jobs that the tests send to a page, and their results. */
-import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, sphereLight, spotLight, type Triple } from "../../src";
+import { areaLight, directionalLight, environmentLight, type Light, namedLight, pointLight, Profile, sphereLight, spotLight, type Triple } from "../../src";
 
 export interface Job {
   run: string;
@@ -22,7 +22,8 @@ export interface Picture {
 }
 
 export function lightOfJson(json: LightJson): Light {
-  const options = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number };
+  const shape = json.profile ? { profile: profileOf(json.profile as ProfileJson), direction: json.direction as Triple, roll: json.roll as number } : {};
+  const options = { color: json.color, a0: json.a0 as number, falloff: json.falloff as "linear", radius: json.radius as number, ...shape };
   if (json.kind === "directional") return directionalLight(json.direction as Triple, json.color);
   if (json.kind === "point") return pointLight(json.position as Triple, options);
   if (json.kind === "spot") {
@@ -32,6 +33,25 @@ export function lightOfJson(json: LightJson): Light {
   if (json.kind === "area") return areaLight(json.position as Triple, json.u as Triple, json.v as Triple, { color: json.color, a0: json.a0 as number });
   if (json.kind === "named") return namedLight(json.name as string, json.color);
   return environmentLight(json.width as number, json.height as number, json.pixels as number[], json.color);
+}
+
+/** A table row by row, RGB, as `srbf.light_profile.Profile` has it. */
+interface ProfileJson {
+  width: number;
+  height: number;
+  numbers: number[];
+  projected: boolean;
+}
+
+const profiles = new Map<string, Profile>();
+
+/** Equal ones are one. */
+function profileOf(json: ProfileJson): Profile {
+  const key = JSON.stringify(json);
+  const { width, height, numbers, projected } = json;
+  const found = profiles.get(key) ?? new Profile({ kind: "float", width, height, channels: 3, data: new Float32Array(numbers) }, projected);
+  profiles.set(key, found);
+  return found;
 }
 
 interface Mixed {

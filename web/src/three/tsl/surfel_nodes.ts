@@ -8,6 +8,7 @@ import type { Triple } from "../../matrix";
 import { versine as versineOf } from "../../point_light";
 import { type ShapeLights, shapeState, shapeWeights } from "../../shape_weights";
 import { packedCells, packedReflectance, shapesTable, square } from "../../surfels";
+import { SrbfError } from "../../errors";
 import type { EngineShadow, ShadowedLook } from "../engine_shadows";
 import { floatTexture } from "../float_textures";
 import { surfelsOf } from "../surfel_weights";
@@ -97,6 +98,7 @@ export class SurfelNodes {
     renderer.clear();
     let from: 0 | 1 = 0;
     const used = new Map<DepthTexture, Shadowed>();
+    if (looks.some(({ shape }) => shape)) throw new SrbfError('expected lights without a profile for weights "gpu" of nodes, found one; take weights: "cpu"');
     for (const look of looks) {
       const shadowed = look.shadow && this.shadowed(renderer, look, look.shadow, used);
       this.set(renderer, look);

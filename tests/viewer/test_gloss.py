@@ -1,0 +1,199 @@
+"""Direct light on glossy and translucent pixels of a view: the page's is what rays say; a profile shapes direct light and bounces."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from closed_forms import ball, build_plane, quad
+from made_profiles import UNEVEN, uneven
+from made_rooms import Room
+from made_views import view_of_room
+from test_page import HEIGHT, WIDTH, lights_of, shown_as
+from view_assets import scene_glb
+from web_assets import complete
+
+from srbf.asset import Asset
+from srbf.io.image import read_image
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.methods import relight
+from srbf.methods.deep_framebuffer import DeepFramebuffer
+from srbf.relighting.direct_light import Added
+from srbf.unshadowed import irradiance_from
+from srbf.visibility.glossy_direct import GlossyPixels
+from srbf.visibility.hemisphere import GOLDEN
+from srbf.visibility.light_rays import rays_towards
+from srbf.visibility.receivers import Receivers
+
+pytest.importorskip("embreex")
+
+SIDE, ZOOM = 24, 16
+APART, MEAN = 3.0, 2.0  # bytes: nine of ten texels, and the mean: a texel at a shadow's edge is a mean of four points here
+SHAPED = 3.0  # bytes of the picture under a light with a profile
+SAMPLES = 1000  # places on a light
+HIGH = 2.0  # m: of the camera above the plane
+CAMERA = {
+    "type": "PERSP",
+    "matrix_world": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, HIGH], [0, 0, 0, 1]],
+    "frame": [[0.5, 0.5, -HIGH / 2], [0.5, -0.5, -HIGH / 2], [-0.5, -0.5, -HIGH / 2], [-0.5, 0.5, -HIGH / 2]],
+    "filter": "BOX",
+    "filter_width": 1.0,
+}
+COMMON: dict[str, Any] = {"on": True, "color": "#ffffff", "intensity": 1.0}
+FADE: dict[str, Any] = {"falloff": "inverse-square", "radius": 0.001}
+PLACE = (1.3, -0.3, 1.2)
+INSIDE = (1.1, 0.8, 1.4)
+OVER: dict[str, tuple[dict[str, Any], Light]] = {
+    "point": ({"kind": "point", **FADE, "position": PLACE, "a0": 1.0}, PointLight(PLACE, a0=1.0, falloff="inverse-square", radius=0.001)),
+    "sun": ({"kind": "directional", "direction": [-0.1, -0.15, 1]}, DirectionalLight((-0.1, -0.15, 1))),
+    "behind": (
+        {"kind": "point", **FADE, "position": [0.25, -0.3, -1.1], "a0": 1.0},
+        PointLight((0.25, -0.3, -1.1), a0=1.0, falloff="inverse-square", radius=0.001),
+    ),
+}
+
+
+SIZED: dict[str, tuple[dict[str, Any], SphereLight | AreaLight]] = {
+    "sphere": (
+        {"kind": "sphere", **FADE, "position": INSIDE, "a0": 1.0, "size": 0.15},
+        SphereLight(INSIDE, a0=1.0, size=0.15, falloff="inverse-square"),
+    ),
+    "area": (
+        {"kind": "area", "position": INSIDE, "target": [1.1, 0.8, 0], "width": 0.5, "height": 0.2, "turn": 0, "a0": 1.0},
+        AreaLight(INSIDE, u=(0.5, 0, 0), v=(0, -0.2, 0)),
+    ),
+}
+
+
+@pytest.fixture
+def glossy(make_asset: Callable[..., Asset]) -> Asset:
+    """Indirect maps of a view straight down on a plane, glossy in half of it and translucent in the other, below a small ball."""
+    occluder = ball(0.15, [0.95, -0.3, 0.75], 24)  # no ray of the camera meets it
+    receivers = build_plane(occluder, size=SIDE, albedo=(0.3, 0.2, 0.1))
+    plain = {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1]}, "doubleSided": True}
+    ground = quad([-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0])
+    made = make_asset(k=4, height=SIDE, width=SIDE, encoding="half", position=False)
+    columns = np.broadcast_to(np.arange(SIDE)[None, :, None] / SIDE, (SIDE, SIDE, 3))
+    color = np.where(columns > 0.3, [0.5, 0.4, 0.3], 0).astype(np.float32)
+    lobe = np.stack([0.2 + 0.4 * columns[::-1, :, 0].T, columns[..., 0], columns[..., 0] > 0.3], axis=2).astype(np.float32)
+    through = np.where(columns < 0.3, [0.1, 0.5, 0.3], 0).astype(np.float32)
+    images = {**receivers.images, "coverage": np.ones((SIDE, SIDE), np.float32), "glossy": color, "lobe": lobe, "transmission": through}
+    names = {"transport": "indirect", "quantity": "radiance", "scene": "scene.glb", "receiver": {"kind": "view", "camera": "Camera"}}
+    scene = scene_glb(("Ground", ground, plain), ("Ball", occluder, plain))
+    return complete(replace(made, images=images, scene=scene), **names, direct={"sun_angle": 0.0, "camera": CAMERA})
+
+
+@pytest.mark.parametrize("kind", OVER)
+def test_lobes_and_backs_show_direct_light_as_rays_say(
+    chromium: Any, glossy: Asset, serve: Callable[..., str], tmp_path: Path, kind: str
+) -> None:
+    glossy.save(tmp_path / "asset")
+    state, light = OVER[kind]
+    expected = direct_light(glossy, [light])
+    bare = {name: image for name, image in glossy.images.items() if name not in ("lobe", "transmission")}
+    diffuse = direct_light(replace(glossy, images=bare), [light])
+    assert np.quantile(np.abs(shown_as(expected) - shown_as(diffuse)), 0.9) > 10
+    lights = [{**COMMON, **state}]
+    hashed = json.dumps({"zoom": ZOOM, "middle": [SIDE / 2, SIDE / 2], "terms": "direct", "exposure": 0, "lights": lights, "selected": -1})
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(hashed)}", width=WIDTH, height=HEIGHT)
+    apart = np.abs(saved(chromium, tmp_path) - shown_as(expected))
+    assert np.quantile(apart, 0.9) <= APART, np.quantile(apart, [0.5, 0.9, 0.95, 1])
+    assert apart.mean() <= MEAN
+
+
+@pytest.fixture(scope="module")
+def shaped(tmp_path_factory: pytest.TempPathFactory) -> Asset:
+    """A deep framebuffer whose scene has lights with an IES file."""
+    room = Room.box((3, 2, 2), 0.25, 0.6)
+    asset = DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("view") / "capture", room, 700, 150, tested=0))
+    common = {"position": [1.2, 0.9, 1.3], "color": [1.0, 0.8, 0.6], "a0": 0.7, "falloff": "inverse-square", "profile": "Lamp.ies"}
+    lamp = {"kind": "point", **common, "direction": [0.6, 0.3, -0.8], "roll": 0.7}
+    spot = {"kind": "spot", **common, "direction": [-0.5, 0.0, -1.0], "inner": 0.6, "outer": 0.9, "roll": -0.4}
+    own = {"scene_lights": [{"name": "Lamp", "light": lamp}, {"name": "Spot", "light": spot}], "scene_profiles": {"Lamp.ies": UNEVEN}}
+    return replace(asset, manifest={**asset.manifest, **own, "direct": {"sun_angle": 0.0, "footprint": 1e-3}})
+
+
+@pytest.mark.parametrize("kind", SIZED)
+def test_lobes_reflect_lights_with_a_size(chromium: Any, shaped: Asset, serve: Callable[..., str], tmp_path: Path, kind: str) -> None:
+    """In a room without anything between, beside the mean over many places of the light, each as a point."""
+    rng = np.random.default_rng(5)
+    shape = (shaped.height, shaped.width)
+    color = np.broadcast_to(np.float32(0.5), (*shape, 3)).copy()
+    lobe = np.stack([rng.uniform(0.2, 0.7, shape), rng.uniform(0, 1, shape), np.ones(shape)], axis=2).astype(np.float32)
+    matrix = np.eye(4)
+    matrix[:3, 3] = (2.4, 1.4, 1.2)
+    direct = {**shaped.manifest["direct"], "camera": {**CAMERA, "matrix_world": matrix.tolist()}}
+    manifest = {**shaped.manifest, "direct": direct, "glossy": "glossy.exr", "lobe": "lobe.exr"}
+    asset = replace(shaped, manifest=manifest, images={**shaped.images, "glossy": color, "lobe": lobe})
+    asset.save(tmp_path / "asset")
+    state, light = SIZED[kind]
+    pixels = GlossyPixels(Receivers.of(asset))
+    points, normals, albedo = (asset.images[name].reshape(-1, 3)[pixels.texels] for name in ("position", "normal", "albedo"))
+    square = (np.arange(SAMPLES)[:, None] * np.array(GOLDEN)) % 1
+    lobes = np.zeros((len(points), 3))
+    for place in square:
+        rays = rays_towards(light, points, normals, 0.0, partial(np.broadcast_to, place, (len(points), 2)))
+        NoL = np.maximum(np.einsum("nc,nc->n", normals, rays.direction), 1e-4)
+        reflected = pixels.reflected(pixels.texels, points, normals, rays.direction.astype(np.float64))
+        lobes += reflected * (rays.irradiance * rays.importance / NoL)[:, None] * rays.opening / SAMPLES
+    diffuse = irradiance_from(light, points, normals)[:, None] * albedo / np.pi
+    lights = [{**COMMON, **state}]
+    hashed = json.dumps({"zoom": ZOOM, "middle": [asset.width / 2, asset.height / 2], "terms": "direct", "exposure": 0, "lights": lights})
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(hashed)}", width=WIDTH, height=HEIGHT)
+    apart = np.abs(saved(chromium, tmp_path).reshape(-1, 3)[pixels.texels] - shown_as(diffuse + lobes))
+    assert np.quantile(apart, 0.95) <= APART, np.quantile(apart, [0.5, 0.9, 0.95, 1])
+    assert np.quantile(shown_as(diffuse + lobes) - shown_as(diffuse), 0.9) > 10
+
+
+@pytest.mark.parametrize("terms", ["indirect", "direct"])
+def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve: Callable[..., str], tmp_path: Path, terms: str) -> None:
+    """The scene's own lights, with their files; FRAMES.json names these, and `srbf relight` finds them in the asset."""
+    shaped.save(tmp_path / "asset")
+    where: dict[str, Any] = {
+        "position": (1.2, 0.9, 1.3),
+        "color": (1.0, 0.8, 0.6),
+        "a0": 0.7,
+        "falloff": "inverse-square",
+        "profile": uneven,
+    }
+    lights: list[Light] = [
+        PointLight(**where, direction=(0.6, 0.3, -0.8), roll=0.7),
+        SpotLight(**where, direction=(-0.5, 0.0, -1.0), inner=0.6, outer=0.9, roll=-0.4),
+    ]
+    hashed = quote(json.dumps({"zoom": ZOOM, "middle": [shaped.width / 2, shaped.height / 2], "terms": terms, "exposure": 0}))
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{hashed}", width=WIDTH, height=HEIGHT)
+
+    def pictures(one: list[Light]) -> np.ndarray:
+        if terms == "indirect":
+            return relight(shaped, one)
+        return direct_light(shaped, one)
+
+    expected, even = (pictures(one) for one in (lights, [replace(light, profile=None) for light in lights]))  # type: ignore[arg-type]
+    covered = shaped.images["coverage"] > 0.5
+    apart = np.abs(saved(chromium, tmp_path) - shown_as(expected))[covered]
+    assert np.quantile(apart, 0.95) <= SHAPED, np.quantile(apart, [0.5, 0.9, 0.95, 1])
+    assert np.quantile(np.abs(shown_as(even) - shown_as(expected))[covered], 0.5) > 3 * SHAPED
+    (found,) = lights_of(chromium, tmp_path, known=shaped)
+    np.testing.assert_allclose(pictures(found), expected, atol=1e-3 * expected.max())
+    assert "profile" not in chromium("run", script="document.getElementById('status').textContent")
+
+
+def direct_light(asset: Asset, lights: list[Light]) -> np.ndarray:
+    """By rays."""
+    with Added(asset, "ray") as added:
+        found = added.response(lights)
+    assert found is not None
+    return found
+
+
+def saved(chromium: Any, folder: Path) -> np.ndarray:
+    """The page's picture, (H, W, 3) bytes."""
+    (folder / "saved.png").write_bytes(chromium.file("Picture (PNG)"))
+    return read_image(folder / "saved.png", 3) * 255
