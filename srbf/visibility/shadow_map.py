@@ -23,8 +23,8 @@ from srbf.visibility.looks import look_of, looks_over
 from srbf.visibility.lookup_points import EDGE_PARTS, LookupPoints
 from srbf.visibility.map_lookups import Lookups, PixelLookups, visible_part
 from srbf.visibility.receivers import Receivers, disc_points, spread_points
-from srbf.visibility.shadow import SunFrame
 from srbf.visibility.shadow_casters import POINT_STAGES, SUN_STAGES, ShadowCasters, ShadowMaps
+from srbf.visibility.sun_cascades import Cascades, uniforms_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -40,9 +40,10 @@ PROFILE_UNIT = 6
 class ShadowMapper:
     """Direct light on receivers by shadow maps; a context manager.
 
-    A directional light has one orthographic map, a spot one perspective map, a point light (and a spot wider than 75 degrees) a cube of
-    six, a sphere or an area many cubes. Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their
-    transmittance. A pixel of a view that shows several surfaces is the mean of points on all of them. ShaderError without OpenGL 3.3.
+    A directional light has an orthographic map, or in large views up to five nested ones, the finer the nearer the camera; a spot one
+    perspective map, a point light (and a spot wider than 75 degrees) a cube of six, a sphere, an area or a spot with a size many maps.
+    Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their transmittance. A pixel of a view that
+    shows several surfaces is the mean of points on all of them. ShaderError without OpenGL 3.3.
     """
 
     def __init__(self, receivers: Receivers, size: int = SIZE, context: moderngl.Context | None = None) -> None:
@@ -96,8 +97,11 @@ class ShadowMapper:
 
     def _of_sun(self, light: DirectionalLight) -> Float32[ndarray, "H W 3"]:
         suns = list(_suns(np.array(light.direction), light.angle_or(self._receivers.sun_angle)))
-        frames = [{**_uniforms(SunFrame.around(self._points, sun)), "weight": 1 / len(suns)} for sun in suns]
-        return self._of_maps(SUN_STAGES, frames, self._size, light)
+        maps = []
+        for sun in suns:
+            frames = self._cascades.frames(sun, self._size)
+            maps += [{**uniforms_of(frames, number), "weight": 1 / len(suns)} for number in range(len(frames))]
+        return self._of_maps(SUN_STAGES, maps, self._size, light)
 
     def _of_point(self, light: PointLight) -> Float32[ndarray, "H W 3"]:
         look = look_of(light)
@@ -197,7 +201,8 @@ class ShadowMapper:
         self._edges = PixelLookups.of(self._resources, points.edges, points.parts, self._center)
         real = [(layer, layer.weight > 0 if points.parts else covered.ravel()) for layer in self._layers]
         real += [(part, part.weight > 0) for part in self._edges.parts]
-        self._points = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
+        places = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
+        self._cascades = Cascades(places, receivers.camera, receivers.width, self._center)
         self._casters: dict[Objects | None, ShadowCasters] = {}
         self._sized: dict[int, ShadowMaps] = {}
         self._profiles = ProfileTextures(self._resources)
@@ -239,10 +244,6 @@ class ShadowMapper:
             for name, texture in zip(names, own.textures, strict=True):
                 texture.use(units[name])
             render(self._lookup[stages], {**uniforms, **units, "walls": casters.has_walls}, vertices=3)
-
-
-def _uniforms(frame: SunFrame) -> dict[str, Any]:
-    return {"across": frame.across, "up": frame.up, "toLight": frame.to_light, "low": frame.low, "extent": frame.extent}
 
 
 def _suns(direction: Float64[ndarray, " 3"], angle: float) -> Iterator[Float64[ndarray, " 3"]]:

@@ -83,9 +83,9 @@ def test_frames_link_lights_and_name_what_there_is(shot: Path, scene: Path, tmp_
     done("relight", shot / "asset", "--lights", tmp_path / "frames.json", "-o", tmp_path / "relit")
     made = render_given(Asset.open(shot / "asset"), scene, [linked], SAMPLES).image
     assert relative(read_image(tmp_path / "relit" / "0000.exr")[:, :, :3], made) < ONE_LIGHT
-    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [{**POINT, "blockers": {"only": ["Lamp"]}}]}]}))
+    (tmp_path / "frames.json").write_text(json.dumps({"frames": [{"lights": [{**POINT, "blockers": {"only": ["Vase"]}}]}]}))
     line = refused(["relight", shot / "asset", "--lights", tmp_path / "frames.json", "-o", tmp_path / "other"])
-    assert "among a light's blockers, found 'Lamp'; it has 'Box', 'Crate', 'Floor', 'Tile', 'Walls'" in line
+    assert "among a light's blockers, found 'Vase'; it has 'Box', 'Crate', 'Floor', 'Tile', 'Walls'" in line
 
 
 def test_an_older_bake_says_so(shot: Path, tmp_path: Path) -> None:

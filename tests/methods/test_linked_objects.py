@@ -71,7 +71,7 @@ def test_shaders_show_the_same(asset: Asset) -> None:
 def test_surfels_hold_no_two_objects_where_the_scenes_lights_tell_them_apart() -> None:
     found = surfaces_of(BOX, 0.5)
     assert found.apart is None
-    told = {"lights": [{"name": "Lamp", "light": {"kind": "point", "receivers": {"only": ["Red"]}}}], "left_out": [], "sun_angle": None}
+    told = {"lights": [{"name": "Bulb", "light": {"kind": "point", "receivers": {"only": ["Red"]}}}], "left_out": [], "sun_angle": None}
     linked = replace(found, lights=json.dumps(told))
     assert linked.apart is not None and linked.checksum == found.checksum
     np.testing.assert_array_equal(linked.apart, found.objects)
