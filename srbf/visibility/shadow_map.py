@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import moderngl
 
 SIZE = 2048  # texels per side of a sun's or a spot's map, twice a cube's face
+FINER_IN_VIEW = 2  # sides of a sun's map where a camera sees small curved parts, on a GPU that has room
 SUN_SAMPLES = 16  # shadow maps of a sun with a disc
 LOOKS = 32  # places of a light with a size
 LOOK_SIZE = 512  # texels per side of their cubes' faces
@@ -99,9 +100,9 @@ class ShadowMapper:
         suns = list(_suns(np.array(light.direction), light.angle_or(self._receivers.sun_angle)))
         maps = []
         for sun in suns:
-            frames = self._cascades.frames(sun, self._size)
+            frames = self._cascades.frames(sun, self._sun_size)
             maps += [{**uniforms_of(frames, number), "weight": 1 / len(suns)} for number in range(len(frames))]
-        return self._of_maps(SUN_STAGES, maps, self._size, light)
+        return self._of_maps(SUN_STAGES, maps, self._sun_size, light)
 
     def _of_point(self, light: PointLight) -> Float32[ndarray, "H W 3"]:
         look = look_of(light)
@@ -189,6 +190,7 @@ class ShadowMapper:
             raise ShaderError(
                 f"expected at most {limit} texels per side on this GPU, found {max(self._size, receivers.width, receivers.height)}"
             )
+        self._sun_size = self._size if receivers.camera is None else min(FINER_IN_VIEW * self._size, limit)
         position = receivers.images["position"]
         coverage = receivers.images.get("coverage")
         covered = np.ones(position.shape[:2], bool) if coverage is None else coverage > 0
