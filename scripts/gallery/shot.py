@@ -50,9 +50,9 @@ Seconds of our picture, and of Cycles with {reference} and {preview} samples, th
 {rows}
 
 *All of it* computes every light for the first time by numpy and rays, direct light with antialiased shadows included; the viewer does
-the same work on a GPU. Cycles' times are without opening the scene (two cores, no GPU). Errors are against the reference, whose own noise counts in
-both. A peer for colors alone: Cycles' light groups keep an image per group, and mix these without noise of their own, but no light can move
-or change its cone; [measurements.md](measurements.md) compares them with `--light-set named`.
+the same work on a GPU. Cycles' times are without opening the scene (two cores, no GPU). Errors are against the reference, whose own
+noise counts in both. A peer for colors alone: Cycles' light groups keep an image per group, and mix these without noise of their own,
+but no light can move or change its cone; [measurements.md](measurements.md) compares them with `--light-set named`.
 """
 
 

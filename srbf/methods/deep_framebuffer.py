@@ -33,10 +33,11 @@ from srbf.methods.mixed_clusters import (
 )
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
 from srbf.visibility.gather_operator import GatherOperator
+from srbf.visibility.linked_light import LinkedLight, surfel_objects
 from srbf.visibility.near_cells import NearCells
 from srbf.visibility.near_sources import NearPool, NearReceivers
 from srbf.visibility.packed_links import COLUMNS, LINK_BYTES, link_count, packed, share_within, unpacked
-from srbf.visibility.received import ReceivedLight, occluders_of
+from srbf.visibility.received import occluders_of
 from srbf.visibility.sparse_links import SparseLinks, radiosity_of
 from srbf.visibility.surface_cells import Cells
 
@@ -98,6 +99,7 @@ class DeepFramebuffer(Method):
     exportable: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
     takes_profiles: ClassVar[bool] = True
+    takes_links: ClassVar[bool] = True
 
     nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")
     budget: int | None = None
@@ -163,6 +165,7 @@ class DeepFramebuffer(Method):
             "exchange_rays": operator.exchange.rays,
             **({} if bounces is None else {"bounces": bounces}),
             **({} if operator.specular_albedo is None else {"specular_albedo": True}),
+            **({"objects": objects} if (objects := capture.manifest["gather"].get("objects")) else {}),
         }
         tables = {"pool": operator.pool_image()}
         for name, links in (("view", view), ("exchange", operator.exchange)):
@@ -283,7 +286,7 @@ class _Ready:
     exchange: csr_array
     gloss: csr_array | None
     cells: Cells
-    received: ReceivedLight
+    received: LinkedLight
     near: tuple[NearPool, NearReceivers] | None  # clusters, and after them surfels, receive
     specular_albedo: Float32[ndarray, "S 3"] | None
 
@@ -342,7 +345,8 @@ def _ready(asset: Asset) -> _Ready:
             near = NearPool(cells, near_cells), NearReceivers(places, normals, near_cells, occluders)
         lobes = gloss[0] if gloss else None
         specular = np.ascontiguousarray(tables["pool"][3, :, :3]) if len(tables["pool"]) > 3 else None
-        received = ReceivedLight(cells, occluders)
+        names = told.get("objects", ())
+        received = LinkedLight(cells, scene, names, surfel_objects(tables["pool"], names))
         found = _Ready(tables, scene, view, exchange, lobes, cells, received, near, specular)
         _kept[key] = found
         while len(_kept) > KEPT:

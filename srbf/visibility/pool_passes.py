@@ -18,6 +18,7 @@ from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.lights import WHITE, EnvironmentLight, Light, PointLight, refuse_named
+from srbf.visibility.linked_light import LinkedLight, surfel_objects
 from srbf.visibility.near_cells import NearCells
 from srbf.visibility.near_passes import NearPasses
 from srbf.visibility.near_sources import NearPool
@@ -93,7 +94,9 @@ class PoolPasses(Passes):
         terms = bounce_terms(asset, cells)
         self._cells = cells
         self._toward_lobes = pool[2:, :, :3].sum(axis=0)  # albedo, and what lobes see beyond it
-        self._surfels = SurfelLight(self._programs, cells, asset.required_scene())
+        names, scene = asset.manifest["gather"].get("objects", ()), asset.required_scene()
+        linked = LinkedLight(cells, scene, names, surfel_objects(pool, names))
+        self._surfels = SurfelLight(self._programs, cells, scene, by_rays=linked)
         self._links = LinkPasses(asset, self._programs, self._textures, terms)
         self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
         self._near: NearPasses | None = None
