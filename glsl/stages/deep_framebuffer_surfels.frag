@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 #version 330 core
-// Direct irradiance of one point of a light on the surfels that it sees through one face of a cube: the arithmetic of
+// Direct irradiance of one point of a light on the surfels that it sees through one face of a cube, or a spot's one map: the arithmetic of
 // srbf.visibility.received. Blend ONE, ONE into a float target of a texel per surfel.
 precision highp float;
 precision highp int;
@@ -26,7 +26,7 @@ uniform vec3 up;
 uniform vec3 ahead;
 uniform float reach;
 uniform float lift;         // meters: of a surfel above its surface, where its shadow is looked up
-uniform int cubeFace;
+uniform int cubeFace;       // -1: one map
 uniform float lambertian;   // 1: a part of an area, by the cosine to the light's axis; 0: a point or spot light
 uniform float weight;
 
@@ -37,7 +37,7 @@ void main() {
     vec4 cell = texelFetch(surfels, at, 0);
     vec3 normal = texelFetch(normals, at, 0).xyz;
     vec3 fromLight = -srbfLightVector(pointLight.position, pointLight.positionLow, cell.xyz + lift * normal);
-    if (srbfCubeFace(fromLight) != cubeFace) {
+    if (cubeFace >= 0 ? srbfCubeFace(fromLight) != cubeFace : dot(fromLight, ahead) <= 0.0) {
         discard;
     }
     vec3 amount = vec3(0.0);
@@ -48,6 +48,7 @@ void main() {
     }
     if (amount.r + amount.g + amount.b > 0.0) {
         vec3 place = srbfPointShadowPlace(fromLight, across, up, ahead, reach);
+        place.xy = clamp(place.xy, 0.0, 1.0);  // of a surfel whose middle is past the cone
         amount *= srbfSurfelVisibility(heights, ivec2(0), textureSize(heights, 0).x, place);
     }
     irradiance = vec4(amount * weight, 1.0);

@@ -17,7 +17,7 @@ from srbf.light_linking import choices_of
 from srbf.lights import AreaLight, Light, PointLight, SpotLight, triple
 from srbf.visibility.gl_resources import ProfileTextures, Resources
 from srbf.visibility.linked_light import LinkedLight
-from srbf.visibility.looks import WORLD, Look
+from srbf.visibility.looks import WORLD, Look, look_of
 from srbf.visibility.received import SIDE, lift_of
 from srbf.visibility.shadow_casters import POINT_STAGES, ShadowCasters, ShadowMaps
 from srbf.visibility.surface_cells import Cells
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     import moderngl
 
 FACE = 1024  # texels per side of a face of the shadow cube
+NARROW = np.radians(30)  # half-angle of a spot that one map holds in place of a cube, with
+MARGIN = 1.5  # times its width: surfels that the cone ends in have their middles outside
 
 
 class SurfelLight:
@@ -94,9 +96,12 @@ class SurfelLight:
         return self.texture
 
     def faces(self, light: PointLight) -> Iterator[dict[str, Any]]:
-        """Draw one face after the other of the shadow cube about a light into `maps`; the uniforms that look it up."""
+        """Draw the shadow cube about a light into `maps`, face after face, or one map of a narrow spot; the uniforms that look it up."""
         local = replace(light, position=triple(np.array(light.position) - self.center))
-        for uniforms in Look(local, (0.0, 0.0, 0.0), WORLD, (0, 1, 2, 3, 4, 5)).maps(self._size):
+        narrow = isinstance(local, SpotLight) and local.outer <= NARROW
+        look = look_of(local) if narrow else Look(local, (0.0, 0.0, 0.0), WORLD, (0, 1, 2, 3, 4, 5))
+        for uniforms in look.maps(self._size):
+            uniforms["reach"] *= MARGIN if narrow else 1
             self.casters.draw(self.maps, POINT_STAGES, uniforms)
             yield {**uniforms, **{f"pointLight.{name}": value for name, value in uniforms["pointLight"].items()}}
 

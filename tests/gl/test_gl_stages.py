@@ -68,7 +68,7 @@ def test_every_method_has_the_same_stages() -> None:
         "point_shadow_transmittance.frag",
     ]
     environments = ["environment_functions.frag", "environment_rows.frag", "environment_weights.frag", "weighted.frag"]
-    pool = [f"deep_framebuffer_{part}.frag" for part in ("bounce", "clusters", "near", "pixels", "sum", "surfels")]
+    pool = [f"deep_framebuffer_{part}.frag" for part in ("bounce", "clusters", "near", "pixels", "seen", "sum", "surfels")]
     neural = ["neural_map_distant.frag", "neural_map_points.frag"]
     assert (
         sorted([*methods, *shadows, *environments, *pool, *neural, "add.frag", "finish.frag", "fullscreen.vert", "lightmap.vert"]) == STAGES
