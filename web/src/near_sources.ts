@@ -34,11 +34,8 @@ export interface Group {
   readonly place: Triple;
 }
 
-/** The place (m) of a light, or the unit direction to a distant one. */
-export interface Toward {
-  readonly place: Triple;
-  readonly distant: boolean;
-}
+/** The place (m) of a light, or the unit direction to a distant one; an environment is above each surface. */
+export type Toward = { readonly place: Triple; readonly distant: boolean } | "above";
 
 /** A pool of surfels some of which may be bright, and what these light. */
 export class NearPool {
@@ -156,14 +153,15 @@ export class NearPool {
 
   /** Where a group is seen. */
   private seenFrom(own: readonly number[], brightness: Float64Array, light: Toward): Triple {
-    const { places, areas } = this.cells;
+    const { places, areas, normals } = this.cells;
     const middle = mean(own.map((i) => [...places.subarray(3 * i, 3 * i + 3)]), own.map((i) => brightness[i] * areas[i]));
     const away = own.map((i) => middle.reduce((sum, x, k) => sum + (places[3 * i + k] - x) ** 2, 0));
     const nearest = own[away.indexOf(Math.min(...away))];
     const place = [...places.subarray(3 * nearest, 3 * nearest + 3)];
-    const vector = light.distant ? light.place : (light.place.map((x, k) => x - place[k]) as unknown as Triple);
-    const far = light.distant ? Infinity : Math.sqrt(dot(vector, vector));
-    const step = Math.min(OFF * Math.sqrt(own.reduce((sum, i) => sum + areas[i], 0)), far / 2) / (light.distant ? 1 : Math.max(far, 1e-30));
+    const above = light === "above" ? (normals.subarray(3 * nearest, 3 * nearest + 3) as unknown as Triple) : light.distant ? light.place : undefined;
+    const vector = above ?? ((light as { place: Triple }).place.map((x, k) => x - place[k]) as unknown as Triple);
+    const far = above ? Infinity : Math.sqrt(dot(vector, vector));
+    const step = Math.min(OFF * Math.sqrt(own.reduce((sum, i) => sum + areas[i], 0)), far / 2) / (above ? 1 : Math.max(far, 1e-30));
     return place.map((x, k) => x + step * vector[k]) as unknown as Triple;
   }
 }

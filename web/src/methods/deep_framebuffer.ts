@@ -102,8 +102,8 @@ function projection(gather: Gather): Tables["projectedWeights"] {
   const white = (light: Placed): Float64Array => {
     occluders ??= new Occluders(corners);
     const irradiance = cells.under(light, occluders, FAR, cells.count);
-    const distant = light.kind === "directional";
-    const near = gather.near?.sources(irradiance, { place: distant ? light.direction : light.position, distant });
+    const toward = light.kind === "surroundings" ? "above" : light.kind === "directional" ? { place: light.direction, distant: true } : { place: light.position, distant: false };
+    const near = gather.near?.sources(irradiance, toward);
     return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, occluders) });
   };
   return (lights) => {
