@@ -113,10 +113,13 @@ def shaped(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     """A deep framebuffer whose scene has lights with an IES file."""
     room = Room.box((3, 2, 2), 0.25, 0.6)
     asset = DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("view") / "capture", room, 700, 150, tested=0))
-    common = {"position": [1.2, 0.9, 1.3], "color": [1.0, 0.8, 0.6], "a0": 0.7, "falloff": "inverse-square", "profile": "Lamp.ies"}
-    lamp = {"kind": "point", **common, "direction": [0.6, 0.3, -0.8], "roll": 0.7}
+    common = {"position": [1.2, 0.9, 1.3], "color": [1.0, 0.8, 0.6], "a0": 0.7, "falloff": "inverse-square", "profile": "Fixture.ies"}
+    fixture = {"kind": "point", **common, "direction": [0.6, 0.3, -0.8], "roll": 0.7}
     spot = {"kind": "spot", **common, "direction": [-0.5, 0.0, -1.0], "inner": 0.6, "outer": 0.9, "roll": -0.4}
-    own = {"scene_lights": [{"name": "Lamp", "light": lamp}, {"name": "Spot", "light": spot}], "scene_profiles": {"Lamp.ies": UNEVEN}}
+    own = {
+        "scene_lights": [{"name": "Fixture", "light": fixture}, {"name": "Spot", "light": spot}],
+        "scene_profiles": {"Fixture.ies": UNEVEN},
+    }
     return replace(asset, manifest={**asset.manifest, **own, "direct": {"sun_angle": 0.0, "footprint": 1e-3}})
 
 

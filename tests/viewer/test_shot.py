@@ -28,7 +28,7 @@ from srbf.viewer.contents import contents_of, read
 pytest.importorskip("embreex")
 
 CLOSE = 2e-3  # of the largest value
-SKY_APART = 2.0  # bytes: hundreds of shadow maps beside rays
+AROUND_APART = 2.0  # bytes: hundreds of shadow maps beside rays
 EXPOSURE = 3.0
 COMMON: dict[str, Any] = {"on": True, "color": "#ffffff", "intensity": 1, "falloff": "inverse-square", "radius": 0.001}
 POINT: dict[str, Any] = {"kind": "point", **COMMON, "position": [0.8, 0.7, 1.1], "a0": 0.5}
@@ -165,12 +165,12 @@ def test_an_environment_that_is_dropped_bounces(
     state = {"zoom": ZOOM, "middle": [asset.width / 2, asset.height / 2], "terms": "indirect", "exposure": 1.0, "lights": [POINT]}
     chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(json.dumps(state | {'selected': 0}))}", width=WIDTH, height=HEIGHT)
     image = np.random.default_rng(3).uniform(0, 3, (8, 16, 3)).astype(np.float32)
-    write_image(tmp_path / "sky.exr", image, "float")
-    chromium("drop", name="sky.exr", bytes=base64.b64encode((tmp_path / "sky.exr").read_bytes()).decode())
+    write_image(tmp_path / "around.exr", image, "float")
+    chromium("drop", name="around.exr", bytes=base64.b64encode((tmp_path / "around.exr").read_bytes()).decode())
     assert [light["on"] for light in chromium.state()["lights"]] == [False, True]
     apart = np.abs(chromium.texels(asset.width, asset.height, ZOOM) - shown_as(relight(asset, [EnvironmentLight(image)]), 1.0))
     covered = asset.images["coverage"] > 0.5
-    assert np.quantile(apart[covered], 0.99) <= SKY_APART and np.ptp(shown_as(relight(asset, [EnvironmentLight(image)]), 1.0)) > 60
+    assert np.quantile(apart[covered], 0.99) <= AROUND_APART and np.ptp(shown_as(relight(asset, [EnvironmentLight(image)]), 1.0)) > 60
 
 
 def test_the_page_is_served_what_lobes_and_backs_need(asset: Asset, tmp_path: Path) -> None:

@@ -183,12 +183,12 @@ def test_an_environment_reaches_surfels_as_in_numpy(browser: Any, asset: Asset, 
     rng = np.random.default_rng(12)
     image = rng.uniform(0, 2, (40, 70, 3)).astype(np.float32) * np.linspace(2, 0.1, 40, dtype=np.float32)[:, None, None]
     image[5:9, 10:14] += 60
-    sky = EnvironmentLight(image, (0.5, 0.8, 1.0))
+    around = EnvironmentLight(image, (0.5, 0.8, 1.0))
     c, s = np.cos(0.4), np.sin(0.4)
     matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [0.0, 0.0, 0.0, 1.0]]
     turned = replace(asset, manifest={**asset.manifest, "asset_from_world": matrix})
-    red = replace(sky, color=(1.0, 0.1, 0.1))
-    sets: list[list[Light]] = [[sky], [red, LIGHTS["point"]]]
+    red = replace(around, color=(1.0, 0.1, 0.1))
+    sets: list[list[Light]] = [[around], [red, LIGHTS["point"]]]
     url = browser.serve(turned)
     drawn = browser.lightmaps(asset=url, light_sets=[told(*own) for own in sets], **run)
     for shown, own in zip(drawn, sets, strict=True):

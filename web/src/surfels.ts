@@ -87,7 +87,7 @@ export interface Look {
   /** Whether it shines by the cosine to `axis`, as a part of an area. */
   readonly lambertian: boolean;
   /** What its light's color is multiplied by, of one direction of an environment. */
-  readonly tint?: Triple;
+  readonly factor?: Triple;
   /** A profile about `axis`. */
   readonly shape?: ProfileLook;
 }
@@ -99,7 +99,7 @@ export function looksOf(light: Placed, middle: Triple): Look[] {
   const away = (p: Triple): Triple => [p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]];
   const plain = { distant: false, axis: [0, 0, 1] as Triple, a0: 1, radius: 1e-4, falloff: "inverse-square", lambertian: false } as const;
   if (light.kind === "directional") return [{ ...plain, distant: true, place: light.direction, color: light.color }];
-  if (light.kind === "surroundings") return light.directions.map(([place, tint]) => ({ ...plain, distant: true, place, color: light.color, tint }));
+  if (light.kind === "surroundings") return light.directions.map(([place, factor]) => ({ ...plain, distant: true, place, color: light.color, factor }));
   if (light.kind === "area") {
     const { position, u, v, a0 } = light;
     const axis = unit(cross(u, v));

@@ -67,7 +67,7 @@ export class NearIrradiance {
     renderer.readRenderTargetPixels(irradiance, 0, 0, cells.width, cells.height, read);
     const values = new Float64Array(3 * pool.cells.count);
     for (let i = 0; i < pool.cells.count; ++i) for (let c = 0; c < 3; ++c) values[3 * i + c] = read[4 * i + c];
-    const near = pool.sources(values, looks[0].tint ? "above" : { place: this.placeOf(looks), distant: looks[0].distant });
+    const near = pool.sources(values, looks[0].factor ? "above" : { place: this.placeOf(looks), distant: looks[0].distant });
     if (!near) return undefined;
     const far = this.far.image.data as unknown as Float32Array;
     const toLobes = this.taken?.image.data as unknown as Float32Array | undefined;

@@ -87,8 +87,8 @@ export class SurfelIrradiance {
     pass.draw(renderer, next);
   }
 
-  private mapsOf({ tint }: Look): OccluderMaps {
-    if (!tint || this.shadowSize <= SOFT) return this.maps;
+  private mapsOf({ factor }: Look): OccluderMaps {
+    if (!factor || this.shadowSize <= SOFT) return this.maps;
     this.soft ??= new OccluderMaps(this.surfels.corners, this.cells.middle, this.cells.reach, SOFT);
     return this.soft;
   }
