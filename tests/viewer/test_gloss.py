@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -27,6 +28,7 @@ from srbf.methods import relight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.direct_light import Added
 from srbf.unshadowed import irradiance_from
+from srbf.viewer.cycles import CyclesRenders
 from srbf.visibility.glossy_direct import GlossyPixels
 from srbf.visibility.hemisphere import GOLDEN
 from srbf.visibility.light_rays import rays_towards
@@ -186,6 +188,15 @@ def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve
     (found,) = lights_of(chromium, tmp_path, known=shaped)
     np.testing.assert_allclose(pictures(found), expected, atol=1e-3 * expected.max())
     assert "profile" not in chromium("run", script="document.getElementById('status').textContent")
+
+
+def test_a_render_takes_profiles_of_the_scene_alone(shaped: Asset, tmp_path: Path) -> None:
+    shaped.save(tmp_path / "asset")
+    (tmp_path / "shot.blend").write_bytes(b"")
+    renders = CyclesRenders(Asset.open(tmp_path / "asset"), tmp_path / "shot.blend")
+    light = {"kind": "point", "position": [0, 0, 1], "profile": "../Other.ies"}
+    status, said = renders.start(json.dumps({"lights": [light], "samples": 1}).encode())
+    assert status == HTTPStatus.BAD_REQUEST and "expected a profile of the asset's scene (Fixture.ies)" in said["error"]
 
 
 def direct_light(asset: Asset, lights: list[Light]) -> np.ndarray:
