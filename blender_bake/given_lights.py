@@ -17,9 +17,9 @@ TYPES = {"directional": "SUN", "point": "POINT", "sphere": "POINT", "spot": "SPO
 
 
 def make(scene: bpy.types.Scene, lights: list[dict[str, Any]], sun_angle: float = 0.0) -> None:
-    """Add the lights to the scene; suns have the angular diameter `sun_angle`, rad. WorkerError for kinds that Blender lacks.
+    """Add the lights to the scene. WorkerError for kinds that Blender lacks.
 
-    A `profile` is the path of its file, an IES file or an image.
+    `sun_angle`: angular diameter of suns that do not say their `angle`, rad. A `profile` is the path of its file, an IES file or an image.
     """
     for light in lights:
         kind = light["kind"]
@@ -35,6 +35,27 @@ def make(scene: bpy.types.Scene, lights: list[dict[str, Any]], sun_angle: float 
         if light.get("falloff") == "linear" or "profile" in light:
             _with_nodes(data, light)
         scene.collection.objects.link(obj)
+        for link, place in (("receivers", "receiver_collection"), ("blockers", "blocker_collection")):
+            if link in light:
+                setattr(obj.light_linking, place, _collection(scene, light[link]))
+
+
+def _collection(scene: bpy.types.Scene, chosen: dict[str, list[str]]) -> bpy.types.Collection:
+    """Of light linking. WorkerError for objects that the scene lacks.
+
+    `only` none is of one that nothing renders: a collection without any chooses all.
+    """
+    collection = bpy.data.collections.new("srbf linked")
+    states = dict.fromkeys(chosen.get("only", ()), "INCLUDE") | dict.fromkeys(chosen.get("without", ()), "EXCLUDE")
+    for name in states:
+        if name not in scene.objects:
+            raise WorkerError(f"expected objects of the scene that a light is linked to, found {name!r}; give the .blend of the bake")
+        collection.objects.link(scene.objects[name])
+    for member, obj in zip(collection.collection_objects, collection.objects, strict=True):
+        member.light_linking.link_state = states[obj.name]
+    if "only" in chosen and "INCLUDE" not in states.values():
+        collection.objects.link(bpy.data.objects.new("srbf nothing", None))
+    return collection
 
 
 def _watts(light: dict[str, Any]) -> float:
@@ -51,7 +72,7 @@ def _placed(light: dict[str, Any], data: bpy.types.Light, sun_angle: float) -> M
     """Sets what only its type has; where it is."""
     kind = light["kind"]
     if kind == "directional":
-        data.angle = sun_angle
+        data.angle = light.get("angle", sun_angle)
         return Vector(light["direction"]).to_track_quat("Z", "Y").to_matrix().to_4x4()
     place = Matrix.Translation(light["position"])
     profile = "profile" in light
@@ -61,7 +82,8 @@ def _placed(light: dict[str, Any], data: bpy.types.Light, sun_angle: float) -> M
         return place @ turned
     if kind == "spot":
         edge = math.cos(light["outer"])
-        data.shadow_soft_size, data.spot_size = 0.0, 2 * light["outer"]
+        data.shadow_soft_size, data.spot_size = light.get("size", 0.0), 2 * light["outer"]
+        data.use_soft_falloff = False  # else it is a disk that turns to each receiver
         data.spot_blend = min(1.0, (math.cos(light["inner"]) - edge) / max(1 - edge, 1e-9))
         return place @ (turned if profile else Vector(light["direction"]).to_track_quat("-Z", "Y").to_matrix().to_4x4())
     u, v = Vector(light["u"]), Vector(light["v"])

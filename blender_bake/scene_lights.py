@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,11 @@ from mathutils import Matrix, Vector
 from blender_bake.light import AREA_WATTS, POINT_WATTS
 from blender_bake.light_frame import roll_of
 from blender_bake.node_values import Place, source, value
-from blender_bake.scene_file import show_as_rendered
+from blender_bake.scene_file import rendered, show_as_rendered
 
 DIGITS = 7  # significant ones: Blender's numbers are single floats
 SMALL = 1e-6  # m: a size up to which a light is a point
 UNEVEN = 1e-3  # relative difference of an object's scales from which a spot's cone is elliptical
-ANGLE = 1e-4  # rad: difference of two suns' angles that a note tells
 FULL_SPREAD = math.pi - 1e-3  # rad: of an area light that is diffuse
 MOST_IES = 1 << 22  # bytes of a photometric file
 ROUND_SIDE = math.sqrt(math.pi) / 2  # side of a square of the area of a disk of diameter 1
@@ -38,10 +38,11 @@ def values(scene: bpy.types.Scene) -> dict[str, Any]:
     Values are those of the current frame. The world and emissive objects are no light objects.
     """
     show_as_rendered(scene)
-    found: list[tuple[str, dict[str, Any], list[str], float | None]] = []
+    found: list[tuple[str, dict[str, Any], list[str]]] = []
     left_out: list[dict[str, Any]] = []
     taken: set[str] = set()
     profiles: dict[str, str] = {}
+    names = sorted({one.name for one in rendered()})
     graph = bpy.context.evaluated_depsgraph_get()
     shown = [
         (_name(instance), instance.object.original.name, instance.matrix_world.copy())
@@ -53,29 +54,27 @@ def values(scene: bpy.types.Scene) -> dict[str, Any]:
         unique = _free(name, taken)
         taken.add(unique)
         try:
-            light, notes, profile = _light(scene, obj, matrix)
+            light, notes, profile = _light(scene, obj, matrix, names)
         except _CannotError as reason:
             left_out.append({"name": unique, "reason": str(reason)})
             continue
         if light is not None:
             if profile is not None:
                 light["profile"] = _stored(profile, unique, profiles)
-            found.append((unique, light, notes, obj.data.angle if obj.data.type == "SUN" else None))
-    suns = [(max(light["color"]), angle) for _, light, _, angle in found if angle is not None]
-    chosen = max(suns)[1] if suns else None
-    for _, _, notes, angle in found:
-        if angle is not None and chosen is not None and abs(angle - chosen) > ANGLE:
-            notes.append(f"its angle is {math.degrees(angle):.3g} degrees: its shadows are those of the brightest sun")
-    lights = [{"name": name, "light": light, **({"note": "; ".join(notes)} if notes else {})} for name, light, notes, _ in found]
+            found.append((unique, light, notes))
+    suns = [(max(light["color"]), light["angle"]) for _, light, _ in found if light["kind"] == "directional"]
+    lights = [{"name": name, "light": light, **({"note": "; ".join(notes)} if notes else {})} for name, light, notes in found]
     return {
         "lights": lights,
         "left_out": left_out,
-        "sun_angle": None if chosen is None else _rounded(chosen),
+        "sun_angle": max(suns)[1] if suns else None,
         **({"profiles": profiles} if profiles else {}),
     }
 
 
-def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tuple[dict[str, Any] | None, list[str], str | None]:
+def _light(
+    scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix, names: Sequence[str]
+) -> tuple[dict[str, Any] | None, list[str], str | None]:
     """The light, what it lacks, the text of its IES file; None where it does not shine. _CannotError where there is no counterpart."""
     data = obj.data
     if data.cycles.is_portal and data.type == "AREA":
@@ -89,9 +88,6 @@ def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tup
         raise _CannotError("it casts no shadows")
     if not obj.visible_diffuse:
         raise _CannotError("it is hidden from diffuse rays")
-    linking = getattr(obj, "light_linking", None)
-    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-        raise _CannotError("light linking chooses what it lights or what shadows it")
     bounces = data.cycles.max_bounces
     notes = [f"its light bounces at most {bounces} times in Cycles"] if bounces < scene.cycles.max_bounces else []
     light = {"POINT": _point, "SPOT": _spot, "SUN": _sun, "AREA": _area}[data.type](data, matrix, color, notes)
@@ -100,7 +96,26 @@ def _light(scene: bpy.types.Scene, obj: bpy.types.Object, matrix: Matrix) -> tup
             raise _CannotError("its object is mirrored, and so would its IES texture be")
         direction = _triple(_axis(matrix))
         light |= {"direction": direction, "roll": _rounded(roll_of(Vector(direction), matrix))}
-    return light, notes, profile
+    return light | _links(obj, names), notes, profile
+
+
+def _links(obj: bpy.types.Object, names: Sequence[str]) -> dict[str, dict[str, list[str]]]:
+    """`receivers` and `blockers` of a light, by `names` of objects that render, where its light linking chooses any."""
+    linking = getattr(obj, "light_linking", None)
+    collections = {} if linking is None else {"receivers": linking.receiver_collection, "blockers": linking.blocker_collection}
+    found = {}
+    for link, collection in collections.items():
+        if collection is None:
+            continue
+        states: dict[str, set[str]] = {"INCLUDE": set(), "EXCLUDE": set()}
+        for member, child in zip(collection.collection_children, collection.children, strict=True):
+            states[member.light_linking.link_state] |= {one.name for one in child.all_objects}
+        for member, one in zip(collection.collection_objects, collection.objects, strict=True):
+            states[member.light_linking.link_state].add(one.name)
+        kept, left = ([name for name in names if name in states[state]] for state in ("INCLUDE", "EXCLUDE"))
+        if states["INCLUDE"] or left:  # an empty collection chooses all
+            found[link] = {**({"only": kept} if states["INCLUDE"] else {}), **({"without": left} if left else {})}
+    return found
 
 
 def _strength(data: bpy.types.Light) -> tuple[np.ndarray, str | None]:
@@ -174,13 +189,11 @@ def _point(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str
     return {"kind": "point", **told}
 
 
-def _spot(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[str]) -> dict[str, Any]:
+def _spot(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str]) -> dict[str, Any]:
     scales = [abs(scale) for scale in matrix.to_scale()]
     if max(scales) - min(scales) > UNEVEN * max(scales):
         raise _CannotError("its object is scaled unevenly, so that its cone is elliptical")
     _require_power(data, data.shadow_soft_size)
-    if data.shadow_soft_size > SMALL:
-        notes.append(f"its radius of {data.shadow_soft_size:.3g} m is left out: its shadows are sharp")
     outer = data.spot_size / 2
     edge = math.cos(outer)
     return {
@@ -189,6 +202,7 @@ def _spot(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[
         "direction": _triple(_axis(matrix)),
         "inner": _rounded(min(math.acos(min(1.0, edge + data.spot_blend * (1 - edge))), outer)),  # Cycles: a smoothstep in the cosine
         "outer": _rounded(outer),
+        **({"size": _rounded(data.shadow_soft_size)} if data.shadow_soft_size > SMALL else {}),
         "color": _triple(color / POINT_WATTS),
         "a0": 1.0,
         "falloff": "inverse-square",
@@ -197,7 +211,7 @@ def _spot(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[
 
 def _sun(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, _: list[str]) -> dict[str, Any]:
     _require_power(data, data.angle)
-    return {"kind": "directional", "direction": _triple(-_axis(matrix)), "color": _triple(color)}
+    return {"kind": "directional", "direction": _triple(-_axis(matrix)), "color": _triple(color), "angle": _rounded(data.angle)}
 
 
 def _area(data: bpy.types.Light, matrix: Matrix, color: np.ndarray, notes: list[str]) -> dict[str, Any]:

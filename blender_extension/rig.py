@@ -36,8 +36,10 @@ def read(path: Path) -> dict[str, Any]:
 def take(scene: bpy.types.Scene, frame: dict[str, Any]) -> tuple[int, list[str]]:
     """Set the scene's lights; (how many were set, a line for each that was not).
 
-    Place, orientation, color, power, size, cone and visibility are set. Suns keep their place and angle, spots their radius, disks their
-    shape. Power then includes exposure, temperature and nodes, which are off. RigError for lights without the values of their kind.
+    Place, orientation, color, power, size, cone and visibility are set. Suns keep their place, disks their shape; suns without an `angle`
+    keep theirs, spots without a `size` their radius. What a light is linked to stays.
+
+    Power then includes exposure, temperature and nodes, which are off. RigError for lights without the values of their kind.
     """
     notes, count = [], 0
     nameless = sum("name" not in light for light in frame["lights"])
@@ -94,7 +96,10 @@ def _set(obj: bpy.types.Object, light: dict[str, Any]) -> None:
     data.color = [value / most for value in color] if most > 0 else (1, 1, 1)
     if data.type == "POINT":
         data.shadow_soft_size = float(light["size"]) if kind == "sphere" else 0.0
+    elif data.type == "SUN":
+        data.angle = float(light.get("angle", data.angle))
     elif data.type == "SPOT":
+        data.shadow_soft_size = float(light.get("size", data.shadow_soft_size))
         edge = math.cos(light["outer"])
         data.spot_size = 2 * light["outer"]
         data.spot_blend = min(1.0, (math.cos(light["inner"]) - edge) / max(1 - edge, 1e-9))

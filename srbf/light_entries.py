@@ -8,6 +8,7 @@ from typing import Any
 
 from srbf import schemas
 from srbf.errors import InputError
+from srbf.light_linking import LINKS, Objects, choices_of
 from srbf.light_profile import Profile
 from srbf.lights import (
     AreaLight,
@@ -24,6 +25,12 @@ from srbf.lights import (
 
 KINDS: dict[str, Any] = {"directional": DirectionalLight, "point": PointLight, "spot": SpotLight, "sphere": SphereLight, "area": AreaLight}
 OF_PROFILES = ("direction", "roll", "profile")
+UNSAID: dict[str, Any] = {
+    "angle": None,
+    "size": 0.0,
+    "receivers": None,
+    "blockers": None,
+}  # what an entry leaves out where it has this value
 Profiles = Callable[[str], Profile]
 
 
@@ -37,6 +44,7 @@ def light_of(entry: dict[str, Any], falloff: Falloff = "linear", profiles: Profi
     if entry["kind"] == "named":
         return named(**fields)
     fields.pop("name", None)
+    fields |= {link: Objects.of_entry(entry[link]) for link in LINKS if link in entry}
     if entry["kind"] in ("point", "spot"):
         fields.setdefault("falloff", falloff)
     if "profile" in fields:
@@ -52,6 +60,9 @@ def entry_of(light: Light) -> dict[str, Any]:
     if isinstance(light, EnvironmentLight):
         raise InputError("expected lights that Blender has, found an environment")
     fields = {name: list(value) if isinstance(value, tuple) else value for name, value in vars(light).items()}
+    for name, usual in UNSAID.items():
+        if name in fields and fields[name] == usual:
+            del fields[name]
     if isinstance(light, PointLight):
         if light.profile is None:
             fields = {name: value for name, value in fields.items() if name not in OF_PROFILES or "inner" in fields and name == "direction"}
@@ -59,6 +70,7 @@ def entry_of(light: Light) -> dict[str, Any]:
             raise InputError("expected a profile that was read from a file, found another")
         else:
             fields["profile"] = light.profile.file[0]
+    fields |= {link: choice.entry() for link, choice in choices_of(light).items()}
     kind = next((kind for kind, made in KINDS.items() if type(light) is made), "named")
     return {"kind": kind, **fields}
 

@@ -11,6 +11,7 @@ from srbf.sphere import Domain
 
 SPOT_SOFTNESS_MIN = 1e-6  # in cosine: an edge of inner = outer stays a step without dividing by zero
 GOLDEN = (5**0.5 - 1) / 2
+CONE_POINTS = 64  # of a sphere, by which the edge of its cone is known
 
 
 def attenuation(distance: Float[ndarray, "*shape"], light: PointLight) -> Float[ndarray, "*shape"]:
@@ -61,6 +62,55 @@ def spot_cone(cos_angle: Float[ndarray, "*shape"], cos_inner: float, cos_outer: 
     """
     t = np.clip((cos_angle - cos_outer) / max(cos_inner - cos_outer, SPOT_SOFTNESS_MIN), 0, 1)
     return t * t * (3 - 2 * t)
+
+
+def soft_cone(light: SpotLight, away: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"] | None = None) -> Float64[ndarray, " n"]:
+    """What a spot's cone lets out to receivers: the mean over the solid angle of its sphere of the cone in each direction.
+
+    Parameters
+    ----------
+    light
+        Of any size; of size 0 this is `spot_cone`.
+    away
+        (n, 3) vectors from the middle of the light to the receivers, m.
+    normals
+        (n, 3) unit vectors of the receivers, whose cosines weigh the directions; None: all weigh the same.
+
+    Returns
+    -------
+    ndarray
+        (n,) float64, 0 to 1.
+
+    Examples
+    --------
+    >>> from srbf.light_geometry import soft_cone
+    >>> spot = SpotLight((0, 0, 2), direction=(0, 0, -1), inner=0.5, outer=0.5, size=0.3)
+    >>> float(soft_cone(spot, 2 * np.array([[np.sin(0.5), 0, -np.cos(0.5)]]))[0].round(1))  # half of the sphere is past the edge
+    0.5
+    """
+    edges = np.cos(light.inner), np.cos(light.outer)
+    distance = np.linalg.norm(away, axis=1)
+    axis = away / np.maximum(distance, 1e-30)[:, None]
+    if light.size == 0:
+        return spot_cone(axis @ np.array(light.direction), *edges)
+    across = np.cross(axis, np.where(np.abs(axis[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-30)
+    up = np.cross(axis, across)
+    lowest = np.sqrt(1 - np.minimum(light.size / np.maximum(distance, 1e-30), 1) ** 2)
+    cone, facing = (
+        None if other is None else [np.einsum("nk,nk->n", vector, other) for vector in (axis, across, up)]
+        for other in (np.broadcast_to(np.array(light.direction), axis.shape), normals)
+    )
+    assert cone is not None
+    total, whole = np.zeros(len(axis)), np.zeros(len(axis))
+    for i in range(CONE_POINTS):
+        cosine = 1 - (i + 0.5) / CONE_POINTS * (1 - lowest)
+        sine, turn = np.sqrt(np.maximum(1 - cosine**2, 0)), 2 * np.pi * GOLDEN * i
+        part = (cosine, sine * np.cos(turn), sine * np.sin(turn))
+        weight = 1.0 if facing is None else np.maximum(-sum(a * b for a, b in zip(part, facing, strict=True)), 0)
+        total += weight * spot_cone(np.asarray(sum(a * b for a, b in zip(part, cone, strict=True))), *edges)
+        whole += weight
+    return total / np.maximum(whole, 1e-30)
 
 
 def light_vectors(light: PointLight, positions: Float[ndarray, "*p 3"]) -> tuple[Float64[ndarray, "*p 3"], Float64[ndarray, "*p"]]:

@@ -11,6 +11,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
 from srbf.errors import InputError
+from srbf.light_linking import Objects
 from srbf.light_profile import Profile, axes_of, roll_of
 from srbf.sphere import normalize
 
@@ -33,11 +34,15 @@ class DirectionalLight:
         (x, y, z) from the surface to the light, of any length but 0; normalized.
     color
         Irradiance on a surface that faces the light, linear Rec.709.
+    angle
+        Angular diameter, rad, 0 to pi: how soft its shadows are. None: as the asset says, that of the capture's sun.
+    receivers, blockers
+        Which objects of the scene it shines on, and which shadow it; None: all.
 
     Raises
     ------
     InputError
-        On a direction of length 0, and on numbers that are not three or not finite.
+        On a direction of length 0, an angle out of range, and on numbers that are not three or not finite.
 
     Examples
     --------
@@ -47,10 +52,21 @@ class DirectionalLight:
 
     direction: Triple
     color: Triple = WHITE
+    angle: float | None = field(default=None, kw_only=True)
+    receivers: Objects | None = field(default=None, kw_only=True)
+    blockers: Objects | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "direction", _unit(self.direction))
         object.__setattr__(self, "color", triple(self.color, "color"))
+        if self.angle is not None:
+            object.__setattr__(self, "angle", _not_negative(self.angle, "a sun's angle"))
+            if self.angle > np.pi:
+                raise InputError(f"expected a sun's angle of at most pi rad, found {self.angle:g}")
+
+    def angle_or(self, usual: float) -> float:
+        """The angular diameter, `usual` where the light does not say it, rad."""
+        return usual if self.angle is None else self.angle
 
 
 @dataclass(frozen=True)
@@ -76,6 +92,8 @@ class PointLight:
     profile
         What share of the strength goes into each direction: a factor on `color`. None: all of it into every direction. Projected ones are
         of spots.
+    receivers, blockers
+        Which objects of the scene it shines on, and which shadow it; None: all.
 
     Raises
     ------
@@ -97,6 +115,8 @@ class PointLight:
     direction: Triple = field(default=DOWN, kw_only=True)
     roll: float = field(default=0.0, kw_only=True)
     profile: Profile | None = field(default=None, kw_only=True)
+    receivers: Objects | None = field(default=None, kw_only=True)
+    blockers: Objects | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", triple(self.position, "position"))
@@ -140,21 +160,25 @@ class PointLight:
 
 @dataclass(frozen=True, kw_only=True)
 class SpotLight(PointLight):
-    """A point light times a smooth cone about an axis: full inside the half-angle `inner`, none past `outer`.
+    """A point light, or a sphere, times a smooth cone about an axis: full inside the half-angle `inner`, none past `outer`.
 
     Parameters
     ----------
-    position, color, a0, falloff, radius, roll, profile
+    position, color, a0, falloff, roll, profile, receivers, blockers
         Of the point light.
+    radius
+        As of the point light, at least `size`.
     direction
         (x, y, z) of the axis, of the cone and of a profile, from the light; normalized.
     inner, outer
         Half-angles, rad: 0 <= inner <= outer <= pi.
+    size
+        Radius of a glowing sphere, m; 0: a point. Each point of the sphere shines into the cone, whose edge is as soft as shadows then.
 
     Raises
     ------
     InputError
-        On half-angles out of range, and as `PointLight`.
+        On half-angles out of range, a negative size, and as `PointLight`.
 
     Examples
     --------
@@ -169,18 +193,26 @@ class SpotLight(PointLight):
     direction: Triple = field()  # without the default of a point light
     inner: float
     outer: float
+    size: float = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "size", _not_negative(self.size, "a spot's size"))
         inner, outer = float(self.inner), float(self.outer)
         if not 0 <= inner <= outer <= np.pi:
             raise InputError(f"expected spot half-angles 0 <= inner <= outer <= pi rad, found inner {inner:g}, outer {outer:g}")
         object.__setattr__(self, "inner", inner)
         object.__setattr__(self, "outer", outer)
         super().__post_init__()
+        object.__setattr__(self, "radius", max(self.radius, self.size))
 
     @property
     def tangent(self) -> float:
         return float(np.tan(self.outer)) if 0 < self.outer < NEARLY_FLAT else 0.0
+
+    def without_cone(self) -> PointLight:
+        """The point light, or the sphere, that shines all around as this one does inside its cone; without a profile."""
+        shared: dict[str, Any] = {name: getattr(self, name) for name in ("position", "color", "a0", "falloff", "radius")}
+        return SphereLight(**shared, size=self.size) if self.size > 0 else PointLight(**shared)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +221,7 @@ class SphereLight(PointLight):
 
     Parameters
     ----------
-    position, color, a0, falloff, direction, roll, profile
+    position, color, a0, falloff, direction, roll, profile, receivers, blockers
         Of the point light in the center; the falloff is `inverse-square` unless it is said.
     size
         Radius of the sphere, m, above 0.
@@ -233,6 +265,8 @@ class AreaLight:
         Irradiance at the distance `a0` straight in front, by the law that holds far away; linear Rec.709.
     a0
         m, above 0.
+    receivers, blockers
+        Which objects of the scene it shines on, and which shadow it; None: all.
 
     Raises
     ------
@@ -251,6 +285,8 @@ class AreaLight:
     v: Triple
     color: Triple = WHITE
     a0: float = 1.0
+    receivers: Objects | None = field(default=None, kw_only=True)
+    blockers: Objects | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         for name in ("position", "u", "v", "color"):
@@ -340,6 +376,11 @@ class EnvironmentLight:
         object.__setattr__(self, "color", triple(self.color, "color"))
 
 
+def radius_of(light: object) -> float:
+    """The radius of a light that is a sphere, m; 0 of others."""
+    return light.size if isinstance(light, (SphereLight, SpotLight)) else 0.0
+
+
 Light = DirectionalLight | PointLight | SpotLight | SphereLight | AreaLight | EnvironmentLight | NamedLight
 """A light of any kind, as `relight` takes them."""
 
@@ -391,8 +432,8 @@ def moved(light: Light, matrix: Float64[ndarray, "4 4"]) -> Light:
         changes["direction"] = direction
         if light.profile is not None:
             changes["roll"] = roll_of(direction, linear @ axes_of(light.direction, light.roll)[0])
-    if isinstance(light, SphereLight):
-        return replace(light, size=light.size * scale, **changes)
+    if isinstance(light, (SphereLight, SpotLight)):
+        changes["size"] = light.size * scale
     return replace(light, **changes)
 
 
@@ -428,6 +469,16 @@ def _above_zero(value: object, name: str) -> float:
         raise InputError(f"expected {name} above 0, found {value!r}") from error
     if not (np.isfinite(number) and number > 0):
         raise InputError(f"expected {name} above 0, found {number:g}")
+    return number
+
+
+def _not_negative(value: object, name: str) -> float:
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"expected {name} of at least 0, found {value!r}") from error
+    if not (np.isfinite(number) and number >= 0):
+        raise InputError(f"expected {name} of at least 0, found {number:g}")
     return number
 
 

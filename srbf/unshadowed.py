@@ -7,15 +7,15 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float64
 from srbf.errors import InputError
-from srbf.light_geometry import light_vectors
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight
+from srbf.light_geometry import light_vectors, soft_cone
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
 
 
 def irradiance_from(light: Light, points: Float[ndarray, "n 3"], normals: Float[ndarray, "n 3"]) -> Float64[ndarray, " n"]:
     """Irradiance of a white light on points of surfaces, with nothing between.
 
     Point, spot and directional lights: strength times cosine. Spheres and areas: exact as Lambertian emitters, cut off at the surface's
-    horizon, and finite at any distance.
+    horizon, and finite at any distance. Spots with a size: as spheres, times what their cone lets out to a point.
 
     Parameters
     ----------
@@ -48,6 +48,8 @@ def irradiance_from(light: Light, points: Float[ndarray, "n 3"], normals: Float[
         return np.maximum(normals @ np.array(light.direction), 0)
     if isinstance(light, AreaLight):
         return area_irradiance(light, points, normals)
+    if isinstance(light, SpotLight) and light.size > 0:
+        return irradiance_from(light.without_cone(), points, normals) * soft_cone(light, points - np.array(light.position), normals)
     if isinstance(light, PointLight):
         toward, strength = light_vectors(light, points)
         cosine = np.einsum("nc,nc->n", toward, normals)

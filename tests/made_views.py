@@ -25,7 +25,15 @@ def surfaces_of(room: Room, longest: float, bounces: int = 12) -> FoundSurfaces:
     albedo = np.where(red[:, None], room.albedo[room.places[:, 0] < 1e-6][0], room.albedo[room.places[:, 0] > 1e-6][0])
     box = np.concatenate([room.corners.reshape(-1, 3).min(axis=0), room.corners.reshape(-1, 3).max(axis=0)]).astype(np.float64)
     return FoundSurfaces(
-        corners, albedo.astype(np.float32), red.astype(np.int64), room.corners, room.free[-12:], room.free, box, np.array(bounces)
+        corners,
+        albedo.astype(np.float32),
+        red.astype(np.int64),
+        room.corners,
+        room.free[-12:],
+        room.free,
+        box,
+        np.array(bounces),
+        names='["Gray", "Red"]',
     )
 
 

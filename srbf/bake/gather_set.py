@@ -23,6 +23,7 @@ from srbf.capture import Capture
 from srbf.errors import InputError
 from srbf.io import files
 from srbf.io.ies import parse_ies
+from srbf.light_linking import Objects
 from srbf.visibility.behind import Behind, points_behind
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GATHER_FILE, POOL_FILE, GatherOperator, cluster_count, is_gathered
@@ -39,8 +40,9 @@ FEWER = 0.95  # surfels that are asked for again, where those behind translucent
 POOL = 32_768  # surfels
 FRAGMENTS = 1  # squares per surfel, of several triangles each, that the scene is asked for
 LEAST_POOL = 16
-TRACED_BY = 3  # counts changes of what is traced: links of former versions are made once more
+TRACED_BY = 4  # counts changes of what is traced: links of former versions are made once more
 SHOWN = 8  # names in a line
+NO_NAMES = "[]"
 NO_LIGHTS = '{"lights": [], "left_out": [], "sun_angle": null}'
 SAMPLING = 5e-3  # CPU seconds for the rays and the samples of a cluster, measured at 120 of these
 Progress = Callable[[int, int, str], None]
@@ -53,7 +55,7 @@ class FoundSurfaces:
     `random`: places of held-out lights. `bounces`: of diffuse light that the scene's settings allow. `transmission`: what the triangles
     let through diffusely, where any does. `gloss`: what their gloss reflects where lobes alone see it, of scenes without reflective
     caustics. `lights`: the scene's own as JSON, {lights, left_out, sun_angle}, see
-    `blender_bake.scene_lights`.
+    `blender_bake.scene_lights`. `names`: of the objects, by their numbers, as JSON.
     """
 
     corners: Float32[ndarray, "T 3 3"]
@@ -67,6 +69,7 @@ class FoundSurfaces:
     transmission: Float32[ndarray, "T 3"] | None = None
     gloss: Float32[ndarray, "T 3"] | None = None
     lights: str = NO_LIGHTS
+    names: str = NO_NAMES
 
     @functools.cached_property
     def checksum(self) -> str:
@@ -85,12 +88,27 @@ class FoundSurfaces:
     def of_arrays(stored: Mapping[str, ndarray]) -> FoundSurfaces:
         """From `arrays`."""
         known: dict[str, Any] = {entry.name: stored[entry.name] for entry in fields(FoundSurfaces) if entry.name in stored}
-        return FoundSurfaces(**(known | {"lights": str(known.get("lights", NO_LIGHTS))}))
+        texts = {"lights": str(known.get("lights", NO_LIGHTS)), "names": str(known.get("names", NO_NAMES))}
+        return FoundSurfaces(**(known | texts))
 
     @property
     def scene_lights(self) -> dict[str, Any]:
         """The scene's own lights: {lights, left_out, sun_angle}."""
         return json.loads(self.lights)
+
+    @property
+    def object_names(self) -> list[str]:
+        """Of the objects, by their numbers."""
+        return json.loads(self.names)
+
+    @property
+    def apart(self) -> Int[ndarray, " T"] | None:
+        """A number of each triangle, the same of objects that the same of the scene's lights shine on; None where all shine on all."""
+        chosen = [Objects.of_entry(one["light"]["receivers"]) for one in self.scene_lights["lights"] if "receivers" in one["light"]]
+        if not chosen:
+            return None
+        lit = np.stack([choice.among(self.object_names) for choice in chosen], axis=1)
+        return np.unique(lit, axis=0, return_inverse=True)[1].ravel()[self.objects]
 
     @staticmethod
     def of_facts(facts: dict[str, Any]) -> FoundSurfaces:
@@ -114,6 +132,7 @@ class FoundSurfaces:
             passed,
             arrays["gloss"][opaque] if "gloss" in arrays and (arrays["gloss"] > 0).any() else None,
             json.dumps(readable(facts["scene_lights"])) if "scene_lights" in facts else NO_LIGHTS,
+            json.dumps(facts.get("surface_objects", [])),
         )
 
 
@@ -204,7 +223,8 @@ class GatherSet:
     def manifest(self) -> dict[str, Any]:
         """Keys of capture.json beside the lights."""
         found = self._known
-        links = {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces)}
+        names = {"objects": found.object_names} if found.object_names else {}
+        links = {"pool": POOL_FILE, "links": GATHER_FILE, "bounces": int(found.bounces), **names}
         samples = {"samples": SAMPLES_FILE, "bounces": min(1, int(found.bounces))}
         return {
             "gather": links if self.gather is None else samples,
@@ -231,7 +251,7 @@ class GatherSet:
     def read(self, path: Path, key: str) -> GatherSet:
         """With what a file holds that `write` wrote; unchanged where there is none, or one of another bake or damaged."""
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile), np.load(path) as stored:
-            if str(stored["key"]) == key:
+            if str(stored["key"]) == key and "names" in stored:
                 return replace(self, found=FoundSurfaces.of_arrays(stored))
         return self
 
@@ -242,7 +262,9 @@ class GatherSet:
         it gathers from reflects light.
         """
         found = self._known
-        key = f"{TRACED_BY} {found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}"
+        apart = found.apart
+        parted = "" if apart is None else f" {hashlib.sha256(apart.tobytes()).hexdigest()}"
+        key = f"{TRACED_BY} {found.checksum} {receivers.width}x{receivers.height} {self.count} {self.clusters} {seed}{parted}"
         if self.gather is not None:
             self._sample(receivers, f"{key} {self.gather} samples", seed, progress, say)
             return
@@ -261,7 +283,18 @@ class GatherSet:
         asked = self.count
         while True:
             pool = pool_of(
-                surfaces, found.objects, occluders, found.free, points, normals, asked, seed, lobes, found.transmission, found.gloss
+                surfaces,
+                found.objects,
+                occluders,
+                found.free,
+                points,
+                normals,
+                asked,
+                seed,
+                lobes,
+                found.transmission,
+                found.gloss,
+                apart,
             )
             total = pool.count + len(Behind.of(pool).surfels)
             if total <= MOST_POOL:

@@ -18,7 +18,7 @@ from srbf.asset import Asset
 from srbf.bake.job import base_job
 from srbf.bake.request import RenderRequest
 from srbf.bake.run import require_scene
-from srbf.bake.settings import BakeSettings, Receiver, noise_seed
+from srbf.bake.settings import BakeSettings, Receiver, Rendered, noise_seed
 from srbf.bake.worker import Worker
 from srbf.errors import BakeError, InputError
 from srbf.io import files
@@ -70,12 +70,13 @@ def render_given(
     stop: threading.Event | None = None,
     seed: int = 1,
     profiles: Path | None = None,
+    denoised: bool = False,
 ) -> GivenReference:
     """Render a view's picture under `lights`, entries as of FRAMES.json (without environments and named lights), by Cycles.
 
     What the scene emits by itself is in it, as the asset's ambient light; its own lights and world are off, unless the capture was baked
     with `keep_scene_lights`. `profiles`: the folder of the files of the lights' profiles. `progress` gets samples
-    (done, total). `stop`: once it is set, Blender's process is killed.
+    (done, total). `stop`: once it is set, Blender's process is killed. `denoised`: by Blender's denoiser, all samples at once.
     InputError for lights that Cycles lacks, an asset of another receiver or transport than a view's, or a missing scene; BakeError where
     Blender fails; StoppedError.
     """
@@ -98,8 +99,9 @@ def render_given(
         scene=made.get("scene"),
         keep_scene_lights=kept,
     )
-    counts = _split(samples)
-    requests = [RenderRequest(None, count, noise_seed(seed, i)) for i, count in enumerate(counts)]
+    channel: Rendered = "denoised" if denoised else "response"
+    counts = [samples] if denoised else _split(samples)
+    requests = [RenderRequest(None, count, noise_seed(seed, i), channels=(channel,)) for i, count in enumerate(counts)]
     total, done = np.zeros((asset.height, asset.width, 3)), 0
     started, rendering = time.perf_counter(), 0.0
     with tempfile.TemporaryDirectory(prefix="srbf-") as name:
@@ -115,7 +117,7 @@ def render_given(
             try:
                 for event in worker.events(say):
                     if event["event"] == "rendered":
-                        total += counts[done] * np.load(scratch / event["files"]["response"])[:, :, :3]
+                        total += counts[done] * np.load(scratch / event["files"][channel])[:, :, :3]
                         rendering += event["seconds"]
                         done += 1
                         progress(sum(counts[:done]), samples)

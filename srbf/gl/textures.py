@@ -23,7 +23,7 @@ ON_HOST = {  # tables that no shader reads
     *("light_coefficients", "light_values", "cells", "environment_transfer"),
     *("surfel_transfer", "surfel_gather", "surfel_albedo", "surfel_series"),
     *("surface_gather", "surface_sent", "surface_feedback", "surface_objects", "surface_albedo"),
-    *("pool", "view_rows", "view_points", "exchange_rows"),  # shaders read them folded
+    *("pool", "view_rows", "view_points", "exchange_rows", "near_labels", "near_places"),  # shaders read them folded
 }
 _DTYPES = {"float16": "f2", "float32": "f4", "uint8": "f1"}  # moderngl's f1 is a normalized byte
 

@@ -23,7 +23,7 @@ class Triangles:
 
     `transmittance` (M, KNOTS, 3) of one wall of a material for shadow rays at the cosines 0, 1/(KNOTS-1), …, 1 to its normal; an opaque
     material has 0. `lightmap`: lightmap coordinates of the receivers' corners, (0, 0) at the top left of its image; NaN for other
-    triangles, None in a scene without lightmap.
+    triangles, None in a scene without lightmap. `objects`: the number of each triangle's object among `names`; None where nobody knows.
     """
 
     corners: Float32[ndarray, "T 3 3"]
@@ -32,6 +32,8 @@ class Triangles:
     casts: Bool[ndarray, " T"]
     transmittance: Float32[ndarray, "M KNOTS 3"]
     lightmap: Float32[ndarray, "T 3 2"] | None = None
+    objects: Int[ndarray, " T"] | None = None
+    names: tuple[str, ...] = ()
 
     @property
     def translucent(self) -> Bool[ndarray, " T"]:
@@ -69,17 +71,25 @@ class _Reader:
         turned = np.eye(4)
         turned[:3, :3] = Z_UP_FROM_Y_UP
         found: list[tuple[np.ndarray, ...]] = []
+        self._names: dict[str, int] = {}
         for root in roots:
             self._visit(root, turned, found)
         if not found:
             raise ValueError("no triangles in it")
-        corners, normals, material, casts, places = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        corners, normals, material, casts, places, objects = (np.concatenate(parts) for parts in zip(*found, strict=True))
         transmittance = np.stack([np.zeros((KNOTS, 3)), *map(_transmittance, document.get("materials", []))])
         if not (np.isfinite(corners).all() and np.isfinite(normals).all()):
             raise ValueError("corners that are not finite")
         lightmap = places.astype(np.float32) if np.isfinite(places).any() else None
         return Triangles(
-            corners.astype(np.float32), normals.astype(np.float32), material, casts, transmittance.astype(np.float32), lightmap
+            corners.astype(np.float32),
+            normals.astype(np.float32),
+            material,
+            casts,
+            transmittance.astype(np.float32),
+            lightmap,
+            objects,
+            tuple(self._names),
         )
 
     def _visit(self, index: int, parent: Float64[ndarray, "4 4"], found: list[tuple[np.ndarray, ...]]) -> None:
@@ -87,9 +97,11 @@ class _Reader:
         matrix = parent @ _local(node)
         if "mesh" in node:
             casts = node.get("extras", {}).get("casts_shadow", True)
+            own = self._names.setdefault(str(node.get("name", "")), len(self._names))
             for primitive in self._document["meshes"][node["mesh"]]["primitives"]:
                 if primitive.get("mode", TRIANGLES) == TRIANGLES:
-                    found.append(self._primitive(primitive, matrix, bool(casts)))
+                    parts = self._primitive(primitive, matrix, bool(casts))
+                    found.append((*parts, np.full(len(parts[0]), own)))
         for child in node.get("children", []):
             self._visit(child, matrix, found)
 

@@ -11,7 +11,9 @@ from srbf.arrays import Float32, Float64
 from srbf.asset import Asset
 from srbf.capture import Capture
 from srbf.light_domain import domain_of_asset
+from srbf.light_linking import refuse_linked
 from srbf.lights import Light, moved, refuse_profiles
+from srbf.methods.linked_objects import require_objects
 from srbf.methods.over_lights import finish
 from srbf.methods.protocol import FitRun, Method, Moving
 from srbf.registry import method_named
@@ -80,7 +82,7 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     Raises
     ------
     InputError
-        On a light with a profile, where the asset's method takes none.
+        On a light with a profile or with chosen objects, where the asset's method takes none, and on objects that its scene lacks.
 
     Examples
     --------
@@ -91,6 +93,10 @@ def in_asset_frame(asset: Asset, lights: Sequence[Light]) -> list[Light]:
     """
     if not method_of(asset).takes_profiles:
         refuse_profiles(lights, asset.method)
+    if method_of(asset).takes_links:
+        require_objects(asset, lights)
+    else:
+        refuse_linked(lights, asset.method)
     return [moved(light, asset.asset_from_world) for light in lights]
 
 

@@ -32,11 +32,12 @@ from srbf.methods.mixed_clusters import (
     size,
 )
 from srbf.methods.protocol import QUIET, FitRun, Method, setting
-from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.gather_operator import GatherOperator
-from srbf.visibility.near_sources import NearPool
+from srbf.visibility.linked_light import LinkedLight, surfel_objects
+from srbf.visibility.near_cells import NearCells
+from srbf.visibility.near_sources import NearPool, NearReceivers
 from srbf.visibility.packed_links import COLUMNS, LINK_BYTES, link_count, packed, share_within, unpacked
-from srbf.visibility.received import ReceivedLight, occluders_of
+from srbf.visibility.received import occluders_of
 from srbf.visibility.sparse_links import SparseLinks, radiosity_of
 from srbf.visibility.surface_cells import Cells
 
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 
 MEGABYTE = 1e6
 LEAST_SHARE = 1 / 32  # of the rays, that a budget leaves
-POINT_BYTES = 24  # of a view cluster: place and normal
 POOL_FILE, VIEW = "pool.exr", "view_links"
 FILES = {
     "pool": POOL_FILE,
@@ -99,6 +99,7 @@ class DeepFramebuffer(Method):
     exportable: ClassVar[bool] = False
     filterable: ClassVar[bool] = False
     takes_profiles: ClassVar[bool] = True
+    takes_links: ClassVar[bool] = True
 
     nearest: int = setting(MOST_NEAREST, "View clusters that a pixel mixes.")
     budget: int | None = None
@@ -147,7 +148,8 @@ class DeepFramebuffer(Method):
         most = min(self.nearest, operator.nearest.shape[1])
         nearest = nearest_covered(capture.coverage())
         stored = neighbor_layers(capture, operator.nearest[:, :most], operator.weights[:, :most], nearest)
-        view = self._within(operator, most, capture.width * capture.height)
+        near = {} if operator.points is None else {POINTS: operator.points, **NearCells.of(operator.cells, occluders_of(scene)).tables()}
+        view = self._within(operator, most, capture.width * capture.height, near)
         scale, bias = np.ones((most, 3), np.float32), np.zeros((most, 3), np.float32)
         images = carried_images(capture, nearest)
         unused = (*(GLOSS if operator.gloss is None else ()), *((THROUGH,) if operator.behind is None else ()))
@@ -163,6 +165,7 @@ class DeepFramebuffer(Method):
             "exchange_rays": operator.exchange.rays,
             **({} if bounces is None else {"bounces": bounces}),
             **({} if operator.specular_albedo is None else {"specular_albedo": True}),
+            **({"objects": objects} if (objects := capture.manifest["gather"].get("objects")) else {}),
         }
         tables = {"pool": operator.pool_image()}
         for name, links in (("view", view), ("exchange", operator.exchange)):
@@ -173,20 +176,21 @@ class DeepFramebuffer(Method):
             tables["gloss_neighbors"] = neighbors(gloss.nearest, gloss.weights).reshape(-1, capture.width, 3)
             manifest |= {name: {"file": file} for name, file in GLOSSY_FILES.items()}
             manifest["gather"] |= {"lobes": gloss.links.rows, "gloss_rays": gloss.links.rays}
-        if operator.points is not None:
-            tables[POINTS] = operator.points
-            manifest |= {POINTS: {"file": f"{POINTS}.exr"}}
+        if near:
+            tables |= near
+            manifest |= {name: {"file": f"{name}.exr"} for name in near}
+            manifest["gather"] |= {"near_levels": len(near["near_labels"]), "near_cells": near["near_places"].shape[1] - 1}
         if operator.behind is not None:
             tables[BEHIND] = neighbors(*operator.behind).reshape(-1, capture.width, 3)
             manifest |= {BEHIND: {"file": f"{BEHIND}.png"}}
         return Asset(manifest, stored, scale, bias, tables, images, scene)
 
-    def _within(self, operator: GatherOperator, nearest: int, pixels: int) -> SparseLinks:
-        """The view's links within the budget."""
+    def _within(self, operator: GatherOperator, nearest: int, pixels: int, near: Mapping[str, ndarray]) -> SparseLinks:
+        """The view's links within the budget, which `near` takes a part of."""
         if self.budget is None:
             return operator.view
         fixed = (
-            POINT_BYTES * (0 if operator.points is None else operator.view.rows)
+            sum(table.nbytes for table in near.values())
             + 48 * len(operator.cells.places)
             + NEIGHBOR_BYTES * nearest * pixels
             + LINK_BYTES * link_count(operator.exchange)
@@ -217,6 +221,8 @@ class DeepFramebuffer(Method):
                 tables[f"{name}_{part}"] = np.round(pixels * 255).astype(np.uint8)
         if POINTS in reader.manifest:
             tables[POINTS] = reader.table(POINTS, (2, told["clusters"]), 3)
+            tables["near_labels"] = reader.table("near_labels", (told["near_levels"], told["surfels"]), 1)
+            tables["near_places"] = reader.table("near_places", (1, told["near_cells"] + 1), 3)
         return {**tables, **read_further_neighbors(reader)}
 
     @classmethod
@@ -280,10 +286,8 @@ class _Ready:
     exchange: csr_array
     gloss: csr_array | None
     cells: Cells
-    received: ReceivedLight
-    occluders: EmbreeTriangles
-    points: Float32[ndarray, "2 R 3"] | None  # places (m) and normals of clusters and surfels
-    near: NearPool
+    received: LinkedLight
+    near: tuple[NearPool, NearReceivers] | None  # clusters, and after them surfels, receive
     specular_albedo: Float32[ndarray, "S 3"] | None
 
     def under(self, lights: Sequence[Light], bounces: int | None) -> Float64[ndarray, "C 3"]:
@@ -295,10 +299,11 @@ class _Ready:
             color = np.array(light.color, np.float32)
             irradiance = self.received.irradiance(replace(light, color=WHITE)).astype(np.float32)
             direct += color * irradiance
-            if self.points is not None and bounces != 0:
-                bright = self.near.sources(albedo * irradiance, light)
+            if self.near is not None and bounces != 0:
+                pool, receivers = self.near
+                bright = pool.sources(albedo * irradiance, light)
                 if bright.count:
-                    sent += color * bright.irradiance(self.points[0], self.points[1], self.occluders)
+                    sent += color * receivers.irradiance(bright)
                     taken += color * bright.taken(irradiance)
         radiosity = radiosity_of(self.exchange, albedo, direct - taken, bounces)
         if taken.any():
@@ -332,14 +337,17 @@ def _ready(asset: Asset) -> _Ready:
         except ValueError as error:
             raise ImageError(f"{error}; fit again") from error
         occluders = occluders_of(scene)
-        points = None
+        near = None
         if POINTS in tables:
-            own = np.stack([cells.places, cells.normals]).astype(np.float32)
-            points = np.concatenate([tables[POINTS][:2], own], axis=1)
+            surfels = np.stack([cells.places, cells.normals]).astype(np.float32)
+            places, normals = np.concatenate([tables[POINTS][:2], surfels], axis=1)
+            near_cells = NearCells.of_asset(asset)
+            near = NearPool(cells, near_cells), NearReceivers(places, normals, near_cells, occluders)
         lobes = gloss[0] if gloss else None
         specular = np.ascontiguousarray(tables["pool"][3, :, :3]) if len(tables["pool"]) > 3 else None
-        received = ReceivedLight(cells, occluders)
-        found = _Ready(tables, scene, view, exchange, lobes, cells, received, occluders, points, NearPool(cells), specular)
+        names = told.get("objects", ())
+        received = LinkedLight(cells, scene, names, surfel_objects(tables["pool"], names))
+        found = _Ready(tables, scene, view, exchange, lobes, cells, received, near, specular)
         _kept[key] = found
         while len(_kept) > KEPT:
             _kept.popitem(last=False)

@@ -99,6 +99,7 @@ class Method(ABC):
     on_page: ClassVar[bool] = True  # the viewer's page and the npm package show it
     takes_objects: ClassVar[bool] = False  # whether a named light is an object whose surfaces emit
     takes_profiles: ClassVar[bool] = False  # whether lights inside its scene may have a profile
+    takes_links: ClassVar[bool] = False  # whether lights may choose the objects that they shine on, and that shadow them
     filterable: ClassVar[bool] = True  # layers mean the same at neighboring texels: they may be filtered, and have mip levels
 
     @classmethod

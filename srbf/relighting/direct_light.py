@@ -17,7 +17,7 @@ from srbf.errors import InputError, MissingLibraryError
 from srbf.io.scene_glb import KNOTS, Triangles
 from srbf.light_domain import Directions
 from srbf.lights import EnvironmentLight, Light, NamedLight, moved
-from srbf.methods import method_of
+from srbf.methods import in_asset_frame, method_of
 from srbf.methods.kept_visibility import kept_visibility, receiver_points
 from srbf.visibility.embree import has_embree
 from srbf.visibility.glossy_direct import GlossyMaps, GlossyRays, has_gloss
@@ -96,7 +96,7 @@ class Added:
 
     def __init__(self, source: Asset | Capture, kind: Direct) -> None:
         self._stack = ExitStack()
-        self._kind = kind
+        self._kind, self._source = kind, source
         self._frame = source.asset_from_world if isinstance(source, Asset) else np.eye(4)
         self._emits = isinstance(source, Asset) and method_of(source).takes_objects
         self._light: DirectLight | None = None
@@ -125,7 +125,13 @@ class Added:
 
     def response(self, lights: Sequence[Light]) -> Float32[ndarray, "H W 3"] | None:
         """The direct light of world-space `lights`, None where none is added."""
-        return None if self._light is None else self._light.response([moved(light, self._frame) for light in lights])
+        return None if self._light is None else self._light.response(self._inside(lights))
+
+    def _inside(self, lights: Sequence[Light]) -> list[Light]:
+        """World-space lights in the frame of the asset or capture."""
+        if isinstance(self._source, Asset):
+            return in_asset_frame(self._source, lights)
+        return [moved(light, self._frame) for light in lights]
 
     def directional(self, directions: Float64[ndarray, "b 3"]) -> Float32[ndarray, "b H W 3"] | float:
         """The responses to white lights from world-space `directions`, 0 where none is added."""

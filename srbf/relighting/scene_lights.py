@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
+from typing import Any
 
 from srbf.asset import MANIFEST, Asset
 from srbf.errors import InputError
 from srbf.light_entries import Profiles, lights_of
+from srbf.light_linking import choices_of
 from srbf.light_profile import Profile
 from srbf.lights import Light
+from srbf.methods.linked_objects import known_objects
 
 SHOWN = 8  # names in a line
 
@@ -41,7 +45,8 @@ def scene_lights(asset: Asset) -> dict[str, Light]:
     if not listed:
         raise InputError("expected an asset that lists its scene's lights, found none; bake a scene with lights with `light_set=gather`")
     lights = lights_of([one["light"] for one in listed], f"the scene's lights in {MANIFEST}", profiles=profiles_of(asset))
-    return dict(zip((one["name"] for one in listed), lights, strict=True))
+    known = known_objects(asset)
+    return {one["name"]: _within(light, known) for one, light in zip(listed, lights, strict=True)}
 
 
 def profiles_of(asset: Asset) -> Profiles:
@@ -55,6 +60,12 @@ def profiles_of(asset: Asset) -> Profiles:
         return Profile.of_ies(texts[name].encode(), name)
 
     return profile
+
+
+def _within(light: Light, known: list[str]) -> Light:
+    """A light that chooses among known objects alone: others neither receive light nor shadow it."""
+    chosen: Any = light
+    return replace(chosen, **{link: choice.within(known) for link, choice in choices_of(light).items()}) if known else light
 
 
 def lines_of(asset: Asset) -> list[str]:

@@ -45,7 +45,7 @@ class GatherOperator:
     Irradiance at clusters is `view` times the radiosity of the pool, in pixels the weighted sum over their clusters. `gloss`: what specular
     lobes gather, where there are any. `behind`: as `nearest` and `weights`, of what falls on the backs of pixels that let light through.
     `points`: places (m) and normals of the clusters, None of older captures. `specular_albedo`: what surfels reflect, beyond their albedo,
-    where a lobe sees them.
+    where a lobe sees them. `objects`: the number of each surfel's object, 0 where the bake did not keep them.
     """
 
     cells: Cells
@@ -57,6 +57,7 @@ class GatherOperator:
     behind: tuple[Int[ndarray, "P K"], Float32[ndarray, "P K"]] | None = None
     points: Float32[ndarray, "2 C 3"] | None = None
     specular_albedo: Float32[ndarray, "S 3"] | None = None
+    objects: Int[ndarray, " S"] | None = None
 
     @staticmethod
     def traced(
@@ -95,7 +96,9 @@ class GatherOperator:
         gloss = None if lobes is None else GlossyGather.traced(pool, lobes, seed=seed + 2, passing=passing)
         points = np.stack([found.places, found.normals]).astype(np.float32)
         specular_albedo = None if pool.gloss is None or gloss is None else np.pad(pool.gloss, ((0, len(passing.surfels)), (0, 0)))
-        return GatherOperator(passing.with_backs(pool.cells), view, exchange, nearest, weights, gloss, behind, points, specular_albedo)
+        objects = np.concatenate([pool.objects, pool.objects[passing.surfels]])
+        cells = passing.with_backs(pool.cells)
+        return GatherOperator(cells, view, exchange, nearest, weights, gloss, behind, points, specular_albedo, objects)
 
     def write(self, folder: Path, key: str) -> None:
         """pool.exr and gather.npz; `key` tells what they are of."""
@@ -113,9 +116,12 @@ class GatherOperator:
             np.savez_compressed(file, key=np.array(key), **arrays)
 
     def pool_image(self) -> Float32[ndarray, "n S 4"]:
-        """Rows (x, y, z, area), (normal, 0), (albedo, 0), and (what lobes see beyond it, 0) where there is any."""
-        colors = [self.cells.albedo, *([] if self.specular_albedo is None else [self.specular_albedo])]
-        return np.concatenate([self.cells.image(), *(np.pad(color, ((0, 0), (0, 1)))[None] for color in colors)]).astype(np.float32)
+        """Rows (x, y, z, area), (normal, 0), (albedo, object), and (what lobes see beyond it, 0) where there is any."""
+        objects = np.zeros(len(self.cells.places)) if self.objects is None else self.objects
+        rows = [*self.cells.image(), np.column_stack([self.cells.albedo, objects])]
+        if self.specular_albedo is not None:
+            rows.append(np.pad(self.specular_albedo, ((0, 0), (0, 1))))
+        return np.stack(rows).astype(np.float32)
 
     @staticmethod
     def read(folder: Path) -> GatherOperator:
@@ -145,7 +151,8 @@ class GatherOperator:
         if points is not None and points.shape != (2, view.rows, 3):
             raise ImageError(f"expected places of {view.rows} clusters in {path}, found {points.shape}; bake again with `force=True`")
         specular_albedo = np.ascontiguousarray(image[3, :, :3]) if len(image) > 3 else None
-        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points, specular_albedo)
+        objects = np.round(image[2, :, 3]).astype(np.int64)
+        return GatherOperator(cells, view, own, nearest, weights, gloss, behind, points, specular_albedo, objects)
 
 
 def is_gathered(folder: Path, key: str) -> bool:

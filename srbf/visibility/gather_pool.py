@@ -35,16 +35,18 @@ def pool_of(
     lobes: Lobes | None = None,
     transmission: Float32[ndarray, "T 3"] | None = None,
     gloss: Float32[ndarray, "T 3"] | None = None,
+    apart: Int[ndarray, " T"] | None = None,
 ) -> Surfels:
     """At most about `count` surfels of all surfaces that light reaches, small where cosine rays from the view's `points` end.
 
     Fragments are split by k-means on place, normal and albedo, each weighing as many rays as end on it [Hasan2005]; none straddles a wall.
     `surfaces`: opaque triangles of any side, `objects` of each its object's number. A second bounce counts as well, and rays of specular
     `lobes` do, by what these reflect. `transmission`: what the triangles let through diffusely;
-    `gloss`: what theirs reflects for lobes alone.
+    `gloss`: what theirs reflects for lobes alone. `apart`: a number of each triangle; no surfel holds two.
     """
     surfaces, source = cut_at_walls(surfaces, occluders, GAP * float(np.sqrt(surfaces.areas.sum() / count)))
     objects = objects[source]
+    kinds = np.zeros(2 * len(source), np.int64) if apart is None else np.tile(apart[source], 2)
     both = surfaces.both_sides()
     passed = None if transmission is None else np.tile(transmission[source], (2, 1))
     shines = None if gloss is None or not (gloss > 0).any() else np.tile(gloss[source], (2, 1))
@@ -67,7 +69,9 @@ def pool_of(
 
     def groups(most: int) -> Int[ndarray, " N"]:
         found = parted_groups(split_clusters(features, most, weight), witnesses)
-        return found if passed is None else np.unique(2 * found + through, return_inverse=True)[1].ravel()
+        if passed is None and apart is None:
+            return found
+        return np.unique(np.column_stack([found, through, kinds[kept]]), axis=0, return_inverse=True)[1].ravel()
 
     asked = count
     owner = groups(asked)
@@ -75,8 +79,7 @@ def pool_of(
         asked = max(1, asked - int(1.1 * (owner.max() + 1 - count)) - 1)
         owner = groups(asked)
     owners[kept] = owner
-    of_surfel = np.zeros(int(owner.max()) + 1, np.int64)
-    of_surfel[owner] = np.concatenate([objects, objects])[kept]
+    of_surfel = _of_most_area(owner, np.concatenate([objects, objects])[kept], sides.areas)
     dark = np.zeros((len(of_surfel), 3), np.float32)
     own, specular = (
         None if part is None else grouped_cells(Fragments(sides.corners, part[kept].astype(np.float32)), owner).albedo
@@ -84,6 +87,16 @@ def pool_of(
     )
     unseen = np.zeros(len(of_surfel), bool)
     return Surfels(grouped_cells(sides, owner), surfaces.corners, owners.reshape(2, -1), of_surfel, dark, unseen, own, specular)
+
+
+def _of_most_area(owner: Int[ndarray, " N"], objects: Int[ndarray, " N"], areas: Float64[ndarray, " N"]) -> Int[ndarray, " S"]:
+    """The object that has most of each surfel's area."""
+    count = int(objects.max()) + 1
+    pairs, number = np.unique(owner * count + objects, return_inverse=True)
+    order = np.argsort(np.bincount(number.ravel(), areas), kind="stable")
+    found = np.zeros(int(owner.max()) + 1, np.int64)
+    found[pairs[order] // count] = pairs[order] % count  # the last has most
+    return found
 
 
 def looked_at(surfaces: Fragments, points: Float[ndarray, "P 3"], normals: Float[ndarray, "P 3"], seed: int = 0) -> Float64[ndarray, " U"]:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
 from srbf.microfacets import alpha_of, reflected
 from srbf.unshadowed import irradiance_from
-from srbf.visibility.light_rays import CastingLight, rays_towards
+from srbf.visibility.light_rays import CastingLight, has_extent, rays_towards
 from srbf.visibility.rays import RayTracer, Samples
 from srbf.visibility.receivers import Receivers, spread_points
 from srbf.visibility.shadow_map import ShadowMapper
@@ -97,7 +97,7 @@ class GlossyRays:
             strength = found.max(axis=2)
             farthest[part] = np.ptp(strength, axis=0)
         mean = total.max(axis=1) / np.maximum(weight, 1)
-        sized = isinstance(light, (AreaLight, SphereLight)) or (isinstance(light, DirectionalLight) and self._receivers.sun_angle > 0)
+        sized = has_extent(light, self._receivers.sun_angle)
         most = SIZED_POINTS if sized else MOST_POINTS
         ragged = np.full(len(texels), sized) | (farthest > RAGGED * np.maximum(mean, DARK * mean.mean()))
         rest = np.flatnonzero(ragged)
@@ -119,11 +119,13 @@ class GlossyRays:
         square = np.repeat(self._disc[first : first + each], count, axis=0)
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, lambda: (square + turn) % 1)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        lit = np.flatnonzero((NoL > LEAST) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
+        shown = (samples.weight > 0) & self._tracer.lit(samples, light)
+        lit = np.flatnonzero((NoL > LEAST) & shown & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
         direction = rays.direction[lit].astype(np.float32)
         own = self._pixels.reflected(pixels[lit], samples.point[lit], samples.normal[lit], rays.direction[lit].astype(np.float64))
         own *= (rays.irradiance[lit] * rays.importance[lit] / NoL[lit])[:, None] * rays.opening[lit]
-        own *= self._tracer.reaching(samples, lit, direction, None if rays.distance is None else rays.distance[lit])
+        distance = None if rays.distance is None else rays.distance[lit]
+        own *= self._tracer.reaching(samples, lit, direction, distance, light.blockers)
         found = np.zeros((len(samples.texel), 3))
         found[lit] = own
         return found.reshape(each, count, 3), samples.weight.reshape(each, count).astype(np.float64)

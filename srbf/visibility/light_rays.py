@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64
 from srbf.light_geometry import attenuation, light_vectors, points_on, spot_cone
-from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight
+from srbf.lights import AreaLight, DirectionalLight, PointLight, SphereLight, SpotLight, radius_of
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.receivers import disc_points
 
@@ -32,6 +32,11 @@ class LightRays:
     importance: Float64[ndarray, " n"]
 
 
+def has_extent(light: object, sun_angle: float) -> bool:
+    """Whether a light's shadows are soft; `sun_angle`: of suns that do not say their own, rad."""
+    return isinstance(light, AreaLight) or radius_of(light) > 0 or (isinstance(light, DirectionalLight) and light.angle_or(sun_angle) > 0)
+
+
 def rays_towards(
     light: CastingLight,
     point: Float32[ndarray, "n 3"],
@@ -39,8 +44,10 @@ def rays_towards(
     sun_angle: float,
     square: Callable[[], Float64[ndarray, "n 2"]],
 ) -> LightRays:
-    """The rays of samples at `point`. `square`: makes the place of each on a light with a size or on a sun's disc, in [0, 1)^2.
+    """The rays of samples at `point`.
 
+    `sun_angle`: of suns that do not say their own, rad. `square`: makes the place of each on a light with a size or on a sun's disc, in
+    [0, 1)^2.
     A light with a size has its exact irradiance times the visible part: a ray counts as much as its point of the light would add. So
     samples that nothing shades have no noise.
     """
@@ -52,6 +59,10 @@ def rays_towards(
         return _weighted(light, point, normal, unit, distance, added)
     if isinstance(light, SphereLight):
         return _towards_sphere(light, point, normal, square())
+    if isinstance(light, SpotLight) and light.size > 0:
+        rays = _towards_sphere(light.without_cone(), point, normal, square())
+        cone = spot_cone(-(rays.direction @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
+        return replace(rays, opening=cone[:, None] * light.factors(point - np.array(light.position)))
     if isinstance(light, PointLight):
         vector = np.array(light.position) - point
         distance = np.linalg.norm(vector, axis=1)
@@ -62,37 +73,38 @@ def rays_towards(
         return LightRays(unit, distance, attenuation(distance, light) * _cosine(unit, normal), opening, np.ones(len(point)))
     axis = np.array(light.direction)
     unit = np.broadcast_to(axis, point.shape)
-    if sun_angle > 0:
-        unit = _turned(unit, disc_points(square()) * np.tan(sun_angle / 2))
+    if (angle := light.angle_or(sun_angle)) > 0:
+        unit = _turned(unit, disc_points(square()) * np.tan(angle / 2))
     return LightRays(unit, None, _cosine(unit, normal), np.ones((len(point), 3)), np.ones(len(point)))
 
 
 def _towards_sphere(
-    light: SphereLight, point: Float32[ndarray, "n 3"], normal: Float32[ndarray, "n 3"], square: Float64[ndarray, "n 2"]
+    light: PointLight, point: Float32[ndarray, "n 3"], normal: Float32[ndarray, "n 3"], square: Float64[ndarray, "n 2"]
 ) -> LightRays:
     """Directions spread evenly over the solid angle of a sphere; from inside of it, over the half in front of its center."""
     axis, strength = light_vectors(light, point)
+    size = radius_of(light)
     center = np.linalg.norm(np.array(light.position) - point, axis=1)
-    sine = np.minimum(light.size / np.maximum(center, 1e-30), 1)
+    sine = np.minimum(size / np.maximum(center, 1e-30), 1)
     lowest = np.sqrt(1 - sine**2)
     cosine = 1 - square[:, 0] * (1 - lowest)
     turn = 2 * np.pi * square[:, 1]
     around = np.sqrt(np.maximum(1 - cosine**2, 0)) / np.maximum(cosine, 1e-6)
     unit = _turned(axis, np.stack([around * np.cos(turn), around * np.sin(turn)], axis=1))
     added = strength * _cosine(unit, normal) * 2 / (1 + lowest)
-    half_chord = np.sqrt(np.maximum(light.size**2 - (center**2 * (1 - cosine**2)), 0))
+    half_chord = np.sqrt(np.maximum(size**2 - (center**2 * (1 - cosine**2)), 0))
     distance = np.maximum(center * cosine - half_chord, 0)  # to the side that is seen
     return _weighted(light, point, normal, unit, distance, added)
 
 
 def _weighted(
-    light: SphereLight | AreaLight, point: ndarray, normal: ndarray, unit: ndarray, distance: ndarray, added: Float64[ndarray, " n"]
+    light: PointLight | AreaLight, point: ndarray, normal: ndarray, unit: ndarray, distance: ndarray, added: Float64[ndarray, " n"]
 ) -> LightRays:
     """`added`: irradiance by the point of the light that each ray meets, if all of the light were as that point."""
     exact = irradiance_from(light, point, normal)
     importance = np.where(exact > 0, np.maximum(added / np.maximum(exact, 1e-300), MIN_IMPORTANCE), 1)
     short = SHORT_OF_LIGHT * (1 + np.abs(point).max(axis=1, initial=0))
-    opening = light.factors(point - np.array(light.position)) if isinstance(light, SphereLight) else np.ones((len(point), 3))
+    opening = light.factors(point - np.array(light.position)) if isinstance(light, PointLight) else np.ones((len(point), 3))
     return LightRays(unit, np.maximum(distance - short, 0), exact, opening, importance)
 
 

@@ -15,13 +15,14 @@ from srbf.visibility.surface import surface_at
 
 @dataclass(frozen=True)
 class Points:
-    """n points: weight in their texel's mean, position (m), shading normal, face normal, offset to the rounded surface (m)."""
+    """n points: weight in their texel's mean, position (m), shading and face normal, offset to the rounded surface (m), triangle or -1."""
 
     weight: Float32[ndarray, " n"]
     point: Float32[ndarray, "n 3"]
     normal: Float32[ndarray, "n 3"]
     face: Float32[ndarray, "n 3"]
     lift: Float32[ndarray, "n 3"]
+    triangle: Int[ndarray, " n"]
 
 
 class LightmapPoints:
@@ -47,7 +48,7 @@ class LightmapPoints:
         if lost.any():
             point[lost], normal[lost] = self._off_mesh(texel[lost], ((square[lost] - 0.5) * self._side).astype(np.float32))
             face[lost], lift[lost], weight[lost] = normal[lost], 0, 1
-        return Points(weight, point, normal, face, lift)
+        return Points(weight, point, normal, face, lift, np.where(lost, -1, triangle))
 
     def _off_mesh(self, texel: ndarray, offset: ndarray) -> tuple[ndarray, ndarray]:
         """(point, normal) at an offset (texels) from the center, along the slopes of position and normal map."""

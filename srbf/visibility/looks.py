@@ -12,7 +12,7 @@ from numpy import ndarray
 from srbf.arrays import Float64
 from srbf.gl.uniforms import point_light_uniforms, profile_uniforms
 from srbf.light_geometry import area_samples
-from srbf.lights import AreaLight, PointLight, SphereLight, SpotLight, Triple, triple
+from srbf.lights import AreaLight, PointLight, SpotLight, Triple, radius_of, triple
 from srbf.sphere import point_set
 
 GUARD = 3  # texels past a face's edge, for filtering across it
@@ -64,8 +64,11 @@ def look_of(light: PointLight) -> Look:
     return Look(white, (0.0, 0.0, 0.0), _axes_to(light.direction), () if narrow else (0, 1, 2, 3, 4, 5))
 
 
-def looks_over(light: SphereLight | AreaLight, count: int) -> list[Look]:
-    """`count` places spread over a light with a size, each shining to its side of the surface. Their sum is the light up to a factor."""
+def looks_over(light: PointLight | AreaLight, count: int) -> list[Look]:
+    """`count` places spread over a light with a size, each shining to its side of the surface, a spot's into its cone.
+
+    Their sum is the light up to a factor.
+    """
     lift = NEAREST * (1 + max(map(abs, light.position)))
     if isinstance(light, AreaLight):
         places, _ = area_samples(light, count)
@@ -74,12 +77,13 @@ def looks_over(light: SphereLight | AreaLight, count: int) -> list[Look]:
         axes = [(triple(across), triple(np.cross(light.direction, across)), light.direction)] * count
     else:
         normals = point_set("fibonacci", count, "sphere")
-        places = np.array(light.position) + light.size * normals
+        places = np.array(light.position) + radius_of(light) * normals
         axes = [_axes_to(triple(normal)) for normal in normals]
-    return [
-        Look(PointLight(triple(place + lift * normal), falloff="inverse-square"), triple(normal), own, (0, 1, 2, 3, 4))
-        for place, normal, own in zip(places, normals, axes, strict=True)
-    ]
+    lights = [PointLight(triple(place + lift * normal), falloff="inverse-square") for place, normal in zip(places, normals, strict=True)]
+    if isinstance(light, SpotLight):
+        spots = [replace(light, position=one.position, a0=1.0, falloff="inverse-square", size=0.0, profile=None) for one in lights]
+        return [replace(look_of(spot), facing=triple(normal)) for spot, normal in zip(spots, normals, strict=True)]
+    return [Look(one, triple(normal), own, (0, 1, 2, 3, 4)) for one, normal, own in zip(lights, normals, axes, strict=True)]
 
 
 def _axes_to(direction: Triple) -> Axes:

@@ -92,4 +92,4 @@ def _grid(side: int) -> Float64[ndarray, "g 2"]:
 
 
 def _weighed(points: Points | Samples, weight: Float32[ndarray, " n"]) -> Points:
-    return Points(weight.astype(np.float32), points.point, points.normal, points.face, points.lift)
+    return Points(weight.astype(np.float32), points.point, points.normal, points.face, points.lift, points.triangle)

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64, Int
-from srbf.lights import AreaLight, SphereLight
+from srbf.arrays import Bool, Float32, Float64, Int
+from srbf.lights import AreaLight, PointLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.gl_resources import Resources, Target
 from srbf.visibility.light_rays import MIN_IMPORTANCE
 from srbf.visibility.lightmap_points import Points
+from srbf.visibility.linked_triangles import lit_at
 from srbf.visibility.rays import Samples
 from srbf.visibility.texel_sums import TexelSums
 
@@ -68,22 +69,24 @@ class PixelLookups:
             parts.append(Lookups.of(resources, part, center, target))
         return PixelLookups(pixels, samples, parts)
 
-    def mean(self, sized: SphereLight | AreaLight | None = None) -> Float32[ndarray, "E 3"]:
+    def mean(self, sized: PointLight | AreaLight | None = None, lit: Bool[ndarray, " T"] | None = None) -> Float32[ndarray, "E 3"]:
         """The irradiance of the pixels by what was added, in which each point counts by its share.
 
-        `sized`: the light, where it has a size; its exact irradiance counts, times the part of it that is visible.
+        `sized`: the light, where it has a size; its exact irradiance counts, times the part of it that is visible. `lit`: on which
+        triangles the light shines, None: on all.
         """
         sums = TexelSums.empty(1, len(self.pixels), np.ones(len(self.pixels)), sized is not None)
         for part, samples in zip(self.parts, self.samples, strict=True):
             found = part.read()
             own, ones = np.searchsorted(self.pixels, samples.texel), np.ones(len(found))
+            shown = lit_at(lit, samples.triangle)[:, None].astype(np.float32)
             if sized is None:
-                sums.add(own, samples.share, ones, found[:, :3], ones)
+                sums.add(own, samples.share, ones, found[:, :3] * shown, ones)
                 continue
             exact, whole = irradiance_from(sized, part.place, part.normal), found[:, 3].astype(np.float64)
             importance = np.where(exact > 0, np.maximum(whole / np.where(exact > 0, exact, 1), MIN_IMPORTANCE), 1)
-            visible = visible_part(found)
-            if isinstance(sized, SphereLight):
+            visible = visible_part(found) * shown
+            if isinstance(sized, PointLight):
                 visible = visible * sized.factors(part.place - np.array(sized.position)).astype(np.float32)
             sums.add(own, samples.share, importance, visible, exact)
         return sums.mean().astype(np.float32)

@@ -1,45 +1,45 @@
 """Light from few surfels that reflect much of it, as beside a wall that a light is close to: in closed form, where few rays meet them.
 
 Rays from a view cluster meet a small bright surfel once or not at all, so that its light would come in blotches. It is taken out of the
-links, and lit from instead: F = cos cos A / (pi d^2 + A) V, a disc's form factor times what a receiver sees of a group of such surfels.
+links, and lit from instead: F = cos cos A / (pi d^2 + A) V, a disc's form factor times what a receiver sees of its cell of such surfels.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float, Float32, Float64, Int
-from srbf.compute.threads import each
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight
+from srbf.arrays import Bool, Float, Float32, Int
+from srbf.compute.threads import each, one_blas_thread
+from srbf.lights import Light
 from srbf.visibility.embree import EmbreeTriangles
+from srbf.visibility.near_cells import NearCells
 from srbf.visibility.surface_cells import Cells, frames
 
 BRIGHT = 32.0  # of the mean radiosity, from which a surfel's light is taken out in part; from twice as much on, the whole
 MOST = 256  # surfels, the brightest
-GROUPS = 4  # parts of the bright surfels, each seen or not as one
-FACING = 0.2  # m, that a unit of the normal counts where surfels are grouped
-OFF = 0.25  # of a group's size, how far from its surface it is seen
 CLOSE, PARTS = 8.0, 4  # sides of a surfel, closer than which to a receiver it counts as so many parts a side
 LIFT = 1e-3  # of the extent of receivers
-ROWS = 1 << 12  # receivers at a time
+ROWS = 1 << 10  # receivers at a time
+KEPT = 1024  # cells of which it is known what sees them
 
 
 @dataclass(frozen=True, eq=False)
 class NearSources:
-    """n surfels of a pool, which part of the light of each is taken out of the links, `parts`, and the group that each is in.
+    """n surfels of a pool, and which part of the light of each is taken out of the links, `parts`.
 
-    `cells` (n) of them, the `radiosity` (n, 3) of these parts; `places` (G, 3), m, where groups are seen.
+    `geometry` (n) of them, the `radiosity` (n, 3) of these parts; the two `cells` by which each is seen, and the share by each.
     """
 
     surfels: Int[ndarray, " n"]
     parts: Float32[ndarray, " n"]
-    cells: Cells
+    geometry: Cells
     radiosity: Float32[ndarray, "n 3"]
-    groups: Int[ndarray, " n"]
-    places: Float64[ndarray, "G 3"]
+    cells: Int[ndarray, "n 2"]
+    shares: Float32[ndarray, "n 2"]
 
     @property
     def count(self) -> int:
@@ -52,62 +52,89 @@ class NearSources:
         found[self.surfels] = self.parts[:, None] * values[self.surfels]
         return found
 
-    def irradiance(
-        self, points: Float[ndarray, "R 3"], normals: Float[ndarray, "R 3"], occluders: EmbreeTriangles
-    ) -> Float32[ndarray, "R 3"]:
-        """What these parts lay on receivers: points (m) and unit normals."""
-        starts = (points + lift_above(points) * normals).astype(np.float32)
-        found = np.zeros((len(points), 3), np.float32)
-        rows = range(0, len(points), ROWS)
+    def by_cell(self) -> list[tuple[int, Int[ndarray, " m"], Float32[ndarray, "m 3"]]]:
+        """(cell, which of the n surfels are seen by it, the radiosity of each that is) of every cell that sends light."""
+        at, side = np.nonzero(self.shares)
+        cell = self.cells[at, side]
+        order = np.argsort(cell, kind="stable")
+        each_cell, first = np.unique(cell[order], return_index=True)
+        return [
+            (int(number), at[own], self.shares[at[own], side[own], None] * self.radiosity[at[own]])
+            for number, own in zip(each_cell, np.split(order, first[1:]), strict=True)
+        ]
+
+
+class NearReceivers:
+    """What receivers, points (m) and unit normals, see of cells of near sources; kept from light to light."""
+
+    def __init__(self, points: Float[ndarray, "R 3"], normals: Float[ndarray, "R 3"], cells: NearCells, occluders: EmbreeTriangles) -> None:
+        self._points, self._normals = np.asarray(points, np.float32), np.asarray(normals, np.float32)
+        self._starts = (points + lift_above(points) * normals).astype(np.float32)
+        self._cells, self._occluders = cells, occluders
+        self._known: OrderedDict[int, ndarray] = OrderedDict()
+        self.traced = 0  # cells that rays were sent to
+
+    def irradiance(self, near: NearSources) -> Float32[ndarray, "R 3"]:
+        """What near sources lay on the receivers, (R, 3)."""
+        sending = near.by_cell()
+        seen = self._seen([cell for cell, _, _ in sending])
+        found = np.zeros((len(self._points), 3), np.float32)
+        rows = range(0, len(found), ROWS)
 
         def part(number: int) -> None:
             own = slice(rows[number], rows[number] + ROWS)
-            factors = disc_factors(np.asarray(points[own], np.float32), np.asarray(normals[own], np.float32), self.cells)
-            for group, place in enumerate(self.places):
-                members = np.flatnonzero(self.groups == group)
-                lit = np.flatnonzero(factors[:, members].any(axis=1))
-                toward = place - starts[own][lit]
-                distance = np.linalg.norm(toward, axis=1)
-                hidden = occluders.occluded(starts[own][lit], toward / np.maximum(distance, 1e-30)[:, None], distance)
-                factors[np.ix_(lit[hidden], members)] = 0
-            found[own] = factors @ self.radiosity
+            factors = disc_factors(self._points[own], self._normals[own], near.geometry)
+            for (_, members, radiosity), visible in zip(sending, seen, strict=True):
+                found[own] += visible[own, None] * (factors[:, members] @ radiosity)
 
-        each(part, len(rows))
+        with one_blas_thread():
+            each(part, len(rows))
         return found
+
+    def _seen(self, cells: list[int]) -> list[Bool[ndarray, " R"]]:
+        """Which receivers see each cell."""
+        new = [cell for cell in cells if cell not in self._known]
+        found: list[ndarray] = [np.zeros(0)] * len(new)
+
+        def trace(number: int) -> None:
+            toward = self._cells.places[new[number]] - self._starts
+            distance = np.linalg.norm(toward, axis=1)
+            direction = toward / np.maximum(distance, 1e-30)[:, None]
+            found[number] = np.packbits(~self._occluders.occluded(self._starts, direction, distance))
+
+        each(trace, len(new))
+        self.traced += len(new)
+        self._known.update(zip(new, found, strict=True))
+        for cell in cells:
+            self._known.move_to_end(cell)
+        seen = [np.unpackbits(self._known[cell], count=len(self._starts)).view(bool) for cell in cells]
+        while len(self._known) > max(KEPT, len(cells)):
+            self._known.popitem(last=False)
+        return seen
 
 
 class NearPool:
     """The surfels of a pool that may be near sources: none of two in one place, as of cloth."""
 
-    def __init__(self, cells: Cells) -> None:
-        self._cells = cells
-        self._area = max(float(cells.areas.sum(dtype=np.float64)), 1e-30)
-        _, number, counts = np.unique(cells.places, axis=0, return_inverse=True, return_counts=True)
+    def __init__(self, surfels: Cells, cells: NearCells) -> None:
+        self._surfels, self._cells = surfels, cells
+        self._area = max(float(surfels.areas.sum(dtype=np.float64)), 1e-30)
+        _, number, counts = np.unique(surfels.places, axis=0, return_inverse=True, return_counts=True)
         self._alone = counts[number.ravel()] == 1
 
     def sources(self, radiosity: Float32[ndarray, "S 3"], light: Light) -> NearSources:
-        """The brightest surfels, where they are far brighter than the mean, of the first reflection of a light.
-
-        Groups are seen at places a little way from the surface to the light, where nothing is.
-        """
+        """The brightest surfels, where they are far brighter than the mean, of the first reflection of a light."""
         brightness = radiosity.mean(axis=1).astype(np.float64)
-        least = BRIGHT * float((brightness * self._cells.areas).sum()) / self._area
+        least = BRIGHT * float((brightness * self._surfels.areas).sum()) / self._area
         if len(brightness) > MOST:
             least = max(least, float(np.partition(brightness, -MOST - 1)[-MOST - 1]))
         bright = np.flatnonzero((brightness > least) & self._alone)
         parts = np.clip(brightness[bright] / max(least, 1e-30) - 1, 0, 1).astype(np.float32)
-        own = self._cells.at(bright)
-        places, normals = own.places.astype(np.float64), own.normals.astype(np.float64)
-        flux = brightness[bright] * own.areas
-        groups = _grouped(places, normals, flux)
-        seen = []
-        for group in range(int(groups.max(initial=-1)) + 1):
-            members = np.flatnonzero(groups == group)
-            middle = np.average(places[members], axis=0, weights=flux[members])
-            nearest = members[((places[members] - middle) ** 2).sum(axis=1).argmin()]
-            toward, far = _toward(light, places[nearest], normals[nearest])
-            seen.append(places[nearest] + min(OFF * float(np.sqrt(own.areas[members].sum())), far / 2) * toward)
-        return NearSources(bright, parts, own, parts[:, None] * radiosity[bright], groups, np.array(seen).reshape(-1, 3))
+        own = self._surfels.at(bright)
+        cells, shares = np.zeros((0, 2), np.int64), np.zeros((0, 2), np.float32)
+        if len(bright):
+            cells, shares = self._cells.seen(light, bright, own.places.astype(np.float64), brightness[bright] * own.areas)
+        return NearSources(bright, parts, own, parts[:, None] * radiosity[bright], cells, shares)
 
 
 def lift_above(points: Float[ndarray, "R 3"]) -> float:
@@ -144,36 +171,3 @@ def _discs(near: ndarray, far: ndarray, squared: ndarray, areas: ndarray) -> nda
     """From the distances along the normals of receivers and sources, the square of the whole, and areas."""
     squared = np.maximum(squared, np.float32(1e-12))
     return np.maximum(near, 0) * np.maximum(far, 0) * areas / (squared * (np.float32(np.pi) * squared + areas))
-
-
-def _toward(light: Light, place: Float64[ndarray, " 3"], normal: Float64[ndarray, " 3"]) -> tuple[Float64[ndarray, " 3"], float]:
-    """(the unit vector from a surface to a light, how far that is, m); an environment is above the surface."""
-    if isinstance(light, DirectionalLight):
-        return np.array(light.direction), np.inf
-    if not isinstance(light, (PointLight, AreaLight)):
-        return normal, np.inf
-    vector = np.array(light.position) - place
-    far = float(np.linalg.norm(vector))
-    return vector / max(far, 1e-30), far
-
-
-def _grouped(places: Float64[ndarray, "n 3"], normals: Float64[ndarray, "n 3"], flux: Float64[ndarray, " n"]) -> Int[ndarray, " n"]:
-    """At most GROUPS, by halving the one that is spread most, along its longest axis."""
-    features = np.concatenate([places, FACING * normals], axis=1)
-    labels = np.zeros(len(places), np.int64)
-    for group in range(1, GROUPS):
-        spread = np.zeros(group)
-        off = np.zeros_like(features)
-        for number in range(group):
-            own = labels == number
-            if own.any():
-                off[own] = features[own] - np.average(features[own], axis=0, weights=flux[own])
-                spread[number] = (flux[own, None] * off[own] ** 2).sum()
-        widest = int(spread.argmax())
-        own = np.flatnonzero(labels == widest)
-        if not len(own) or spread[widest] <= 0:
-            break
-        axis = np.linalg.eigh((off[own] * flux[own, None]).T @ off[own])[1][:, -1]
-        axis *= np.sign(axis[np.abs(axis).argmax()])
-        labels[own[off[own] @ axis > 0]] = group
-    return np.unique(labels, return_inverse=True)[1].ravel()

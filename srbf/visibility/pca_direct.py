@@ -11,7 +11,8 @@ from numpy import ndarray
 from srbf.arrays import Float32, Float64, Int
 from srbf.encode.dilation import dilate, nearest_covered
 from srbf.light_geometry import points_on
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight
+from srbf.light_linking import refuse_linked
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, radius_of
 from srbf.sphere import point_set
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.pca_visibility import LOOKS, PcaVisibility
@@ -33,6 +34,7 @@ class PcaDirect:
         positions = receivers.images["position"][covered].astype(np.float64)
         normals = receivers.images["normal"][covered].astype(np.float64)
         starts = starts_of(positions, normals)
+        refuse_linked(lights, "`direct=pca`")
         total = np.zeros((len(positions), 3), np.float32)
         for light in lights:
             if isinstance(light, (DirectionalLight, PointLight, AreaLight)):
@@ -79,7 +81,7 @@ class PcaDirect:
     def _suns(self, light: DirectionalLight) -> Float64[ndarray, "n 3"]:
         """Unit vectors over a sun's disc."""
         axis = np.array(light.direction)
-        angle = self.receivers.sun_angle
+        angle = light.angle_or(self.receivers.sun_angle)
         if angle == 0:
             return axis[None]
         across = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.9 else [0.0, 1.0, 0.0])
@@ -93,10 +95,10 @@ def _looks(light: Light) -> list[tuple[ndarray, ndarray | None]]:
     """Places of a light, and which way each shines, None: all around."""
     if isinstance(light, AreaLight):
         return [(place, np.array(light.direction)) for place in points_on(light, _grid())]
-    if isinstance(light, SphereLight):
-        normals = point_set("fibonacci", 2 * LOOKS**2, "sphere")  # half of them face a receiver
-        return [(np.array(light.position) + light.size * normal, normal) for normal in normals]
     assert isinstance(light, PointLight)
+    if (size := radius_of(light)) > 0:
+        normals = point_set("fibonacci", 2 * LOOKS**2, "sphere")  # half of them face a receiver
+        return [(np.array(light.position) + size * normal, normal) for normal in normals]
     return [(np.array(light.position), None)]
 
 

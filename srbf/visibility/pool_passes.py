@@ -18,6 +18,8 @@ from srbf.gl.passes import Passes
 from srbf.gl.programs import Programs
 from srbf.gl.textures import AssetTextures
 from srbf.lights import WHITE, EnvironmentLight, Light, PointLight, refuse_named
+from srbf.visibility.linked_light import LinkedLight, surfel_objects
+from srbf.visibility.near_cells import NearCells
 from srbf.visibility.near_passes import NearPasses
 from srbf.visibility.near_sources import NearPool
 from srbf.visibility.packed_links import unpacked
@@ -37,7 +39,7 @@ class PoolPasses(Passes):
     """
 
     def __init__(self, asset: Asset, programs: Programs, textures: AssetTextures, limits: Limits, formula: bool = False) -> None:
-        self._asset, self._programs, self._textures = asset, programs, textures
+        self._asset, self._programs, self._textures, self._limits = asset, programs, textures, limits
         self._known: dict[Any, tuple[Light, moderngl.Texture, moderngl.Framebuffer]] = {}
         self._free: list[tuple[moderngl.Texture, moderngl.Framebuffer]] = []
         self.computed = 0
@@ -92,14 +94,18 @@ class PoolPasses(Passes):
         terms = bounce_terms(asset, cells)
         self._cells = cells
         self._toward_lobes = pool[2:, :, :3].sum(axis=0)  # albedo, and what lobes see beyond it
-        self._surfels = SurfelLight(self._programs, cells, asset.required_scene())
+        names, scene = asset.manifest["gather"].get("objects", ()), asset.required_scene()
+        linked = LinkedLight(cells, scene, names, surfel_objects(pool, names))
+        self._surfels = SurfelLight(self._programs, cells, scene, by_rays=linked)
         self._links = LinkPasses(asset, self._programs, self._textures, terms)
         self._sums = [self._programs.target(self._links.cluster_size) for _ in range(2)]  # the first has the sum
         self._near: NearPasses | None = None
         if "view_points" in asset.tables and terms:
             places, normals = asset.tables["view_points"]
-            self._near = NearPasses(self._programs, self._surfels, [(cells.places, cells.normals), (places, normals)])
-            self._pool = NearPool(cells)
+            near = NearCells.of_asset(asset)
+            sets = [(cells.places, cells.normals), (places, normals)]
+            self._near = NearPasses(self._programs, self._surfels, near.places, sets, self._limits.texture_size)
+            self._pool = NearPool(cells, near)
             size = self._surfels.texture.size
             self._far, self._second, self._taken = (self._programs.target(size) for _ in range(3))
             self._near_clusters = self._programs.target((self._links.cluster_size[0], self._links.view_rows))

@@ -13,13 +13,15 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Float64, Int
 from srbf.compute.threads import each
 from srbf.encode.dilation import dilate, nearest_covered
-from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
+from srbf.light_linking import Objects
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight, radius_of
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.environment_rays import RAYS as ENVIRONMENT_RAYS
 from srbf.visibility.environment_rays import EnvironmentSampler
 from srbf.visibility.light_rays import CastingLight, rays_towards
 from srbf.visibility.lightmap_points import LightmapPoints
+from srbf.visibility.linked_triangles import casting, lit_at, lit_triangles
 from srbf.visibility.material_albedo import MaterialAlbedo, nearest_pure
 from srbf.visibility.outlines import outlines
 from srbf.visibility.receivers import Receivers, hashed, pixel_filter, spread_points
@@ -47,7 +49,10 @@ MATERIAL_SAMPLES = 64  # of a pixel that shows several materials
 
 @dataclass(frozen=True)
 class Samples:
-    """n points on surfaces: texel, weight (0: no surface), position (m), shading and face normal, offset to the rounded surface (m)."""
+    """n points on surfaces: texel, weight (0: no surface), position (m), shading and face normal, offset to the rounded surface (m).
+
+    `triangle`: that each is on, -1 of none.
+    """
 
     texel: Int[ndarray, " n"]
     weight: Float32[ndarray, " n"]
@@ -56,6 +61,7 @@ class Samples:
     face: Float32[ndarray, "n 3"]
     lift: Float32[ndarray, "n 3"]
     share: Float32[ndarray, "n 3"] | Float32[ndarray, "n 1"]  # in its texel's mean; the albedo if a pixel shows several materials
+    triangle: Int[ndarray, " n"]
 
 
 class RayTracer:
@@ -67,7 +73,7 @@ class RayTracer:
         self._count = max(samples, self._few)
         triangles = receivers.triangles
         self._all = EmbreeTriangles(triangles.corners)
-        self._shadow_rays = ShadowRays(triangles)
+        self._shadow_rays: dict[Objects | None, ShadowRays] = {None: ShadowRays(triangles)}
         height, width = receivers.height, receivers.width
         self._turn = hashed(height, width, 4).reshape(-1, 4)
         self._most = max(self._count, MAX_SAMPLES)
@@ -132,10 +138,24 @@ class RayTracer:
         return found, np.where(source >= 0, source, found.texel)
 
     def reaching(
-        self, samples: Samples, chosen: Int[ndarray, " n"], direction: Float32[ndarray, "n 3"], distance: Float64[ndarray, " n"] | None
+        self,
+        samples: Samples,
+        chosen: Int[ndarray, " n"],
+        direction: Float32[ndarray, "n 3"],
+        distance: Float64[ndarray, " n"] | None,
+        blockers: Objects | None = None,
     ) -> Float32[ndarray, "n 3"]:
-        """What part of the light along unit vectors from the `chosen` samples reaches them, up to a `distance` (m; None: endless)."""
-        return self._shadow_rays.passed(self._origins(samples, chosen, direction), direction, distance)
+        """What part of the light along unit vectors from the `chosen` samples reaches them, up to a `distance` (m; None: endless).
+
+        `blockers`: what casts its shadows, None: all.
+        """
+        if blockers not in self._shadow_rays:
+            self._shadow_rays[blockers] = ShadowRays(casting(self._receivers.triangles, blockers))
+        return self._shadow_rays[blockers].passed(self._origins(samples, chosen, direction), direction, distance)
+
+    def lit(self, samples: Samples, light: CastingLight) -> Bool[ndarray, " n"]:
+        """Whether a light shines on the object that each sample is of."""
+        return lit_at(lit_triangles(self._receivers.triangles, light), samples.triangle)
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
@@ -183,7 +203,7 @@ class RayTracer:
         point = np.repeat(np.arange(len(samples.texel)), 2 * ENVIRONMENT_RAYS)
         lit = np.flatnonzero(light.any(axis=1) & (samples.weight[point] > 0))
         own, direction = point[lit], ways[lit].astype(np.float32)
-        passed = light[lit] * self._shadow_rays.passed(self._origins(samples, own, direction), direction, None)
+        passed = light[lit] * self.reaching(samples, own, direction, None)
         return np.stack([np.bincount(own, passed[:, c], len(samples.texel)) for c in range(3)], axis=1).astype(np.float32)
 
     @staticmethod
@@ -200,7 +220,7 @@ class RayTracer:
         if isinstance(light, DirectionalLight):
             return None
         if isinstance(light, SpotLight):
-            light = PointLight(light.position, a0=light.a0, falloff=light.falloff, radius=light.radius)
+            light = light.without_cone()
         position, normal = (self._receivers.images[name].reshape(-1, 3)[self._texels] for name in ("position", "normal"))
         scale = np.zeros(self._receivers.height * self._receivers.width)
         scale[self._texels] = irradiance_from(light, position, normal)
@@ -231,11 +251,10 @@ class RayTracer:
 
         rays = rays_towards(light, samples.point, samples.normal, self._receivers.sun_angle, square)
         NoL = np.einsum("nc,nc->n", samples.normal, rays.direction)
-        visible = rays.opening.astype(np.float32)
-        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (rays.opening > 0).any(axis=1))
-        direction = rays.direction[lit].astype(np.float32)
-        origin = self._origins(samples, lit, direction)
-        visible[lit] *= self._shadow_rays.passed(origin, direction, None if rays.distance is None else rays.distance[lit])
+        visible = (rays.opening * self.lit(samples, light)[:, None]).astype(np.float32)
+        lit = np.flatnonzero((NoL > 0) & (samples.weight > 0) & (rays.irradiance > 0) & (visible > 0).any(axis=1))
+        distance = None if rays.distance is None else rays.distance[lit]
+        visible[lit] *= self.reaching(samples, lit, rays.direction[lit].astype(np.float32), distance, light.blockers)
         sums.add(samples.texel, samples.share, rays.importance, visible, rays.irradiance)
 
     def _samples(self, texels: Int[ndarray, " e"], numbers: range) -> Samples:
@@ -251,7 +270,7 @@ class RayTracer:
 
     def _on_lightmap(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         found = self._lightmap.at(texel, square)
-        return Samples(texel, found.weight, found.point, found.normal, found.face, found.lift, found.weight[:, None])
+        return Samples(texel, found.weight, found.point, found.normal, found.face, found.lift, found.weight[:, None], found.triangle)
 
     def _seen(self, texel: np.ndarray, square: np.ndarray) -> Samples:
         origin, direction = self._looks(texel, square)
@@ -272,7 +291,7 @@ class RayTracer:
         share = weight[:, None]
         if self._materials is not None:
             share = share * self._materials.at(texel, self._receivers.triangles.material[triangle])
-        return Samples(texel, weight, point, normal, face * away, lift * away, share)
+        return Samples(texel, weight, point, normal, face * away, lift * away, share, hit.astype(np.int64))
 
     def _bumped(self) -> tuple[Float32[ndarray, "P 3"], Float32[ndarray, "P 3"]] | None:
         """(smooth normals at the centers of pixels, what turns them into those that the bake saw); None where there are no bump maps."""
@@ -356,7 +375,7 @@ def _most_beside(values: Bool[ndarray, " P"] | Float[ndarray, " P"], height: int
 
 
 def _has_size(light: CastingLight) -> bool:
-    return isinstance(light, (AreaLight, SphereLight))
+    return isinstance(light, AreaLight) or radius_of(light) > 0
 
 
 def _balanced(turn: Float64[ndarray, "e 4"], count: int) -> Float64[ndarray, "s e 2"]:

@@ -11,7 +11,7 @@ from numpy import ndarray
 
 from srbf.arrays import Float, Float32, Float64, Int
 from srbf.io.scene_glb import read_triangles
-from srbf.light_geometry import environment_samples, spot_cone
+from srbf.light_geometry import environment_samples, soft_cone
 from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SpotLight
 from srbf.visibility.embree import EmbreeTriangles
 from srbf.visibility.surface_cells import OFFSET, Cells, frames
@@ -99,7 +99,7 @@ class ReceivedLight:
             near = np.maximum(np.maximum(squared, light.radius**2), least)
             found = light.a0**2 / near if light.falloff == "inverse-square" else light.a0 / np.sqrt(near)
             if isinstance(light, SpotLight):
-                found = found * spot_cone(-(unit @ np.array(light.direction)), np.cos(light.inner), np.cos(light.outer))
+                found = found * soft_cone(light, -unit * np.sqrt(squared)[:, None])
             return found[:, None] if light.profile is None else found[:, None] * light.factors(-unit)
 
         sides = NEAR_CONE if isinstance(light, SpotLight) and light.outer < WIDEST else NEAR

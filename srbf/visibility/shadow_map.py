@@ -10,23 +10,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy import ndarray
 
-from srbf.arrays import Float32, Float64
+from srbf.arrays import Bool, Float32, Float64
 from srbf.errors import ShaderError
 from srbf.gl.context import Limits, create_context
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, triple
+from srbf.light_linking import Objects
+from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, radius_of, triple
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.gl_resources import ProfileTextures, Resources, render
+from srbf.visibility.light_rays import CastingLight
+from srbf.visibility.linked_triangles import casting, lit_at, lit_triangles
 from srbf.visibility.looks import look_of, looks_over
 from srbf.visibility.lookup_points import EDGE_PARTS, LookupPoints
 from srbf.visibility.map_lookups import Lookups, PixelLookups, visible_part
 from srbf.visibility.receivers import Receivers, disc_points, spread_points
-from srbf.visibility.shadow import SunFrame
 from srbf.visibility.shadow_casters import POINT_STAGES, SUN_STAGES, ShadowCasters, ShadowMaps
+from srbf.visibility.sun_cascades import Cascades, uniforms_of
 
 if TYPE_CHECKING:
     import moderngl
 
 SIZE = 2048  # texels per side of a sun's or a spot's map, twice a cube's face
+FINER_IN_VIEW = 2  # sides of a sun's map where a camera sees small curved parts, on a GPU that has room
 SUN_SAMPLES = 16  # shadow maps of a sun with a disc
 LOOKS = 32  # places of a light with a size
 LOOK_SIZE = 512  # texels per side of their cubes' faces
@@ -37,9 +41,10 @@ PROFILE_UNIT = 6
 class ShadowMapper:
     """Direct light on receivers by shadow maps; a context manager.
 
-    A directional light has one orthographic map, a spot one perspective map, a point light (and a spot wider than 75 degrees) a cube of
-    six, a sphere or an area many cubes. Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their
-    transmittance. A pixel of a view that shows several surfaces is the mean of points on all of them. ShaderError without OpenGL 3.3.
+    A directional light has an orthographic map, or in large views up to five nested ones, the finer the nearer the camera; a spot one
+    perspective map, a point light (and a spot wider than 75 degrees) a cube of six, a sphere, an area or a spot with a size many maps.
+    Percentage-closer filtering over 3 x 3 texels; translucent walls multiply a second map by their transmittance. A pixel of a view that
+    shows several surfaces is the mean of points on all of them. ShaderError without OpenGL 3.3.
     """
 
     def __init__(self, receivers: Receivers, size: int = SIZE, context: moderngl.Context | None = None) -> None:
@@ -73,8 +78,8 @@ class ShadowMapper:
         total = np.zeros((self._receivers.height, self._receivers.width, 3), np.float32)
         for light in lights:
             if isinstance(light, DirectionalLight):
-                irradiance = self._of_sun(np.array(light.direction))
-            elif isinstance(light, (SphereLight, AreaLight)):
+                irradiance = self._of_sun(light)
+            elif isinstance(light, AreaLight) or radius_of(light) > 0:
                 irradiance = self._of_size(self._from_center(light))
             elif isinstance(light, PointLight):
                 irradiance = self._of_point(self._from_center(light))
@@ -91,10 +96,13 @@ class ShadowMapper:
         """A light with a place, as the map's frame has it."""
         return replace(light, position=triple(np.array(light.position) - self._center))
 
-    def _of_sun(self, direction: Float64[ndarray, " 3"]) -> Float32[ndarray, "H W 3"]:
-        suns = list(_suns(direction, self._receivers.sun_angle))
-        frames = [{**_uniforms(SunFrame.around(self._points, sun)), "weight": 1 / len(suns)} for sun in suns]
-        return self._of_maps(SUN_STAGES, frames, self._size)
+    def _of_sun(self, light: DirectionalLight) -> Float32[ndarray, "H W 3"]:
+        suns = list(_suns(np.array(light.direction), light.angle_or(self._receivers.sun_angle)))
+        maps = []
+        for sun in suns:
+            frames = self._cascades.frames(sun, self._sun_size)
+            maps += [{**uniforms_of(frames, number), "weight": 1 / len(suns)} for number in range(len(frames))]
+        return self._of_maps(SUN_STAGES, maps, self._sun_size, light)
 
     def _of_point(self, light: PointLight) -> Float32[ndarray, "H W 3"]:
         look = look_of(light)
@@ -102,52 +110,78 @@ class ShadowMapper:
         if light.profile is not None:
             with self._context:
                 self._profiles.of(light.profile).use(PROFILE_UNIT)
-        return self._of_maps(POINT_STAGES, [{**uniforms, "weight": 1.0} for uniforms in look.maps(size)], size)
+        return self._of_maps(POINT_STAGES, [{**uniforms, "weight": 1.0} for uniforms in look.maps(size)], size, light)
 
-    def _of_maps(self, stages: tuple[str, str, str], looks: list[dict[str, Any]], size: int) -> Float32[ndarray, "H W 3"]:
+    def _of_maps(
+        self, stages: tuple[str, str, str], looks: list[dict[str, Any]], size: int, light: CastingLight
+    ) -> Float32[ndarray, "H W 3"]:
         """By a map of each look; once more at more points of the pixels that the edge of a shadow crosses."""
+        lit = lit_triangles(self._receivers.triangles, light)
         with self._context:
+            casters = self._casters_of(light)
             self._clear()
             for uniforms in looks:
-                self._draw(stages, uniforms, size, [*self._layers, *self._edges.parts])
-            found = self._with(self._edges, self._sums()[..., :3])
+                self._draw(stages, uniforms, size, [*self._layers, *self._edges.parts], casters)
+            found = self._with(self._edges, self._sums()[..., :3] * self._lit(lit), lit)
             for pixels, samples in self._lookup_points.of_shadows(found):
                 own = Resources(self._context)
                 try:
                     more = PixelLookups.of(own, pixels, samples, self._center)
                     for uniforms in looks:
-                        self._draw(stages, uniforms, size, more.parts)
-                    found = self._with(more, found)
+                        self._draw(stages, uniforms, size, more.parts, casters)
+                    found = self._with(more, found, lit)
                 finally:
                     own.close()
             return found
 
-    def _of_size(self, light: SphereLight | AreaLight) -> Float32[ndarray, "H W 3"]:
+    def _of_size(self, light: PointLight | AreaLight) -> Float32[ndarray, "H W 3"]:
         """The exact irradiance times the part of the looks, weighted by what each adds, that reaches a texel."""
         size = min(self._size, LOOK_SIZE)
         strides = max(1, len(self._layers) // LAYERS_PER_LOOK)
+        lit = lit_triangles(self._receivers.triangles, light)
         with self._context:
+            casters = self._casters_of(light)
             self._clear()
             for number, look in enumerate(looks_over(light, LOOKS)):
                 lookups = [*self._layers[number % strides :: strides], *self._edges.parts[number % EDGE_PARTS :: EDGE_PARTS]]
                 for uniforms in look.maps(size):
-                    self._draw(POINT_STAGES, {**uniforms, "weight": 1.0}, size, lookups)
+                    self._draw(POINT_STAGES, {**uniforms, "weight": 1.0}, size, lookups, casters)
             found = self._sums()
             exact = np.zeros((found.shape[0] * found.shape[1], 3))
             for layer in self._layers:
                 own = (layer.weight * irradiance_from(light, layer.place, layer.normal))[:, None]
-                exact += own * light.factors(layer.place - np.array(light.position)) if isinstance(light, SphereLight) else own
-            return self._with(self._edges, (visible_part(found) * exact.reshape(*found.shape[:2], 3)).astype(np.float32), light)
+                exact += own * light.factors(layer.place - np.array(light.position)) if isinstance(light, PointLight) else own
+            plain = visible_part(found) * exact.reshape(*found.shape[:2], 3) * self._lit(lit)
+            return self._with(self._edges, plain.astype(np.float32), lit, light)
 
     @staticmethod
     def _with(
-        lookups: PixelLookups, irradiance: Float32[ndarray, "H W 3"], sized: SphereLight | AreaLight | None = None
+        lookups: PixelLookups,
+        irradiance: Float32[ndarray, "H W 3"],
+        lit: Bool[ndarray, " T"] | None,
+        sized: PointLight | AreaLight | None = None,
     ) -> Float32[ndarray, "H W 3"]:
-        """With the pixels that have points of their own; `sized`: the light, if it has a size."""
+        """With the pixels of several points. `lit`: triangles that the light shines on; `sized`: the light, if it has a size."""
         result = irradiance.copy()
         if len(lookups.pixels):
-            result.reshape(-1, 3)[lookups.pixels] = lookups.mean(sized)
+            result.reshape(-1, 3)[lookups.pixels] = lookups.mean(sized, lit)
         return result
+
+    def _lit(self, lit: Bool[ndarray, " T"] | None) -> Float32[ndarray, "H W 1"]:
+        """The part of each texel on triangles that a light shines on; None: it shines on all."""
+        shape = (self._receivers.height, self._receivers.width, 1)
+        if lit is None:
+            return np.ones(shape, np.float32)
+        layers = self._lookup_points.layers
+        total = np.sum([points.weight * lit_at(lit, points.triangle) for points in layers], axis=0)
+        return (total / np.maximum(np.sum([points.weight for points in layers], axis=0), 1e-30)).reshape(shape).astype(np.float32)
+
+    def _casters_of(self, light: CastingLight) -> ShadowCasters:
+        """What shadows a light."""
+        if light.blockers not in self._casters:
+            chosen = casting(self._receivers.triangles, light.blockers)
+            self._casters[light.blockers] = ShadowCasters(self._resources, chosen, self._center)
+        return self._casters[light.blockers]
 
     def _prepare(self) -> None:
         receivers = self._receivers
@@ -156,6 +190,7 @@ class ShadowMapper:
             raise ShaderError(
                 f"expected at most {limit} texels per side on this GPU, found {max(self._size, receivers.width, receivers.height)}"
             )
+        self._sun_size = self._size if receivers.camera is None else min(FINER_IN_VIEW * self._size, limit)
         position = receivers.images["position"]
         coverage = receivers.images.get("coverage")
         covered = np.ones(position.shape[:2], bool) if coverage is None else coverage > 0
@@ -168,8 +203,9 @@ class ShadowMapper:
         self._edges = PixelLookups.of(self._resources, points.edges, points.parts, self._center)
         real = [(layer, layer.weight > 0 if points.parts else covered.ravel()) for layer in self._layers]
         real += [(part, part.weight > 0) for part in self._edges.parts]
-        self._points = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
-        self._casters = ShadowCasters(self._resources, receivers.triangles, self._center)
+        places = np.concatenate([lookups.place[shown] for lookups, shown in real]).astype(np.float64)
+        self._cascades = Cascades(places, receivers.camera, receivers.width, self._center)
+        self._casters: dict[Objects | None, ShadowCasters] = {}
         self._sized: dict[int, ShadowMaps] = {}
         self._profiles = ProfileTextures(self._resources)
         corners = self._resources.buffer(np.array([[-1, -1], [3, -1], [-1, 3]]))
@@ -192,11 +228,13 @@ class ShadowMapper:
         data = self._sum[1].read(components=4, dtype="f4")
         return np.frombuffer(data, np.float32).reshape(self._receivers.height, self._receivers.width, 4)
 
-    def _draw(self, stages: tuple[str, str, str], uniforms: dict[str, Any], size: int, lookups: Sequence[Lookups]) -> None:
+    def _draw(
+        self, stages: tuple[str, str, str], uniforms: dict[str, Any], size: int, lookups: Sequence[Lookups], casters: ShadowCasters
+    ) -> None:
         """Draw one map of a light, and add what reaches the points of some `lookups` by it."""
         gl: Any = self._context
         maps = self._maps(size)
-        self._casters.draw(maps, stages, uniforms)
+        casters.draw(maps, stages, uniforms)
         gl.enable_only(gl.BLEND)
         gl.blend_equation, gl.blend_func = gl.FUNC_ADD, (gl.ONE, gl.ONE)
         names = ("points", "normals", "faces")
@@ -207,11 +245,7 @@ class ShadowMapper:
             own.target[1].use()
             for name, texture in zip(names, own.textures, strict=True):
                 texture.use(units[name])
-            render(self._lookup[stages], {**uniforms, **units, "walls": self._casters.has_walls}, vertices=3)
-
-
-def _uniforms(frame: SunFrame) -> dict[str, Any]:
-    return {"across": frame.across, "up": frame.up, "toLight": frame.to_light, "low": frame.low, "extent": frame.extent}
+            render(self._lookup[stages], {**uniforms, **units, "walls": casters.has_walls}, vertices=3)
 
 
 def _suns(direction: Float64[ndarray, " 3"], angle: float) -> Iterator[Float64[ndarray, " 3"]]:

@@ -13,10 +13,12 @@ from srbf.arrays import Float64
 from srbf.gl.deep_framebuffer import folded
 from srbf.gl.programs import Programs
 from srbf.io.scene_glb import read_triangles
+from srbf.light_linking import choices_of
 from srbf.lights import AreaLight, Light, PointLight, SpotLight, triple
 from srbf.visibility.gl_resources import ProfileTextures, Resources
+from srbf.visibility.linked_light import LinkedLight
 from srbf.visibility.looks import WORLD, Look
-from srbf.visibility.received import SIDE, ReceivedLight, lift_of, occluders_of
+from srbf.visibility.received import SIDE, lift_of
 from srbf.visibility.shadow_casters import POINT_STAGES, ShadowCasters, ShadowMaps
 from srbf.visibility.surface_cells import Cells
 
@@ -29,7 +31,7 @@ FACE = 1024  # texels per side of a face of the shadow cube
 class SurfelLight:
     """Direct irradiance on cells as a texture of one texel per cell: the GPU's `srbf.visibility.received.ReceivedLight`.
 
-    Point, spot, sphere and area lights by shadow maps; directional and environment lights by the rays of `ReceivedLight`.
+    Point, spot, sphere and area lights by shadow maps; directional and environment lights, and those that choose objects, by rays.
 
     Parameters
     ----------
@@ -41,10 +43,12 @@ class SurfelLight:
         scene.glb: what casts shadows.
     size
         Texels per side of a face of the shadow cube.
+    by_rays
+        What measures lights without a cube; None: rays that know no objects.
     """
 
-    def __init__(self, programs: Programs, cells: Cells, scene: bytes, size: int = FACE) -> None:
-        self._programs, self._cells, self._scene = programs, cells, scene
+    def __init__(self, programs: Programs, cells: Cells, scene: bytes, size: int = FACE, by_rays: LinkedLight | None = None) -> None:
+        self._programs = programs
         self._resources = Resources(programs.context)
         programs.resources.callback(self._resources.close)
         places = cells.places.astype(np.float64)
@@ -56,14 +60,14 @@ class SurfelLight:
         self.maps, self._size = ShadowMaps.of(self._resources, size), size
         self.texture, self._target = self._resources.target(self._places.size, 4, "f4")
         self._profiles = ProfileTextures(self._resources)
-        self._by_rays: ReceivedLight | None = None
+        self._by_rays = LinkedLight(cells, scene, (), None) if by_rays is None else by_rays
 
     def draw(self, light: Light) -> moderngl.Texture:
         """The irradiance of one light of the asset's frame, until the next call; blending is left on and additive.
 
         MissingLibraryError for directional and environment lights without embreex.
         """
-        if not isinstance(light, (PointLight, AreaLight)):
+        if not isinstance(light, (PointLight, AreaLight)) or choices_of(light):
             return self._traced(light)
         gl: Any = self._programs.context
         self._target.use()
@@ -97,8 +101,6 @@ class SurfelLight:
             yield {**uniforms, **{f"pointLight.{name}": value for name, value in uniforms["pointLight"].items()}}
 
     def _traced(self, light: Light) -> moderngl.Texture:
-        if self._by_rays is None:
-            self._by_rays = ReceivedLight(self._cells, occluders_of(self._scene))
         found = folded(self._by_rays.irradiance(light).astype(np.float32))
         self.texture.write(np.ascontiguousarray(np.pad(found, ((0, 0), (0, 0), (0, 1)))))
         return self.texture

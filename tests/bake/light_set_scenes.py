@@ -129,7 +129,7 @@ def designed() -> None:
     mesh("Walls", places, [FACES[name] for name in ("West", "North", "South")], gray())  # a sun shines in from the east and above
     light("Bulb", "POINT", (0.6, 1.4, 1.2), 14, color=(1, 0.8, 0.5), shadow_soft_size=0)
     light("Globe", "POINT", (2.2, 0.5, 1.4), 9, color=(0.5, 0.8, 1), shadow_soft_size=0.08, use_soft_falloff=False)
-    spot = light("Spot", "SPOT", (1.4, 1.6, 1.8), 20, exposure=1, spot_size=1.1, spot_blend=0.4, shadow_soft_size=0)
+    spot = light("Spot", "SPOT", (1.4, 1.6, 1.8), 20, exposure=1, spot_size=1.1, spot_blend=0.4, shadow_soft_size=0.1)
     spot.rotation_euler = (-0.35, 0.2, 0)
     spot.data.use_nodes = True
     emission = next(node for node in spot.data.node_tree.nodes if node.type == "EMISSION")
@@ -140,6 +140,8 @@ def designed() -> None:
     disk.rotation_euler = (-0.6, 0, 0)
     sun = light("Sun", "SUN", (0, 0, 5), 1.2, color=(1, 0.9, 0.7), angle=0.02)
     sun.rotation_euler = (0.25, 0.6, 0)
+    haze = light("Haze", "SUN", (0, 0, 5), 0.5, color=(0.6, 0.8, 1), angle=0.5)
+    haze.rotation_euler = (-0.2, 0.7, 0)
     light("Off", "POINT", (1, 1, 1), 0)
     light("Hidden", "POINT", (1, 1, 1), 10).hide_render = True
     light("Portal", "AREA", (1, 1, 3), 10).data.cycles.is_portal = True
@@ -150,6 +152,42 @@ def designed() -> None:
     shader = next(node for node in nodes if node.type == "EMISSION")
     profile.data.node_tree.links.new(nodes.new("ShaderNodeTexIES").outputs["Fac"], shader.inputs["Strength"])
     light("Shadowless", "POINT", (1, 1, 1), 0.001, use_shadow=False)
+
+
+def link(obj: Any, kind: str, include: tuple[str, ...] = (), exclude: tuple[str, ...] = ()) -> Any:
+    """Light linking of a light, `kind` receiver or blocker; names of collections stand for their objects."""
+    chosen = bpy.data.collections.new(f"{obj.name} {kind}")
+    for name in (*include, *exclude):
+        if name in bpy.data.collections:
+            chosen.children.link(bpy.data.collections[name])
+        else:
+            chosen.objects.link(bpy.data.objects[name])
+    for members, ones in ((chosen.collection_objects, chosen.objects), (chosen.collection_children, chosen.children)):
+        for member, one in zip(members, ones, strict=True):
+            member.light_linking.link_state = "EXCLUDE" if one.name in exclude else "INCLUDE"
+    setattr(obj.light_linking, f"{kind}_collection", chosen)
+    return obj
+
+
+def linked() -> None:
+    """The room with a ball in a collection, a screen that hides from nothing, and lights that shine on some, or that some do not shadow."""
+    walls()
+    group = bpy.data.collections.new("Things")
+    bpy.context.scene.collection.children.link(group)
+    for name, low in (("Box", (1.0, 0.4, 0)), ("Tile", (1.5, 0.9, 0))):
+        obj = mesh(name, corners_of(low, (low[0] + 0.35, low[1] + 0.35, 0.3)), [face[::-1] for face in FACES.values()], gray(0.8))
+        bpy.context.scene.collection.objects.unlink(obj)
+        group.objects.link(obj)
+    mesh("Hidden", corners_of((1, 1, 1), (1.2, 1.2, 1.2)), list(FACES.values()), gray()).hide_render = True
+    link(light("Things alone", "POINT", (1.0, 1.0, 1.4), 12, color=(1, 0.4, 0.2), shadow_soft_size=0.05), "receiver", ("Things", "Hidden"))
+    without = light("Not the crate", "SPOT", (2.0, 0.6, 1.8), 40, color=(0.2, 0.5, 1), spot_size=1.6, shadow_soft_size=0.08)
+    without.rotation_euler = (0.3, 0.2, 0)
+    link(without, "receiver", exclude=("Crate",))
+    link(light("No shadow of things", "POINT", (0.6, 0.5, 1.3), 8, shadow_soft_size=0), "blocker", exclude=("Things",))
+    both = light("Floor by the crate", "AREA", (2.3, 0.8, 1.5), 9, color=(0.5, 1, 0.5), size=0.3)
+    link(link(both, "receiver", ("Floor", "Box")), "blocker", ("Crate",))
+    link(light("All", "POINT", (0.5, 1.5, 1.6), 2, shadow_soft_size=0), "receiver")
+    link(light("Nothing", "POINT", (0.5, 1.5, 1.0), 50, shadow_soft_size=0), "receiver", ("Hidden",))
 
 
 PHOTOMETRY = """IESNA:LM-63-2002
@@ -274,7 +312,23 @@ def white_world() -> None:
 
 SCENES: dict[str, Callable[[], None]] = {
     scene.__name__: scene
-    for scene in (room, designed, luminaires, unlit, removed, metal, black, block, plane, open_air, crowd, cellar, sphere, white_world)
+    for scene in (
+        room,
+        designed,
+        linked,
+        luminaires,
+        unlit,
+        removed,
+        metal,
+        black,
+        block,
+        plane,
+        open_air,
+        crowd,
+        cellar,
+        sphere,
+        white_world,
+    )
 }
 
 if __name__ == "__main__":

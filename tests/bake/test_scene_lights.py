@@ -78,25 +78,26 @@ def relative(image: np.ndarray, reference: np.ndarray) -> float:
 def test_the_lights_are_listed_by_name_with_their_values(shot: tuple[Path, str]) -> None:
     folder, said = shot
     lights = scene_lights(Asset.open(folder / "asset"))
-    assert list(lights) == ["Bulb", "Disk", "Globe", "Panel", "Spot", "Sun"]
-    bulb, disk, globe, panel, spot, sun = lights.values()
+    assert list(lights) == ["Bulb", "Disk", "Globe", "Haze", "Panel", "Spot", "Sun"]
+    bulb, disk, globe, haze, panel, spot, sun = lights.values()
     assert type(bulb) is PointLight and bulb.falloff == "inverse-square" and bulb.position == pytest.approx((0.6, 1.4, 1.2))
     np.testing.assert_allclose(bulb.color, 14 / (4 * np.pi) * np.array([1, 0.8, 0.5]), rtol=1e-5)
     assert isinstance(globe, SphereLight) and globe.size == pytest.approx(0.08)
-    assert isinstance(spot, SpotLight) and spot.outer == pytest.approx(0.55)
+    assert isinstance(spot, SpotLight) and spot.outer == pytest.approx(0.55) and spot.size == pytest.approx(0.1)
     assert np.cos(spot.inner) == pytest.approx(np.cos(0.55) + 0.4 * (1 - np.cos(0.55)))
     np.testing.assert_allclose(spot.color, 20 * 2 * 1.5 / (4 * np.pi) * np.array([0.4, 1, 0.4]), rtol=1e-5)
     assert isinstance(panel, AreaLight) and panel.area == pytest.approx(0.4 * 0.5 * 0.6, rel=1e-5)
     assert isinstance(disk, AreaLight) and disk.area == pytest.approx(np.pi * 0.15**2, rel=1e-5)
     assert np.linalg.norm(disk.u) == pytest.approx(0.3 * DISK, rel=1e-5)
-    assert isinstance(sun, DirectionalLight)
+    assert isinstance(sun, DirectionalLight) and sun.angle == pytest.approx(0.02)
+    assert isinstance(haze, DirectionalLight) and haze.angle == pytest.approx(0.5)
     np.testing.assert_allclose(sun.color, 1.2 * np.array([1, 0.9, 0.7]), rtol=1e-5)
     manifest = json.loads((folder / "capture" / "capture.json").read_text())
     assert manifest["direct"]["sun_angle"] == pytest.approx(0.02)
     left = {one["name"]: one["reason"] for one in manifest["scene_lights_left_out"]}
     assert set(left) == {"Portal", "Narrow", "Profile", "Shadowless"}
     assert "world" in left["Portal"] and "spread" in left["Narrow"] and "IES" in left["Profile"] and "shadows" in left["Shadowless"]
-    assert "6 lights of the scene's own: 'Bulb', 'Disk'" in said and "'Profile' is left out" in said and "equal area" in said
+    assert "7 lights of the scene's own: 'Bulb', 'Disk'" in said and "'Profile' is left out" in said and "equal area" in said
     told = json.loads(done("info", folder / "asset", "--json").stdout)
     assert told["scene_lights"] == list(lights) and len(told["scene_lights_left_out"]) == 4
     assert "scene lights" in done("info", folder / "capture").stdout

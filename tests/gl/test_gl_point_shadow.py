@@ -23,6 +23,10 @@ LIGHTS: dict[str, Light] = {
     "point near a wall": PointLight((-0.85, 0.2, 1.3)),
     "narrow spot": SpotLight((-0.7, -0.7, 1.8), direction=(0.6, 0.6, -1.2), inner=0.4, outer=0.6, falloff="inverse-square"),
     "wide spot": SpotLight((-0.7, -0.7, 1.0), direction=(0.6, 0.6, -0.2), inner=1.2, outer=1.5, falloff="inverse-square"),
+    "spot with a size": SpotLight((-0.7, -0.7, 1.8), direction=(0.6, 0.6, -1.2), inner=0.4, outer=0.6, falloff="inverse-square", size=0.12),
+    "wide spot with a size": SpotLight(
+        (-0.7, -0.7, 1.0), direction=(0.6, 0.6, -0.2), inner=1.2, outer=1.5, falloff="inverse-square", size=0.12
+    ),
     "sphere": SphereLight((0.1, -0.1, 1.6), size=0.15),
     "ies": PointLight((0.1, -0.1, 1.6), falloff="inverse-square", direction=(0.5, 0.2, -1), roll=0.3, profile=uneven),
     "picture": SpotLight(
@@ -69,7 +73,7 @@ def test_lights_add_up_and_scale(mapper: Any) -> None:
     )
 
 
-@pytest.mark.parametrize("kind", ["point", "narrow spot", "wide spot", "sphere", "area"])
+@pytest.mark.parametrize("kind", ["point", "narrow spot", "wide spot", "spot with a size", "sphere", "area"])
 def test_nothing_shades_an_open_plane(context: Any, kind: str) -> None:
     receivers = build_plane(size=48, half=2.0, footprint=0.1)
     light = LIGHTS[kind]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closed_forms import build_plane, quad
 from rooms import room
 
-from srbf.lights import AreaLight, Light, NamedLight, PointLight, SphereLight, SpotLight
+from srbf.lights import AreaLight, DirectionalLight, Light, NamedLight, PointLight, SphereLight, SpotLight
 from srbf.unshadowed import irradiance_from
 from srbf.visibility.rays import RayTracer
 
 TEXEL = 5e-3  # relative: a texel's mean and its center
 PENUMBRA = 0.02  # of the unshadowed light: up to 512 points of a light
+CONE = 0.03  # of the unshadowed light, at a hard edge: points of a sphere by rays, and 64 by which the closed form knows it
 LIGHTS: dict[str, Light] = {
     "point": PointLight((0.2, 0.1, 0.8), falloff="inverse-square"),
     "spot": SpotLight((0.2, 0.1, 0.8), direction=(0, 0, -1), inner=1.2, outer=1.4, falloff="inverse-square"),
@@ -21,6 +24,11 @@ LIGHTS: dict[str, Light] = {
     "area": AreaLight((0.2, 0.1, 0.8), u=(0.5, 0, 0), v=(0, -0.4, 0.2)),
     "upright area": AreaLight((0.2, 0.1, 0.2), u=(0, 0.8, 0), v=(0, 0, 0.8)),
 }
+SPOTS = {
+    "spot with a size": SpotLight((0.2, 0.1, 0.8), direction=(0, 0.2, -1), inner=0.5, outer=0.8, falloff="inverse-square", size=0.2),
+    "hard spot with a size": SpotLight((0.2, 0.1, 0.8), direction=(0, 0, -1), inner=0.6, outer=0.6, falloff="inverse-square", size=0.1),
+}
+WIDE = SpotLight((0, 0, 1.0), direction=(0, 0, -1), inner=1.5, outer=1.5, falloff="inverse-square", size=0.1)
 
 
 @pytest.mark.parametrize("kind", LIGHTS)
@@ -33,6 +41,20 @@ def test_an_open_plane_has_the_closed_form(kind: str) -> None:
     apart = np.linalg.norm(place - center, axis=1).reshape(found.shape) > 0.4
     np.testing.assert_allclose(found[apart], expected[apart], rtol=TEXEL, atol=TEXEL * expected.mean())
     assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("kind", SPOTS)
+def test_a_spot_with_a_size_has_a_soft_cone_and_the_energy_of_its_cone(kind: str) -> None:
+    receivers, light = build_plane(footprint=0.2), SPOTS[kind]
+    found = RayTracer(receivers).response([light])[..., 0]
+    place, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
+    expected = irradiance_from(light, place, normal).reshape(found.shape)
+    assert np.abs(found - expected).max() < CONE * expected.max()
+    assert found.sum() == pytest.approx(expected.sum(), rel=TEXEL)
+    whole = irradiance_from(light.without_cone(), place, normal).reshape(found.shape)
+    share = np.divide(expected, whole, out=np.zeros_like(whole), where=whole > 0)
+    sharp = irradiance_from(replace(light, size=0.0), place, normal).reshape(found.shape)
+    assert ((share > 0.05) & (sharp == 0)).any() and ((share < 0.95) & (share > 0.5)).any()
 
 
 def test_an_area_is_cut_by_an_edge() -> None:
@@ -55,10 +77,10 @@ def test_an_area_is_cut_by_an_edge() -> None:
     assert np.abs(found - expected).max() < PENUMBRA * expected.max()
 
 
-def test_a_sphere_seen_past_an_edge_is_a_part_of_its_disc() -> None:
+@pytest.mark.parametrize("light", [SphereLight((0, 0, 1.0), size=0.1), WIDE])
+def test_a_sphere_seen_past_an_edge_is_a_part_of_its_disc(light: Light) -> None:
     roof = quad([-9, -9, 0.5], [0, -9, 0.5], [0, 9, 0.5], [-9, 9, 0.5])
     receivers = build_plane(roof, footprint=0.02)
-    light = SphereLight((0, 0, 1.0), size=0.1)
     found = RayTracer(receivers).response([light])[..., 0]
     place, normal = (receivers.images[name].reshape(-1, 3) for name in ("position", "normal"))
     whole = irradiance_from(light, place, normal).reshape(found.shape)
@@ -69,6 +91,21 @@ def test_a_sphere_seen_past_an_edge_is_a_part_of_its_disc() -> None:
     expected = (np.arccos(-t) + t * np.sqrt(1 - t * t)) / np.pi
     assert np.abs(share - expected).max() < PENUMBRA
     assert (share[x > 0.2] > 1 - 1e-3).all() and (share[x < -0.2] == 0).all()
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.3])
+def test_each_sun_has_a_penumbra_of_its_own_angle(angle: float) -> None:
+    """Past the edge of a roof 0.5 m up, a disc of that angle is cut off over 0.5 tan(angle)."""
+    roof = quad([-9, -9, 0.5], [0, -9, 0.5], [0, 9, 0.5], [-9, 9, 0.5])
+    receivers = build_plane(roof, footprint=0.02)
+    tracer = RayTracer(receivers)
+    found = tracer.response([DirectionalLight((0, 0, 1), angle=angle)])[..., 0]
+    x = receivers.images["position"][len(found) // 2, :, 0]
+    t = np.clip(x / 0.5 / np.tan(angle / 2), -1, 1)
+    expected = (np.arccos(-t) + t * np.sqrt(1 - t * t)) / np.pi
+    assert np.abs(found[len(found) // 2] - expected).max() < PENUMBRA
+    both = tracer.response([DirectionalLight((0, 0, 1), angle=angle), DirectionalLight((0, 0, 1))])[..., 0]
+    np.testing.assert_allclose(both - found, tracer.response([DirectionalLight((0, 0, 1))])[..., 0], atol=1e-5)
 
 
 def test_a_light_in_a_surface_is_finite() -> None:

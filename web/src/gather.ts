@@ -4,6 +4,7 @@ import { decodeFloat } from "./exr";
 import type { AssetFiles } from "./files";
 import { type ByteImage, type FloatImage, padToFour } from "./image";
 import type { Manifest } from "./manifest";
+import { NearCells } from "./near_cells";
 import { NearPool } from "./near_sources";
 import { decodePng } from "./png";
 import { Cells } from "./received_light";
@@ -18,8 +19,10 @@ export interface GatherManifest extends Manifest {
   view_rows?: { file: string };
   exchange_links?: { file: string };
   exchange_rows?: { file: string };
-  /** Places and normals of the view's clusters: without, all light comes by links. */
+  /** Places and normals of the view's clusters, and cells by which near surfels are seen: without, all light comes by links. */
   view_points?: { file: string };
+  near_labels?: { file: string };
+  near_places?: { file: string };
   /** Of a view with specular lobes: links of these, and the lobes of its pixels. */
   gloss_links?: { file: string };
   gloss_rows?: { file: string };
@@ -59,6 +62,7 @@ export interface Gather {
   readonly near?: NearPool;
 }
 
+export const NEAR_FILES = ["view_points", "near_labels", "near_places"] as const;
 export const ACROSS = 256; // rows, or clusters, next to each other in a texture
 const [NEGLIGIBLE, MOST_TERMS] = [1e-4, 64]; // of all light, that a bounce adds and is the last; of a scene whose bounces nobody has limited
 
@@ -80,13 +84,13 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
   const { surfels, clusters, view_rays, exchange_rays, bounces, lobes, gloss_rays, specular_albedo } = manifest.gather as Required<GatherManifest>["gather"];
   const file = (manifest.pool as { file: string }).file;
   const scene = manifest.scene as string;
-  const places = manifest.view_points?.file;
-  const [pool, corners, view, exchange, points, gloss] = await Promise.all([
-    files.bytes(file).then((buffer) => decodeFloat(buffer, file)),
+  const float = (name: string) => files.bytes(name).then((buffer) => decodeFloat(buffer, name));
+  const [pool, corners, view, exchange, near, gloss] = await Promise.all([
+    float(file),
     files.bytes(scene).then((buffer) => readOccluders(buffer, scene)),
     readLinks(files, manifest, "view", clusters, view_rays, surfels),
     readLinks(files, manifest, "exchange", surfels, exchange_rays, surfels),
-    places === undefined ? undefined : files.bytes(places).then((buffer) => decodeFloat(buffer, places)),
+    manifest.view_points && Promise.all(NEAR_FILES.map((key) => float((manifest[key] as { file: string }).file))),
     lobes ? readLinks(files, manifest, "gloss", lobes, gloss_rays as number, surfels) : undefined,
   ]);
   const least = specular_albedo ? 4 : 3;
@@ -99,8 +103,11 @@ export async function readGather(files: AssetFiles, manifest: GatherManifest): P
   const cells = new Cells({ kind: "float", width: surfels, height: 2, channels: 4, data: first }, file);
   const most = bounces ?? MOST_TERMS;
   const terms = Math.max(termsOf(exchange, albedo, most), Math.min(specular ? 1 : 0, most)); // lobes see what is not diffuse
-  const near = points && terms ? new NearPool(cells, albedo, points, clusters, places as string) : undefined;
-  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, gloss, specular, terms, near };
+  return { surfels: { cells, corners, tables: [] }, albedo, exchange, view, gloss, specular, terms, near: near && terms ? nearPool(near) : undefined };
+
+  function nearPool([points, labels, places]: FloatImage[]): NearPool {
+    return new NearPool(cells, new NearCells(labels, places, surfels, "near_labels"), albedo, points, clusters, "view_points");
+  }
 }
 
 /** What the clusters and, from the next row of ACROSS on, the lobes receive from surfels of a direct irradiance (S, 3), all bounces included. */

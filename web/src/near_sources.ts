@@ -6,36 +6,38 @@ import { SrbfError } from "./errors";
 import type { FloatImage } from "./image";
 import { dot, type Triple } from "./matrix";
 import type { Occluders } from "./occluders";
+import type { NearCells } from "./near_cells";
 import { type Cells, frame } from "./received_light";
 
 const BRIGHT = 32; // of the mean radiosity, from which a surfel's light is taken out in part; from twice as much on, the whole
-export const MOST = 256; // surfels, the brightest
-const GROUPS = 4; // parts of the bright surfels, each seen or not as one
-const FACING = 0.2; // m, that a unit of the normal counts where surfels are grouped
-const OFF = 0.25; // of a group's size, how far from its surface it is seen
+const MOST = 256; // surfels, the brightest
+export const ENTRIES = 2 * MOST; // surfels, each by two cells
 const [CLOSE, PARTS] = [8, 4]; // sides of a surfel, closer than which to a receiver it counts as so many parts a side
 const LIFT = 1e-3; // of the extent of receivers
-const SQUARINGS = 32; // of a matrix, until its longest axis alone is left
+const KEPT = 1024; // cells of which it is known what sees them
 
-/** n surfels of a pool, those of a group after each other. */
+/** n surfels of a pool. */
 export interface NearSources {
   readonly surfels: readonly number[];
   /** Which part of the light of each is taken out of the links. */
   readonly parts: readonly number[];
-  /** The radiosity of that part, (n, 3). */
-  readonly light: Float64Array;
-  readonly groups: readonly Group[];
+  readonly cells: readonly SendingCell[];
 }
 
-export interface Group {
-  readonly first: number;
-  readonly count: number;
-  /** Where it is seen, m: a little way from its surface to the light. */
+/** What is sent from surfels that are seen by one cell. */
+export interface SendingCell {
+  readonly cell: number;
+  /** Numbers among the sources' surfels. */
+  readonly members: readonly number[];
+  /** Their radiosity, as much as is seen by this cell. */
+  readonly light: readonly Triple[];
+}
+
+/** The place (m) of a light, or the unit direction to a distant one. */
+export interface Toward {
   readonly place: Triple;
+  readonly distant: boolean;
 }
-
-/** The place (m) of a light, or the unit direction to a distant one; an environment is above each surface. */
-export type Toward = { readonly place: Triple; readonly distant: boolean } | "above";
 
 /** A pool of surfels some of which may be bright, and what these light. */
 export class NearPool {
@@ -47,10 +49,13 @@ export class NearPool {
   readonly lift: number;
   /** Which surfels share their place with no other: translucent ones have a second one behind them. */
   private readonly alone: readonly boolean[];
+  /** What the receivers see of cells. */
+  private readonly known = new Map<number, Uint8Array>();
 
   /** `points`: rows of the clusters' places and normals. @throws SrbfError on an image of another shape. */
   constructor(
     readonly cells: Cells,
+    readonly near: NearCells,
     private readonly albedo: Float32Array,
     { width, height, channels, data }: FloatImage,
     clusters: number,
@@ -92,77 +97,62 @@ export class NearPool {
     }
     bright = bright.filter((i) => this.alone[i]);
     if (!bright.length) return undefined;
-    const groups = this.grouped(bright, brightness);
-    const surfels = groups.flat();
-    const parts = surfels.map((i) => Math.min(1, brightness[i] / Math.max(least, 1e-30) - 1));
-    const taken = Float64Array.from(surfels.flatMap((surfel, i) => [0, 1, 2].map((c) => parts[i] * first(3 * surfel + c))));
-    let before = 0;
-    const seen = groups.map((own) => {
-      before += own.length;
-      return { first: before - own.length, count: own.length, place: this.seenFrom(own, brightness, light) };
+    const parts = bright.map((i) => Math.min(1, brightness[i] / Math.max(least, 1e-30) - 1));
+    const places = bright.map((i) => [...this.cells.places.subarray(3 * i, 3 * i + 3)] as unknown as Triple);
+    const shares = this.near.seen(bright, places, bright.map((i) => brightness[i] * areas[i]), light.distant ? undefined : light.place);
+    const sending = new Map<number, { members: number[]; light: Triple[] }>();
+    shares.forEach((own, i) => {
+      for (const [cell, share] of own) {
+        const sent = sending.get(cell) ?? { members: [], light: [] };
+        sending.set(cell, sent);
+        sent.members.push(i);
+        sent.light.push([0, 1, 2].map((c) => share * parts[i] * first(3 * bright[i] + c)) as unknown as Triple);
+      }
     });
-    return { surfels, parts, light: taken, groups: seen };
+    return { surfels: bright, parts, cells: [...sending].sort(([one], [other]) => one - other).map(([cell, sent]) => ({ cell, ...sent })) };
   }
 
   /** What sources lay on all receivers, (n, 3). */
-  irradiance({ surfels, light, groups }: NearSources, occluders: Occluders): Float64Array {
-    const { cells, places, normals, lift } = this;
+  irradiance({ surfels, cells: sending }: NearSources, occluders: Occluders): Float64Array {
+    const { cells, places, normals } = this;
     const out = new Float64Array(places.length);
+    const seen = sending.map(({ cell }) => this.seen(cell, occluders));
+    const factors = new Float64Array(surfels.length);
     for (let at = 0; at < places.length; at += 3) {
-      const [x, y, z] = [places[at], places[at + 1], places[at + 2]];
-      const [nx, ny, nz] = [normals[at], normals[at + 1], normals[at + 2]];
-      const [sx, sy, sz] = [Math.fround(x + lift * nx), Math.fround(y + lift * ny), Math.fround(z + lift * nz)];
-      for (const { first, count, place } of groups) {
-        let [r, g, b] = [0, 0, 0];
-        for (let i = first; i < first + count; ++i) {
-          const s = 3 * surfels[i];
-          const facing: Triple = [cells.normals[s], cells.normals[s + 1], cells.normals[s + 2]];
-          const factor = discFactor([cells.places[s] - x, cells.places[s + 1] - y, cells.places[s + 2] - z], [nx, ny, nz], facing, cells.areas[surfels[i]]);
-          if (factor === 0) continue;
-          r += factor * light[3 * i];
-          g += factor * light[3 * i + 1];
-          b += factor * light[3 * i + 2];
-        }
-        if ((r === 0 && g === 0 && b === 0) || occluders.between(sx, sy, sz, place[0] - sx, place[1] - sy, place[2] - sz)) continue;
-        out[at] += r;
-        out[at + 1] += g;
-        out[at + 2] += b;
-      }
+      const normal: Triple = [normals[at], normals[at + 1], normals[at + 2]];
+      surfels.forEach((surfel, i) => {
+        const s = 3 * surfel;
+        const toward: Triple = [cells.places[s] - places[at], cells.places[s + 1] - places[at + 1], cells.places[s + 2] - places[at + 2]];
+        factors[i] = discFactor(toward, normal, [cells.normals[s], cells.normals[s + 1], cells.normals[s + 2]], cells.areas[surfel]);
+      });
+      sending.forEach(({ members, light }, number) => {
+        if (seen[number][at / 3] === 0) return;
+        members.forEach((member, i) => {
+          for (let c = 0; c < 3; ++c) out[at + c] += factors[member] * light[i][c];
+        });
+      });
     }
     return out;
   }
 
-  /** At most GROUPS, by halving the one that is spread most, along its longest axis. */
-  private grouped(bright: readonly number[], brightness: Float64Array): number[][] {
-    const { places, normals, areas } = this.cells;
-    const groups = [[...bright]];
-    while (groups.length < GROUPS) {
-      const spreads = groups.map((own) => {
-        const features = own.map((i) => [...places.subarray(3 * i, 3 * i + 3), ...normals.subarray(3 * i, 3 * i + 3).map((x) => FACING * x)]);
-        return spreadOf(features, own.map((i) => brightness[i] * areas[i]));
-      });
-      const widest = spreads.reduce((best, { spread }, i) => (spread > spreads[best].spread ? i : best), 0);
-      const { spread, along } = spreads[widest];
-      if (spread <= 0) break;
-      const own = groups[widest];
-      groups[widest] = own.filter((_, i) => along[i] <= 0);
-      groups.push(own.filter((_, i) => along[i] > 0));
+  /** 1 for each receiver that sees a cell. */
+  private seen(cell: number, occluders: Occluders): Uint8Array {
+    const { places, normals, lift, known } = this;
+    const found = known.get(cell) ?? new Uint8Array(places.length / 3);
+    if (!known.has(cell)) {
+      const place = this.near.place(cell);
+      for (let i = 0; i < found.length; ++i) {
+        const [x, y, z] = [0, 1, 2].map((k) => Math.fround(places[3 * i + k] + lift * normals[3 * i + k]));
+        found[i] = occluders.between(x, y, z, place[0] - x, place[1] - y, place[2] - z) ? 0 : 1;
+      }
     }
-    return groups;
-  }
-
-  /** Where a group is seen. */
-  private seenFrom(own: readonly number[], brightness: Float64Array, light: Toward): Triple {
-    const { places, areas, normals } = this.cells;
-    const middle = mean(own.map((i) => [...places.subarray(3 * i, 3 * i + 3)]), own.map((i) => brightness[i] * areas[i]));
-    const away = own.map((i) => middle.reduce((sum, x, k) => sum + (places[3 * i + k] - x) ** 2, 0));
-    const nearest = own[away.indexOf(Math.min(...away))];
-    const place = [...places.subarray(3 * nearest, 3 * nearest + 3)];
-    const above = light === "above" ? (normals.subarray(3 * nearest, 3 * nearest + 3) as unknown as Triple) : light.distant ? light.place : undefined;
-    const vector = above ?? ((light as { place: Triple }).place.map((x, k) => x - place[k]) as unknown as Triple);
-    const far = above ? Infinity : Math.sqrt(dot(vector, vector));
-    const step = Math.min(OFF * Math.sqrt(own.reduce((sum, i) => sum + areas[i], 0)), far / 2) / (above ? 1 : Math.max(far, 1e-30));
-    return place.map((x, k) => x + step * vector[k]) as unknown as Triple;
+    known.delete(cell);
+    known.set(cell, found); // the last in order
+    for (const first of known.keys()) {
+      if (known.size <= KEPT) break;
+      known.delete(first);
+    }
+    return found;
   }
 }
 
@@ -191,34 +181,6 @@ export function without({ surfels, parts }: NearSources, irradiance: Float64Arra
     for (let c = 0; c < 3; ++c) out[3 * surfel + c] *= 1 - parts[i];
   });
   return out;
-}
-
-/** How far points are from their weighted mean: in all, and each along the longest axis. */
-function spreadOf(points: number[][], weights: number[]): { spread: number; along: number[] } {
-  const middle = mean(points, weights);
-  const off = points.map((point) => point.map((x, k) => x - middle[k]));
-  const matrix = middle.map((_, i) => middle.map((_, j) => off.reduce((sum, d, n) => sum + weights[n] * d[i] * d[j], 0)));
-  const spread = points.length > 1 ? matrix.reduce((sum, row, i) => sum + row[i], 0) : 0; // without rounding
-  if (spread <= 0) return { spread, along: off.map(() => 0) };
-  const axis = longestAxis(matrix);
-  return { spread, along: off.map((d) => d.reduce((sum, x, k) => sum + x * axis[k], 0)) };
-}
-
-/** The eigenvector of the largest eigenvalue of a symmetric matrix without negative ones; its largest part is above 0. */
-function longestAxis(matrix: number[][]): number[] {
-  const trace = (m: number[][]) => m.reduce((sum, row, i) => sum + row[i], 0);
-  let power = matrix;
-  for (let i = 0; i < SQUARINGS; ++i) {
-    const scale = 1 / trace(power) ** 2;
-    power = power.map((row) => power.map((other) => scale * row.reduce((sum, x, k) => sum + x * other[k], 0)));
-  }
-  const diagonal = power.map((row, i) => row[i]);
-  return power[diagonal.indexOf(Math.max(...diagonal))];
-}
-
-function mean(points: number[][], weights: number[]): number[] {
-  const total = weights.reduce((sum, x) => sum + x, 0);
-  return points[0].map((_, k) => points.reduce((sum, point, i) => sum + weights[i] * point[k], 0) / total);
 }
 
 /** The longest side of the box about places, m. */

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 // What one look of a light lays on each cell of a scene's surfaces, added to that of the looks before: the arithmetic of srbf/visibility/received.py.
-// SRBF_SOURCES: what a group of bright surfels lays there, seen from one place: that of srbf/visibility/near_sources.py.
 // SRBF_PROFILE: the light has a profile. SRBF_DISTANT: a directional light. SRBF_SHADOW: 0 none, 1 a map of the asset's own triangles, 2 an engine's map that compares, 3 one that holds
 // depths (or their means, VSM). SRBF_MEAN_NORMALS: normals may be means over several faces. SRBF_REVERSED: the engine's depth is 1 where it is nearest.
 precision highp float;
@@ -14,11 +13,7 @@ precision highp samplerCubeShadow;
 #include "surfels/cell_on_cube.glsl"
 #include "surfels/cell_on_map.glsl"
 #ifdef SRBF_MEAN_NORMALS
-#include "shadow/point_shadow_place.glsl"
-#include "surfels/surfel_visibility.glsl"
-#endif
-#ifdef SRBF_SOURCES
-#include "surfels/disc_factor.glsl"
+#include "cube_visibility.glsl"
 #endif
 #ifdef SRBF_PROFILE
 #include "surfels/profiled_irradiance.glsl"
@@ -42,11 +37,6 @@ uniform sampler2D profile;
 uniform vec3 profileAcross;
 uniform vec3 profileUp;
 uniform float profileTangent;
-#endif
-#ifdef SRBF_SOURCES
-uniform sampler2D sources;  // rows: place and area, normal, radiosity, of one surfel a column
-uniform int first;          // column of the group's first surfel
-uniform int count;
 #endif
 #if SRBF_SHADOW == 1
 uniform sampler2D nearness;  // six faces of a cube, or one map of a directional light
@@ -76,15 +66,7 @@ uniform sampler2D shadowMap;
 out vec4 irradiance;
 
 vec3 unshadowed(vec4 cell, vec3 normal) {
-#ifdef SRBF_SOURCES
-    vec3 total = vec3(0.0);
-    for (int i = first; i < first + count; ++i) {
-        vec4 source = texelFetch(sources, ivec2(i, 0), 0);
-        float factor = srbfDiscFactor(source.xyz - cell.xyz, normal, texelFetch(sources, ivec2(i, 1), 0).xyz, source.w);
-        total += factor * texelFetch(sources, ivec2(i, 2), 0).rgb;
-    }
-    return total;
-#elif defined(SRBF_DISTANT)
+#ifdef SRBF_DISTANT
     return color * max(dot(normal, light), 0.0);
 #else
     SrbfPointLight pointLight = SrbfPointLight(light, vec3(0.0), color, axis, a0, radius, versineInner, versineOuter, falloff);
@@ -99,18 +81,11 @@ vec3 unshadowed(vec4 cell, vec3 normal) {
 #if SRBF_SHADOW == 1 && defined(SRBF_MEAN_NORMALS)
 // The nearest surfaces about a lifted cell, whose plane is not known.
 float visibility(vec3 place, vec3 normal) {
-    ivec2 size = textureSize(nearness, 0);
 #ifdef SRBF_DISTANT
     vec2 at = vec2(dot(place, across), dot(place, up)) / reach * 0.5 + 0.5;
-    return srbfSurfelVisibility(nearness, ivec2(0), size.x, vec3(at, dot(place, light) + 2.0 * reach));
+    return srbfSurfelVisibility(nearness, ivec2(0), textureSize(nearness, 0).x, vec3(at, dot(place, light) + 2.0 * reach));
 #else
-    int width = size.y / 2;
-    vec3 fromLight = place - light;
-    int face = srbfCubeFace(fromLight);
-    int axis = face / 2;
-    vec3 ahead = vec3(axis == 0, axis == 1, axis == 2);  // columns run along the axis after it, rows along the one after that
-    vec3 seen = srbfPointShadowPlace(fromLight, ahead.zxy, ahead.yzx, face % 2 == 0 ? ahead : -ahead, 1.0);
-    return srbfSurfelVisibility(nearness, ivec2(face % 3, face / 3) * width, width, seen);
+    return cubeVisibility(nearness, place - light);
 #endif
 }
 #elif SRBF_SHADOW == 1

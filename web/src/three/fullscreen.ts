@@ -36,6 +36,16 @@ export class FullscreenPass {
   }
 }
 
+/** Draw into some rows of a target alone. */
+export function within(target: WebGLRenderTarget, first: number, rows: number, draw: (target: WebGLRenderTarget) => void): void {
+  target.viewport.set(0, first, target.width, rows);
+  try {
+    draw(target);
+  } finally {
+    target.viewport.set(0, 0, target.width, target.height);
+  }
+}
+
 /** Run `draw`; then the renderer's target, clear color and switches are what they were. */
 export function undisturbed(renderer: WebGLRenderer, draw: () => void): void {
   const target = renderer.getRenderTarget();

@@ -15,7 +15,7 @@ import type { Triple } from "../matrix";
 import { packedCells } from "../surfels";
 import type { ShadowedLook } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
-import { FullscreenPass } from "./fullscreen";
+import { FullscreenPass, within } from "./fullscreen";
 import { NearIrradiance } from "./near_irradiance";
 import { SurfelIrradiance } from "./surfel_irradiance";
 import { tableTexture } from "./textures";
@@ -163,16 +163,6 @@ export class GatherWeights {
     lobes.uniforms.light.value = seen.texture;
     const [before, own] = this.rows;
     within(target, before, own, (part) => lobes.draw(renderer, part));
-  }
-}
-
-/** Draw into some rows of a target alone. */
-function within(target: WebGLRenderTarget, first: number, rows: number, draw: (target: WebGLRenderTarget) => void): void {
-  target.viewport.set(0, first, target.width, rows);
-  try {
-    draw(target);
-  } finally {
-    target.viewport.set(0, 0, target.width, target.height);
   }
 }
 

@@ -1,20 +1,27 @@
 /**
- * Light from the brightest surfels of a pool on the others and on the view's clusters: a shadow cube about each group of them, and a pass for
- * each set of receivers. Direct light on the surfels is read back, since which of them are bright is found on the CPU.
+ * Light from the brightest surfels of a pool on the others and on the view's clusters. What these see of a cell is drawn once, by a shadow cube
+ * about it, and kept. Direct light on the surfels is read back, since which of them are bright is found on the CPU.
  */
-import type { DataTexture, Texture, WebGLRenderer, WebGLRenderTarget } from "three";
+import { type DataTexture, NearestFilter, RedFormat, type Texture, UnsignedByteType, type WebGLRenderer, WebGLRenderTarget } from "three";
 import { ACROSS, type Gather } from "../gather";
 import type { Triple } from "../matrix";
-import { MOST, type NearPool, type NearSources, without } from "../near_sources";
+import { ENTRIES, type NearPool, type SendingCell, without } from "../near_sources";
+import nearLight from "../shaders/near_light.glsl";
+import nearSeen from "../shaders/near_seen.glsl";
 import type { Look, PackedCells } from "../surfels";
 import { floatTarget, floatTexture } from "./float_textures";
-import type { FullscreenPass } from "./fullscreen";
-import { irradiancePass, type SurfelIrradiance } from "./surfel_irradiance";
+import { FullscreenPass, within } from "./fullscreen";
+import type { SurfelIrradiance } from "./surfel_irradiance";
 
-const NEAREST = 5e-4; // meters: a group is seen from close above its surface, which hides what is behind
+const NEAREST = 5e-4; // meters: a cell is seen from close above its surface, which hides what is behind
+const SLOTS = 64; // cells whose visibility is kept, at most
 
 interface Receivers {
-  readonly pass: FullscreenPass;
+  readonly rows: number;
+  readonly seeing: FullscreenPass;
+  readonly lighting: FullscreenPass;
+  /** How much each sees of the cells, one slot below the other. */
+  readonly seen: WebGLRenderTarget;
   readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
 }
 
@@ -35,9 +42,12 @@ export class NearIrradiance {
   private readonly taken?: DataTexture;
   private readonly sources: DataTexture;
   private readonly textures: DataTexture[];
-  private readonly surfels: Receivers;
-  private readonly clusters: Receivers;
+  private sets?: [surfels: Receivers, clusters: Receivers];
+  private slots = SLOTS;
+  private readonly kept = new Map<number, number>(); // slots of cells, those asked for last at the end
   private readonly read: Float32Array;
+  /** Cells whose visibility was drawn. */
+  drawn = 0;
 
   /** `cells`: of the pool, as `direct` has them, in the pool's order: each is its own patch. */
   constructor(
@@ -50,15 +60,13 @@ export class NearIrradiance {
     this.read = new Float32Array(4 * width * height);
     this.far = floatTexture(new Float32Array(4 * width * height), width, height);
     if (gather.gloss) this.taken = floatTexture(new Float32Array(4 * width * height), width, height);
-    this.sources = floatTexture(new Float32Array(12 * MOST), MOST, 3);
+    this.sources = floatTexture(new Float32Array(12 * ENTRIES), ENTRIES, 3);
     const rows = Math.ceil(pool.clusters / ACROSS);
     this.textures = [pool.places, pool.normals].map((values, row) => {
       const texels = new Float32Array(4 * ACROSS * rows);
       for (let i = 0; i < 3 * pool.clusters; ++i) texels[4 * Math.floor(i / 3) + (i % 3)] = values[i] - (row === 0 ? cells.middle[i % 3] : 0);
       return floatTexture(texels, ACROSS, rows);
     });
-    this.surfels = this.receivers(direct.places, direct.normals, width, height);
-    this.clusters = this.receivers(this.textures[0], this.textures[1], ACROSS, rows);
   }
 
   /** Of a light's irradiance on the surfels; undefined where none is bright. Within `undisturbed`. */
@@ -67,7 +75,7 @@ export class NearIrradiance {
     renderer.readRenderTargetPixels(irradiance, 0, 0, cells.width, cells.height, read);
     const values = new Float64Array(3 * pool.cells.count);
     for (let i = 0; i < pool.cells.count; ++i) for (let c = 0; c < 3; ++c) values[3 * i + c] = read[4 * i + c];
-    const near = pool.sources(values, looks[0].factor ? "above" : { place: this.placeOf(looks), distant: looks[0].distant });
+    const near = pool.sources(values, { place: this.placeOf(looks), distant: looks[0].distant });
     if (!near) return undefined;
     const far = this.far.image.data as unknown as Float32Array;
     const toLobes = this.taken?.image.data as unknown as Float32Array | undefined;
@@ -79,24 +87,23 @@ export class NearIrradiance {
     });
     this.far.needsUpdate = true;
     if (this.taken) this.taken.needsUpdate = true;
-    this.setSources(near);
-    const [blank] = this.clusters.sums;
+    const [surfels, receivingClusters] = this.receivers(renderer);
+    const [blank] = receivingClusters.sums;
     renderer.setRenderTarget(blank);
     renderer.setClearColor(0, 0);
     renderer.clear(true, false, false);
     let [second, clusters]: Texture[] = [this.far, blank.texture];
-    for (const { first, count, place } of near.groups) {
-      const light = place.map((x, k) => x - cells.middle[k]) as unknown as Triple;
-      const { nearness } = this.direct.maps.draw(renderer, light, false, NEAREST);
-      const values = { nearness, light, first, count };
-      second = added(renderer, this.surfels, second, values);
-      clusters = added(renderer, this.clusters, clusters, values);
+    for (let start = 0; start < near.cells.length; start += this.slots) {
+      const sending = near.cells.slice(start, start + this.slots);
+      const count = this.setSources(near.surfels, sending, this.slotsOf(renderer, sending));
+      second = added(renderer, surfels, second, count);
+      clusters = added(renderer, receivingClusters, clusters, count);
     }
     return { far: this.far, second, clusters, taken: this.taken };
   }
 
   dispose(): void {
-    const sets = [this.surfels, this.clusters].flatMap(({ pass, sums }) => [pass, ...sums]);
+    const sets = (this.sets ?? []).flatMap(({ seeing, lighting, seen, sums }) => [seeing, lighting, seen, ...sums]);
     this.taken?.dispose();
     for (const one of [this.far, this.sources, ...this.textures, ...sets]) one.dispose();
   }
@@ -107,32 +114,93 @@ export class NearIrradiance {
     return this.cells.middle.map((x, k) => x + looks.reduce((sum, { place }) => sum + place[k], 0) / looks.length) as unknown as Triple;
   }
 
-  private setSources({ surfels, light }: NearSources): void {
+  /** The surfels that cells send light from; how many. */
+  private setSources(surfels: readonly number[], sending: readonly SendingCell[], slots: readonly number[]): number {
     const { cells } = this.pool;
     const texels = this.sources.image.data as unknown as Float32Array;
-    surfels.forEach((surfel, i) => {
-      for (let k = 0; k < 3; ++k) {
-        texels[4 * i + k] = cells.places[3 * surfel + k] - this.cells.middle[k];
-        texels[4 * (MOST + i) + k] = cells.normals[3 * surfel + k];
-        texels[4 * (2 * MOST + i) + k] = light[3 * i + k];
-      }
-      texels[4 * i + 3] = cells.areas[surfel];
+    let at = 0;
+    sending.forEach(({ members, light }, number) => {
+      members.forEach((member, i) => {
+        const surfel = surfels[member];
+        for (let k = 0; k < 3; ++k) {
+          texels[4 * at + k] = cells.places[3 * surfel + k] - this.cells.middle[k];
+          texels[4 * (ENTRIES + at) + k] = cells.normals[3 * surfel + k];
+          texels[4 * (2 * ENTRIES + at) + k] = light[i][k];
+        }
+        texels[4 * at + 3] = cells.areas[surfel];
+        texels[4 * (ENTRIES + at) + 3] = slots[number];
+        ++at;
+      });
     });
     this.sources.needsUpdate = true;
+    return at;
   }
 
-  private receivers(places: Texture, normals: Texture, width: number, height: number): Receivers {
-    const set = { places: { value: places }, normals: { value: normals }, sources: { value: this.sources }, lift: { value: this.pool.lift } };
-    const drawn = { former: { value: null }, light: { value: null }, nearness: { value: null }, first: { value: 0 }, count: { value: 0 } };
-    const defines = { SRBF_SHADOW: 1, SRBF_MEAN_NORMALS: 1, SRBF_SOURCES: 1 };
-    return { pass: irradiancePass({ ...set, ...drawn }, defines), sums: [floatTarget(width, height), floatTarget(width, height)] };
+  /** Where it is kept what receivers see of each cell; drawn for those that are new, in place of those not asked for longest. */
+  private slotsOf(renderer: WebGLRenderer, sending: readonly SendingCell[]): number[] {
+    const { kept } = this;
+    for (const { cell } of sending) {
+      const slot = kept.get(cell);
+      if (slot === undefined || !kept.delete(cell)) continue;
+      kept.set(cell, slot);
+    }
+    return sending.map(({ cell }) => {
+      const known = kept.get(cell);
+      if (known !== undefined) return known;
+      let slot = kept.size;
+      if (slot >= this.slots) {
+        const [oldest, own] = kept.entries().next().value as [number, number];
+        kept.delete(oldest);
+        slot = own;
+      }
+      kept.set(cell, slot);
+      this.drawSeen(renderer, cell, slot);
+      return slot;
+    });
+  }
+
+  /** What all receivers see of a cell. */
+  private drawSeen(renderer: WebGLRenderer, cell: number, slot: number): void {
+    ++this.drawn;
+    const light = this.pool.near.place(cell).map((x, k) => x - this.cells.middle[k]) as unknown as Triple;
+    const { nearness } = this.direct.maps.draw(renderer, light, false, NEAREST);
+    for (const { seeing, seen, rows } of this.receivers(renderer)) {
+      for (const [name, value] of Object.entries({ nearness, light, first: slot * rows })) seeing.uniforms[name].value = value;
+      within(seen, slot * rows, rows, (target) => seeing.draw(renderer, target));
+    }
+  }
+
+  /** Both sets, made when it is known how large textures may be. */
+  private receivers(renderer: WebGLRenderer): [surfels: Receivers, clusters: Receivers] {
+    if (!this.sets) {
+      const { direct, cells, textures } = this;
+      const rows = textures[0].image.height;
+      this.slots = Math.min(SLOTS, Math.floor(renderer.capabilities.maxTextureSize / Math.max(cells.height, rows)));
+      this.sets = [this.set(direct.places, direct.normals, cells.width, cells.height), this.set(textures[0], textures[1], ACROSS, rows)];
+    }
+    return this.sets;
+  }
+
+  private set(places: Texture, normals: Texture, width: number, rows: number): Receivers {
+    const kind = { format: RedFormat, type: UnsignedByteType, magFilter: NearestFilter, minFilter: NearestFilter, depthBuffer: false };
+    const seen = new WebGLRenderTarget(width, rows * this.slots, kind);
+    const own = { places: { value: places }, normals: { value: normals } };
+    const looked = { nearness: { value: null }, light: { value: null }, lift: { value: this.pool.lift }, first: { value: 0 } };
+    const lit = { seen: { value: seen.texture }, sources: { value: this.sources }, former: { value: null }, count: { value: 0 }, rows: { value: rows } };
+    return {
+      rows,
+      seeing: new FullscreenPass(nearSeen, { ...own, ...looked }),
+      lighting: new FullscreenPass(nearLight, { ...own, ...lit }),
+      seen,
+      sums: [floatTarget(width, rows), floatTarget(width, rows)],
+    };
   }
 }
 
-/** The sum of `former` and what one group of sources lays on receivers. */
-function added(renderer: WebGLRenderer, { pass, sums }: Receivers, former: Texture, values: Record<string, unknown>): Texture {
+/** The sum of `former` and what `count` sources lay on receivers. */
+function added(renderer: WebGLRenderer, { lighting, sums }: Receivers, former: Texture, count: number): Texture {
   const next = sums.find(({ texture }) => texture !== former) as WebGLRenderTarget;
-  for (const [name, value] of Object.entries({ former, ...values })) pass.uniforms[name].value = value;
-  pass.draw(renderer, next);
+  for (const [name, value] of Object.entries({ former, count })) lighting.uniforms[name].value = value;
+  lighting.draw(renderer, next);
   return next.texture;
 }

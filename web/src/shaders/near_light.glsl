@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// Light from bright surfels, as much as receivers see of the cells that these are in, added to `former`: the arithmetic of srbf/visibility/near_sources.py.
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+
+#include "surfels/disc_factor.glsl"
+
+uniform sampler2D places;   // less the middle of all cells, meters
+uniform sampler2D normals;
+uniform sampler2D seen;     // how much of each cell, `rows` texels below each other
+uniform sampler2D sources;  // rows: place and area, normal and slot of the cell, radiosity, of one surfel a column
+uniform sampler2D former;
+uniform int count;          // of columns
+uniform int rows;           // texels of receivers
+
+out vec4 irradiance;
+
+void main() {
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    vec3 place = texelFetch(places, at, 0).xyz;
+    vec3 normal = texelFetch(normals, at, 0).xyz;
+    vec3 total = texelFetch(former, at, 0).rgb;
+    for (int i = 0; i < count; ++i) {
+        vec4 source = texelFetch(sources, ivec2(i, 0), 0);
+        vec4 facing = texelFetch(sources, ivec2(i, 1), 0);
+        float visible = texelFetch(seen, at + ivec2(0, rows * int(facing.w)), 0).r;
+        if (visible > 0.0) {
+            total += visible * srbfDiscFactor(source.xyz - place, normal, facing.xyz, source.w) * texelFetch(sources, ivec2(i, 2), 0).rgb;
+        }
+    }
+    irradiance = vec4(total, 1.0);
+}
