@@ -7,7 +7,7 @@ SCENE ?= loft
 OUT ?= out/$(SCENE)
 MINUTES ?= 9
 PAGE := srbf/viewer/page/index.html
-PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.glsl)
+PAGE_SOURCES := web/package-lock.json $(wildcard web/*.ts web/viewer/* web/src/*.ts web/src/*/*) $(wildcard glsl/*/*.*)
 
 .PHONY: setup setup-test demo variable-lightmap gallery test test-fast test-godot check docs torture bench extension web clean
 setup: $(VENV)/.installed

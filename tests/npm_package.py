@@ -49,7 +49,7 @@ def npm() -> Callable[..., str]:
 def built(script: str, npm: Callable[..., str], files: Iterable[Path], made: Iterable[Path], *arguments: str) -> None:
     """Have `npm run script` make the files `made`, unless they are there and were made of these very `files` and of glsl/."""
     digest = hashlib.sha256()
-    for file in sorted({*files, WEB / "package-lock.json", *(WEB.parent / "glsl").rglob("*.glsl")}):
+    for file in sorted({*files, WEB / "package-lock.json", *(WEB.parent / "glsl").rglob("*.*")}):
         digest.update(str(file.relative_to(WEB.parent)).encode() + file.read_bytes())
     with FileLock(BUILD / ".lock"):
         mark = BUILD / f"{script.replace(':', '-')}.sha256"

@@ -8,7 +8,7 @@ vec2 srbfLobeAlbedo(highp sampler2D lobeAlbedo, float NoV, float alpha) {
     const float GRAZING = 0.02;
     ivec2 last = textureSize(lobeAlbedo, 0) - ivec2(1);
     vec2 most = vec2(float(last.x), float(last.y));
-    vec2 place = clamp(vec2(sqrt(alpha), (NoV - GRAZING) / (1.0 - GRAZING)), 0.0, 1.0) * most;
+    vec2 place = clamp(vec2(sqrt(alpha), (NoV - GRAZING) / (1.0 - GRAZING)), vec2(0.0), vec2(1.0)) * most;
     ivec2 low = ivec2(min(int(place.x), last.x - 1), min(int(place.y), last.y - 1));
     vec2 part = place - vec2(float(low.x), float(low.y));
     vec2 top = mix(texelFetch(lobeAlbedo, low, 0).rg, texelFetch(lobeAlbedo, low + ivec2(1, 0), 0).rg, part.x);

@@ -24,7 +24,7 @@ vec3 srbfSpecularLobe(highp sampler2D lobeAlbedo, vec3 normal, vec3 toEye, vec3 
     float masked = sqrt(1.0 + squared * max(1.0 - NoV * NoV, 0.0) / (NoV * NoV)) + sqrt(1.0 + squared * max(1.0 - NoL * NoL, 0.0) / max(NoL * NoL, 1e-12));
     float amount = squared / (PI * width * width) * 2.0 / masked / (4.0 * NoV);
     vec2 terms = srbfLobeAlbedo(lobeAlbedo, NoV, alpha);
-    vec3 along = clamp((color - terms.y) / max(1.0 - terms.y, 1e-6), 0.0, 1.0);  // Fresnel term along the normal
+    vec3 along = clamp((color - terms.y) / max(1.0 - terms.y, 1e-6), vec3(0.0), vec3(1.0));  // Fresnel term along the normal
     float grazing = pow(1.0 - clamp(dot(toEye, middle), 0.0, 1.0), 5.0);
     vec3 term = (along + (1.0 - along) * grazing) / max(along * (1.0 - terms.y) + terms.y, vec3(1e-9));
     return color * (1.0 - share + share * term) * (amount / terms.x);

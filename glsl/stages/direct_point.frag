@@ -112,7 +112,7 @@ void main() {
     float NoL = max(dot(normal, toLight), 1.0 / STEEPEST);
     vec2 slope = -vec2(dot(normal, across), dot(normal, up)) / (NoL * max(length(lightVector), 1e-20)) * step;
     float bias = BIAS * step * place.z;
-    vec3 visibility = vec3(srbfShadowFraction(heights, place.xy, place.z, slope, bias));
+    vec3 visibility = vec3(seen ? srbfShadowFraction(heights, place.xy, place.z, slope, bias) : 0.0);
     float shaded = 1.0 - srbfShadowFraction(wallHeights, place.xy, place.z, slope, bias);
     visibility *= mix(vec3(1.0), textureLod(transmittance, place.xy, 0.0).rgb, shaded);
     if (profiled) {
@@ -120,6 +120,8 @@ void main() {
     }
     response = vec4(srbfDirect(normal, toLight, visibility) * strength * weight, 1.0);
 #ifdef SRBF_LOBES
-    response.rgb += reflected(at, point, normal, lightVector) * visibility * weight;
+    if (max(visibility.r, max(visibility.g, visibility.b)) > 0.0 && texelFetch(lobes, at, 0).b > 0.0) {
+        response.rgb += reflected(at, point, normal, lightVector) * visibility * weight;
+    }
 #endif
 }

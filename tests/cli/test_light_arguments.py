@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_profiles import UNEVEN, uneven
 
 from srbf.cli.light_arguments import parse_area, parse_named, parse_sphere, read_frames, with_falloff
 from srbf.errors import InputError, ManifestError
+from srbf.light_profile import Profile
 from srbf.lights import AreaLight, DirectionalLight, Light, NamedLight, PointLight, SphereLight, SpotLight
 
 
@@ -118,3 +120,20 @@ def test_frames_name_the_frame_of_a_bad_light(tmp_path: Path) -> None:
     path = frames_of(tmp_path, {"kind": "area", "position": [0, 0, 1], "u": [1, 0, 0], "v": [1, 0, 0]})
     with pytest.raises(InputError, match="frame 0: expected an area light's sides"):
         read_frames(path)
+
+
+def test_a_profile_is_the_file_beside_the_frames_or_one_that_is_known(tmp_path: Path) -> None:
+    path = frames_of(tmp_path, {"kind": "point", "position": [0, 0, 1], "profile": "one.ies"})
+    asked = []
+
+    def known(name: str) -> Profile:
+        asked.append(name)
+        return uneven
+
+    with pytest.raises(InputError, match="expected an IES file"):
+        read_frames(path)
+    (light,) = read_frames(path, known=known)[0]
+    assert isinstance(light, PointLight) and light.profile == uneven and asked == ["one.ies"]
+    (tmp_path / "one.ies").write_text(UNEVEN.replace("1 1000 1 ", "1 1000 2 "))
+    (light,) = read_frames(path, known=known)[0]
+    assert isinstance(light, PointLight) and light.profile != uneven and asked == ["one.ies"]

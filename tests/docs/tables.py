@@ -75,7 +75,7 @@ ELSEWHERE = {
     "npm test *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
     "npm run check *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
     "npm run build *": f"{WEB}::test_the_units_types_and_build_of_the_package_pass",
-    "npm run build:viewer *": "tests/viewer/conftest.py::viewer_page",
+    "npm run build:viewer *": "tests/npm_package.py::viewer_page",
 }
 
 # Why nothing here runs it to its end. Flags of our own scripts, names of npm's scripts and the files named are checked all the same.

@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -27,6 +28,7 @@ from srbf.methods import relight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.relighting.direct_light import Added
 from srbf.unshadowed import irradiance_from
+from srbf.viewer.cycles import CyclesRenders
 from srbf.visibility.glossy_direct import GlossyPixels
 from srbf.visibility.hemisphere import GOLDEN
 from srbf.visibility.light_rays import rays_towards
@@ -113,10 +115,13 @@ def shaped(tmp_path_factory: pytest.TempPathFactory) -> Asset:
     """A deep framebuffer whose scene has lights with an IES file."""
     room = Room.box((3, 2, 2), 0.25, 0.6)
     asset = DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("view") / "capture", room, 700, 150, tested=0))
-    common = {"position": [1.2, 0.9, 1.3], "color": [1.0, 0.8, 0.6], "a0": 0.7, "falloff": "inverse-square", "profile": "Bulb.ies"}
-    bulb = {"kind": "point", **common, "direction": [0.6, 0.3, -0.8], "roll": 0.7}
+    common = {"position": [1.2, 0.9, 1.3], "color": [1.0, 0.8, 0.6], "a0": 0.7, "falloff": "inverse-square", "profile": "Fixture.ies"}
+    fixture = {"kind": "point", **common, "direction": [0.6, 0.3, -0.8], "roll": 0.7}
     spot = {"kind": "spot", **common, "direction": [-0.5, 0.0, -1.0], "inner": 0.6, "outer": 0.9, "roll": -0.4}
-    own = {"scene_lights": [{"name": "Bulb", "light": bulb}, {"name": "Spot", "light": spot}], "scene_profiles": {"Bulb.ies": UNEVEN}}
+    own = {
+        "scene_lights": [{"name": "Fixture", "light": fixture}, {"name": "Spot", "light": spot}],
+        "scene_profiles": {"Fixture.ies": UNEVEN},
+    }
     return replace(asset, manifest={**asset.manifest, **own, "direct": {"sun_angle": 0.0, "footprint": 1e-3}})
 
 
@@ -183,6 +188,15 @@ def test_a_profile_of_the_scene_shapes_light(chromium: Any, shaped: Asset, serve
     (found,) = lights_of(chromium, tmp_path, known=shaped)
     np.testing.assert_allclose(pictures(found), expected, atol=1e-3 * expected.max())
     assert "profile" not in chromium("run", script="document.getElementById('status').textContent")
+
+
+def test_a_render_takes_profiles_of_the_scene_alone(shaped: Asset, tmp_path: Path) -> None:
+    shaped.save(tmp_path / "asset")
+    (tmp_path / "shot.blend").write_bytes(b"")
+    renders = CyclesRenders(Asset.open(tmp_path / "asset"), tmp_path / "shot.blend")
+    light = {"kind": "point", "position": [0, 0, 1], "profile": "../Other.ies"}
+    status, said = renders.start(json.dumps({"lights": [light], "samples": 1}).encode())
+    assert status == HTTPStatus.BAD_REQUEST and "expected a profile of the asset's scene (Fixture.ies)" in said["error"]
 
 
 def direct_light(asset: Asset, lights: list[Light]) -> np.ndarray:

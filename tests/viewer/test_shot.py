@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import subprocess
 import sys
@@ -17,7 +18,8 @@ from made_views import view_of_room, with_backs, with_lobes
 from test_page import HEIGHT, STEP, WIDTH, ZOOM, lights_of, shown_as
 
 from srbf.asset import Asset
-from srbf.lights import AreaLight, Light, PointLight
+from srbf.io.image import write_image
+from srbf.lights import AreaLight, EnvironmentLight, Light, PointLight
 from srbf.methods import relight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 from srbf.viewer import page_manifest
@@ -26,6 +28,7 @@ from srbf.viewer.contents import contents_of, read
 pytest.importorskip("embreex")
 
 CLOSE = 2e-3  # of the largest value
+AROUND_APART = 2.0  # bytes: hundreds of shadow maps beside rays
 EXPOSURE = 3.0
 COMMON: dict[str, Any] = {"on": True, "color": "#ffffff", "intensity": 1, "falloff": "inverse-square", "radius": 0.001}
 POINT: dict[str, Any] = {"kind": "point", **COMMON, "position": [0.8, 0.7, 1.1], "a0": 0.5}
@@ -149,6 +152,25 @@ def test_the_script_makes_the_lights_in_blender(chromium: Any, page: Callable[..
 def test_the_page_is_served_the_places_that_bright_surfels_light(asset: Asset, tmp_path: Path) -> None:
     asset.save(tmp_path / "asset")
     assert "asset/view_points.exr" in contents_of([tmp_path / "asset"])
+
+
+@pytest.mark.slow
+def test_an_environment_that_is_dropped_bounces(
+    chromium: Any, serve: Callable[..., str], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """In a room without a lid; the other light goes off."""
+    room = Room.box((3, 2, 2), 0.25, 0.6, lid=False)
+    asset = DeepFramebuffer().encode(view_of_room(tmp_path_factory.mktemp("open") / "capture", room, 400, 100, tested=0))
+    asset.save(tmp_path / "asset")
+    state = {"zoom": ZOOM, "middle": [asset.width / 2, asset.height / 2], "terms": "indirect", "exposure": 1.0, "lights": [POINT]}
+    chromium("open", url=f"{serve(tmp_path / 'asset')}#{quote(json.dumps(state | {'selected': 0}))}", width=WIDTH, height=HEIGHT)
+    image = np.random.default_rng(3).uniform(0, 3, (8, 16, 3)).astype(np.float32)
+    write_image(tmp_path / "around.exr", image, "float")
+    chromium("drop", name="around.exr", bytes=base64.b64encode((tmp_path / "around.exr").read_bytes()).decode())
+    assert [light["on"] for light in chromium.state()["lights"]] == [False, True]
+    apart = np.abs(chromium.texels(asset.width, asset.height, ZOOM) - shown_as(relight(asset, [EnvironmentLight(image)]), 1.0))
+    covered = asset.images["coverage"] > 0.5
+    assert np.quantile(apart[covered], 0.99) <= AROUND_APART and np.ptp(shown_as(relight(asset, [EnvironmentLight(image)]), 1.0)) > 60
 
 
 def test_the_page_is_served_what_lobes_and_backs_need(asset: Asset, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from made_views import view_of_room, with_backs, with_lobes, with_specular_albed
 from srbf import methods
 from srbf.asset import Asset
 from srbf.light_profile import Profile
-from srbf.lights import AreaLight, DirectionalLight, Light, PointLight, SphereLight, SpotLight
+from srbf.lights import AreaLight, DirectionalLight, EnvironmentLight, Light, PointLight, SphereLight, SpotLight
 from srbf.methods.deep_framebuffer import DeepFramebuffer
 
 pytest.importorskip("embreex")
@@ -71,6 +71,11 @@ def url(browser: Any, asset: Asset) -> str:
 
 
 def told(*lights: Light) -> list[dict[str, Any]]:
+    around = [light for light in lights if isinstance(light, EnvironmentLight)]
+    if around:
+        height, width, _ = around[0].image.shape
+        map_of = {"kind": "environment", "color": around[0].color, "width": width, "height": height}
+        return [{**map_of, "pixels": around[0].image.ravel().tolist()}, *told(*(light for light in lights if light not in around))]
     return [{"kind": NAMES[type(light)], **asdict(light), **shape_of(light)} for light in lights]
 
 
@@ -170,6 +175,28 @@ def test_profiles_shape_the_light_on_surfels(browser: Any, asset: Asset, url: st
         np.testing.assert_allclose(shown, expected, atol=CLOSE * expected.max(), err_msg=str(own))
     said = browser.response("three-lightmap", asset=url, lightSets=[told(*lights), told(lights[0])], weights="gpu")
     assert said["computed"] == 3
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: "-".join(run.values()))
+def test_an_environment_reaches_surfels_as_in_numpy(browser: Any, asset: Asset, run: dict[str, str]) -> None:
+    """Through the open top of a room that is turned about x, alone and beside a point light; recolored it is not computed again."""
+    rng = np.random.default_rng(12)
+    image = rng.uniform(0, 2, (40, 70, 3)).astype(np.float32) * np.linspace(2, 0.1, 40, dtype=np.float32)[:, None, None]
+    image[5:9, 10:14] += 60
+    around = EnvironmentLight(image, (0.5, 0.8, 1.0))
+    c, s = np.cos(0.4), np.sin(0.4)
+    matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [0.0, 0.0, 0.0, 1.0]]
+    turned = replace(asset, manifest={**asset.manifest, "asset_from_world": matrix})
+    red = replace(around, color=(1.0, 0.1, 0.1))
+    sets: list[list[Light]] = [[around], [red, LIGHTS["point"]]]
+    url = browser.serve(turned)
+    drawn = browser.lightmaps(asset=url, light_sets=[told(*own) for own in sets], **run)
+    for shown, own in zip(drawn, sets, strict=True):
+        expected = methods.relight(turned, own)
+        np.testing.assert_allclose(shown, expected, atol=RIM * expected.max(), err_msg=str(len(own)))
+        assert np.abs(shown - expected).mean() < CLOSE * expected.max()
+    if run == RUNS[0]:
+        assert browser.response("three-lightmap", asset=url, lightSets=[told(*own) for own in sets], weights="gpu")["computed"] == 2
 
 
 def test_nodes_name_what_the_gpu_does_not_compute_there(browser: Any, url: str) -> None:

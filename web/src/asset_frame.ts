@@ -5,6 +5,7 @@ import { SrbfError } from "./errors";
 import { type AreaLight, type EnvironmentLight, isPunctual, type Light, moved, type NamedLight, type PunctualLight } from "./lights";
 import { lightDomainOf } from "./manifest";
 import type { Matrix4, Triple } from "./matrix";
+import { type Surroundings, surroundings } from "./surroundings";
 
 /** A unit direction from the surface to the light, in the asset's frame, and its irradiance. */
 export type DistantLight = readonly [direction: Triple, color: Triple];
@@ -14,6 +15,8 @@ export interface LightsInAssetFrame {
   readonly distant: Iterable<DistantLight>;
   /** Environments around lights inside a scene, in the asset's world. */
   readonly environments: readonly EnvironmentLight[];
+  /** Environments around a pool of surfels, as distant lights. */
+  readonly surroundings: readonly Surroundings[];
   readonly assetFromWorld: Matrix4;
   /** Point, spot and sphere lights. */
   readonly punctual: readonly PunctualLight[];
@@ -26,7 +29,7 @@ const TAKEN = {
   directions: ["directional", "environment", "point", "spot", "sphere"],
   named: ["named"],
   cloud: ["point", "spot", "sphere", "area", "directional"],
-  pool: ["point", "spot", "sphere", "area", "directional"],
+  pool: ["point", "spot", "sphere", "area", "directional", "environment"],
   surfels: ["point", "spot", "sphere", "area", "directional", "environment", "named"],
 } as const;
 
@@ -48,7 +51,8 @@ export function inAssetFrame(asset: Pick<Asset, "manifest" | "assetFromWorld">, 
   }
   return {
     distant: distant(),
-    environments: domain === "directions" ? [] : lights.filter((light) => light.kind === "environment"),
+    environments: domain === "directions" || domain === "pool" ? [] : lights.filter((light) => light.kind === "environment"),
+    surroundings: domain === "pool" ? lights.filter((light) => light.kind === "environment").map((light) => surroundings(light, assetFromWorld)) : [],
     assetFromWorld,
     punctual: lights.filter(isPunctual).map((light) => moved(light, assetFromWorld)),
     areas: lights.filter((light) => light.kind === "area").map((light) => moved(light, assetFromWorld)),

@@ -6,6 +6,7 @@ import { type AreaLight, type DirectionalLight, type PunctualLight, unit } from 
 import { cross, type Triple } from "./matrix";
 import type { Occluders } from "./occluders";
 import { profileLook } from "./point_light";
+import type { Surroundings } from "./surroundings";
 
 const OFFSET = 1e-4; // of the scene's size: between a surface and the end of a ray to it
 export const SIDE = 4; // points per side of an area light
@@ -55,7 +56,16 @@ export class Cells {
   }
 
   /** Mean irradiance of every patch under a light in white, (n, 3), 0 past the K patches; `far`: how far a distant light's shadow rays go, m. */
-  under(light: PunctualLight | AreaLight | DirectionalLight, occluders: Occluders, far: number, n = this.patches): Float64Array {
+  under(light: PunctualLight | AreaLight | DirectionalLight | Surroundings, occluders: Occluders, far: number, n = this.patches): Float64Array {
+    if (light.kind === "surroundings") {
+      const out = new Float64Array(3 * n);
+      for (const [direction, color] of light.directions) {
+        this.underDistant(direction, occluders, far).forEach((x, i) => {
+          for (let c = 0; c < 3; ++c) out[3 * i + c] += x * color[c];
+        });
+      }
+      return out;
+    }
     if (light.kind === "area") return rgb(this.underArea(light, occluders), n);
     if (light.kind === "directional") return rgb(this.underDistant(light.direction, occluders, far), n);
     if (!light.profile || light.profile.gray) return rgb(this.underPoint(light, occluders), n);

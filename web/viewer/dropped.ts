@@ -18,7 +18,7 @@ export async function droppedFrames(file: File, state: State, usual: "linear" | 
 
 /** Add an environment map; the first one turns the other lights off. @throws SrbfError where the asset takes none, there are too many lights, or it cannot be read. */
 export async function droppedEnvironment(file: File, state: State, environments: Map<string, Environment>, takes: boolean): Promise<void> {
-  if (!takes) throw new SrbfError("expected an asset of distant lights for an environment, found one of other lights");
+  if (!takes) throw new SrbfError("expected an asset of distant lights or a deep framebuffer for an environment, found one of other lights");
   environments.set(file.name, await readEnvironment(file));
   const { lights } = state;
   const known = lights.findIndex((light) => light.kind === "environment" && light.file === file.name);

@@ -103,8 +103,8 @@ function projection(gather: Gather): Tables["projectedWeights"] {
   const white = (light: Placed): Float64Array => {
     occluders ??= new Occluders(corners);
     const irradiance = cells.under(light, occluders, FAR, cells.count);
-    const distant = light.kind === "directional";
-    const near = gather.near?.sources(irradiance, { place: distant ? light.direction : light.position, distant });
+    const toward = "position" in light ? { place: light.position, distant: false } : { place: light.kind === "directional" ? light.direction : ([0, 0, 1] as Triple), distant: true };
+    const near = gather.near?.sources(irradiance, toward);
     return gathered(gather, irradiance, near && gather.near && { far: without(near, irradiance), sent: gather.near.irradiance(near, occluders) });
   };
   return (lights) => {

@@ -100,7 +100,7 @@ export class GatherWeights {
     renderer.clear(true, false, false);
     irradiance.forEach(({ texture }, i) => {
       const [look] = shining[i];
-      this.add(renderer, former.texture, texture, look.color.map((x) => x * shining[i].length), next);
+      this.add(renderer, former.texture, texture, look.color.map((x) => (look.factor ? x : x * shining[i].length)), next);
       [former, next] = [next, former];
     });
   }
@@ -121,7 +121,7 @@ export class GatherWeights {
   private white(renderer: WebGLRenderer, looks: readonly ShadowedLook[]): WebGLRenderTarget {
     const target = this.unused.pop() ?? floatTarget(...this.size);
     const share = 1 / looks.length;
-    const direct = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: [share, share, share] as Triple })));
+    const direct = this.direct.draw(renderer, looks.map((look) => ({ ...look, color: look.factor ?? ([share, share, share] as Triple) })));
     const near = this.near?.draw(renderer, direct, looks);
     let [light, next] = this.radiosity;
     for (let term = 0; term < this.gather.terms; ++term) {

@@ -2,12 +2,14 @@
 import { type DataTexture, type IUniform, Matrix4, type Texture, type WebGLRenderer, type WebGLRenderTarget } from "three";
 import { versine } from "../point_light";
 import cellIrradiance from "../shaders/surfel_irradiance.glsl";
-import type { PackedCells, Surfels } from "../surfels";
+import type { Look, PackedCells, Surfels } from "../surfels";
 import { type ShadowedLook, shadowUniforms } from "./engine_shadows";
 import { floatTarget, floatTexture } from "./float_textures";
 import { FullscreenPass } from "./fullscreen";
 import { OccluderMaps } from "./occluder_maps";
 import { ProfileTextures } from "./profile_textures";
+
+const SOFT = 256; // texels per side of a face, where an environment shines from hundreds of directions
 
 /** A pass of surfel_irradiance.glsl. */
 export function irradiancePass(uniforms: Record<string, IUniform>, defines: Record<string, number>): FullscreenPass {
@@ -20,14 +22,15 @@ export class SurfelIrradiance {
   private readonly lift: number;
   private readonly sums: [WebGLRenderTarget, WebGLRenderTarget];
   readonly maps: OccluderMaps;
+  private soft?: OccluderMaps;
   private readonly passes = new Map<string, FullscreenPass>();
   private readonly profiles = new ProfileTextures();
 
   /** `shadowSize`: texels per side of a face of the shadow maps; `defines` of surfel_irradiance.glsl. */
   constructor(
-    surfels: Surfels,
+    private readonly surfels: Surfels,
     private readonly cells: PackedCells,
-    shadowSize: number,
+    private readonly shadowSize: number,
     private readonly defines: Record<string, number> = {},
   ) {
     this.lift = surfels.cells.lift;
@@ -51,6 +54,7 @@ export class SurfelIrradiance {
   }
 
   dispose(): void {
+    this.soft?.dispose();
     for (const one of [this.places, this.normals, ...this.sums, this.maps, ...this.passes.values(), this.profiles]) one.dispose();
   }
 
@@ -63,7 +67,7 @@ export class SurfelIrradiance {
       pass = irradiancePass(this.uniforms(), defines);
       this.passes.set(key, pass);
     }
-    const own = shadow ? {} : this.maps.draw(renderer, look.place, look.distant);
+    const own = shadow ? {} : this.mapsOf(look).draw(renderer, look.place, look.distant);
     const values: Record<string, unknown> = {
       former,
       light: look.place,
@@ -81,6 +85,12 @@ export class SurfelIrradiance {
     };
     for (const [name, value] of Object.entries(values)) pass.uniforms[name].value = value;
     pass.draw(renderer, next);
+  }
+
+  private mapsOf({ factor }: Look): OccluderMaps {
+    if (!factor || this.shadowSize <= SOFT) return this.maps;
+    this.soft ??= new OccluderMaps(this.surfels.corners, this.cells.middle, this.cells.reach, SOFT);
+    return this.soft;
   }
 
   private uniforms(): Record<string, IUniform> {
