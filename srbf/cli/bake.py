@@ -68,6 +68,7 @@ def bake(
     size: flag.SizeOf = None,
     texels_per_meter: flag.TexelsPerMeter = None,
     samples: flag.Samples = None,
+    share: flag.ShareOf = None,
     time_limit: flag.TimeLimit = None,
     holdout_samples: flag.HoldoutSamples = 64,
     denoise: flag.Denoise = False,
@@ -163,6 +164,7 @@ def bake(
                 denoise=denoise,
                 scene=scene_name,
                 gloss=gloss,
+                step=1 if share is None else share,
             )
             if sun_angle == "auto" and light_set is not None:
                 raise typer.BadParameter("expected directional lights with --sun-angle auto, found --light-set; leave one of them out")

@@ -19,6 +19,7 @@ from srbf.cli.values import (
     duration,
     size,
 )
+from srbf.receiver_share import parse_share
 
 SCENE, LIGHTS, QUALITY, FARM, SAFETY = "Scene", "Lights", "Quality", "Farm", "Safety"
 
@@ -275,6 +276,17 @@ Samples = Annotated[
         metavar="COUNT",
         parser=AUTO_OR_COUNT,
         help="Samples per texel of each fitted light; auto: until the error stops improving. Default 2, with --time-limit no limit.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+ShareOf = Annotated[
+    int | None,
+    typer.Option(
+        "--share",
+        metavar="FRACTION",
+        parser=Parsed(parse_share),
+        help="1/4, 1/9 or 1/16 of the texels for each fitted light, others for the next: as much from more directions. Default whole.",
         show_default=False,
         rich_help_panel=QUALITY,
     ),
