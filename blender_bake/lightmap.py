@@ -55,6 +55,7 @@ class LightmapReceiver:
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
+        self._spread = True  # of light: over a texel's footprint
         self._small: dict[tuple[int, int], bpy.types.Image] = {}  # images of shares, by size
         self._whole_uvs: dict[str, np.ndarray] = {}  # (N, 2) by object, once a share is rendered
         self._owner = np.zeros(
@@ -137,11 +138,13 @@ class LightmapReceiver:
             self._move_uvs(obj, share)
         self._image.user_remap(self._small[size])
         self._image, (self._width, self._height) = self._small[size], size
+        self._spread = not share.at_centers
         try:
             yield
         finally:
             self._image.user_remap(whole[0])
             self._image, self._width, self._height = whole
+            self._spread = True
             for obj in self._objects:
                 obj.data.uv_layers.active = obj.data.uv_layers[self._layers[obj.name]]
 
@@ -207,7 +210,7 @@ class LightmapReceiver:
         return views
 
     def _light(self, kind: str, samples: int, seed: int, parts: set[str]) -> np.ndarray:
-        return self._bake(kind, self._objects, samples, seed, spread=True, pass_filter=parts)[:, :, :3]
+        return self._bake(kind, self._objects, samples, seed, spread=self._spread, pass_filter=parts)[:, :, :3]
 
     def _bake(
         self, kind: str, objects: list[bpy.types.Object], samples: int, seed: int, *, spread: bool = False, **options: Any

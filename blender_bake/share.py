@@ -13,17 +13,21 @@ UV_LAYER = "srbf share"
 
 @dataclass(frozen=True)
 class Share:
-    """Every `step`-th texel across and down, from column `x` and row `y` on, row 0 at the top."""
+    """Every `step`-th texel across and down, from column `x` and row `y` on, row 0 at the top.
+
+    at_centers: a lightmap's first sample is at the center of its texel, not spread over a footprint that is `step` texels' wide.
+    """
 
     step: int
     x: int
     y: int
+    at_centers: bool = False
 
     @staticmethod
     def of(region: dict[str, Any]) -> Share:
         """From the host's JSON."""
         x, y = region["offset"]
-        return Share(region["step"], x, y)
+        return Share(region["step"], x, y, region.get("at_centers", False))
 
     def of_image(self, image: np.ndarray) -> np.ndarray:
         """Its texels of an image (H, W, C)."""

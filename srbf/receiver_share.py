@@ -25,6 +25,8 @@ class Share:
         2 to 8: 1 / step² of the texels.
     offset
         Column and row of the first one, each from 0 to step - 1.
+    at_centers
+        Of a request to the worker: the first sample of a lightmap's texel is at its center. Not kept in captures.
 
     Examples
     --------
@@ -39,6 +41,7 @@ class Share:
 
     step: int
     offset: tuple[int, int]
+    at_centers: bool = False
 
     @staticmethod
     def of_manifest(entry: Mapping[str, Any], where: str) -> Share:
@@ -50,7 +53,7 @@ class Share:
 
     def json(self) -> dict[str, Any]:
         """As in capture.json, and in a request to the worker."""
-        return {"step": self.step, "offset": list(self.offset)}
+        return {"step": self.step, "offset": list(self.offset), **({"at_centers": True} if self.at_centers else {})}
 
     @property
     def indices(self) -> Indexed:
@@ -62,7 +65,7 @@ class Share:
         return -(-(width - self.offset[0]) // self.step), -(-(height - self.offset[1]) // self.step)
 
 
-def parse_share(text: str) -> int:
+def share_step(text: str) -> int:
     """The step of `whole`, or of a fraction 1/n² as 1/4, 1/9 or 1/16; InputError for others."""
     if text in ("whole", "1"):
         return 1
@@ -74,7 +77,7 @@ def parse_share(text: str) -> int:
 
 
 def share_word(step: int) -> str:
-    """What `parse_share` makes it of."""
+    """What `share_step` makes it of."""
     return "whole" if step == 1 else f"1/{step**2}"
 
 

@@ -16,7 +16,7 @@ from srbf.evaluation.errors_by_role import evaluate
 from srbf.io import files
 from srbf.io.image import read_image, write_image
 from srbf.methods.eigen_map import EigenMap
-from srbf.receiver_share import Share, parse_share, share_word, shares_in_turn
+from srbf.receiver_share import Share, share_step, share_word, shares_in_turn
 from srbf.sphere import point_set
 from srbf.texel_interpolation import interpolation
 
@@ -48,11 +48,11 @@ def test_neighbors_in_direction_have_other_shares(count: int, step: int) -> None
 
 
 def test_words_of_shares() -> None:
-    assert [parse_share(word) for word in ("whole", "1", "1/4", "1/9", "1/64")] == [1, 1, 2, 3, 8]
+    assert [share_step(word) for word in ("whole", "1", "1/4", "1/9", "1/64")] == [1, 1, 2, 3, 8]
     assert [share_word(step) for step in (1, 2, 8)] == ["whole", "1/4", "1/64"]
     for word in ("1/3", "1/1", "1/81", "quarter", "0.25", "-1/4", ""):
         with pytest.raises(InputError, match="expected a share of whole, 1/4"):
-            parse_share(word)
+            share_step(word)
 
 
 def whole_images(folder: Path) -> Capture:

@@ -344,7 +344,7 @@ class _Passes:
             light for light in self._order if self._accumulation.samples(light) < self._goal_of(light) and light.index not in self._failed
         ]
         level = min((self._accumulation.passes(light) for light in due), default=0)
-        first = 1 if self._auto else FIRST_SAMPLES
+        first = 1 if self._auto or self._settings.step > 1 else FIRST_SAMPLES
         return [self._task(light, level, first) for light in due if self._accumulation.passes(light) == level]
 
     def _task(self, light: PlannedLight, level: int, first: int) -> Task:

@@ -37,6 +37,7 @@ SHORTER = {
     "srbf bake --light-set surfels *": f"--size 24 {TESTED} --surfels-per-m2 4",
     "srbf bake --light-set gather *": f"--size 24 {TESTED}",
     "srbf bake --light-set cubemap:32 *": "--light-set cubemap:8 --size 24 --validation 4 --holdout 2",
+    "srbf bake --lights auto *": f"--size 24 {TESTED} --error 90%",
     "srbf bake *": FEW,
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",
