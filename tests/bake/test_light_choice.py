@@ -100,7 +100,7 @@ def test_a_probe_of_a_shadow_predicts_the_error_of_a_bake(blend, tmp_path: Path)
     assert chosen.run(Reporter())
     capture = Capture.open(tmp_path / "capture")
     assert len(capture.indices("train")) == chosen.settings.lights
-    again = with_chosen_lights(job, Goal(error=0.02), False, said.append)  # what is there is not chosen anew
+    again = with_chosen_lights(job, Goal(error=0.02), False, said.append)  # what is there keeps its lights
     assert (again.settings.lights, again.settings.step) == (chosen.settings.lights, chosen.settings.step)
     assert again.run(Reporter()) is False
     assert np.isfinite(capture.image(0)).all()

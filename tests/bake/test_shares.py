@@ -19,7 +19,7 @@ from srbf.io.image import read_image
 from srbf.receiver_images import Transport
 
 FAKE = Path(__file__).resolve().parents[2] / "benchmarks" / "fake_blender.py"
-ALIKE = 0.05  # of the brightest, how far neighbors may differ: not at edges of shadows, where a share has a wider footprint
+FLAT = 0.05  # of the brightest, how far neighbors may differ: not at edges of shadows, where a share has a wider footprint
 NOISE = 0.1  # relative RMSE of a picture of 64 samples and of another footprint, edges of shadows left out
 
 
@@ -97,7 +97,7 @@ def test_a_stopped_bake_goes_on_to_the_same_bits(tmp_path: Path, transport: Tran
     ],
 )
 def test_a_share_is_those_texels_of_the_whole_image(bake, scene: str, receiver: str, size: tuple[int, int]) -> None:
-    """Where neighbors are alike, for edges of shadows are seen through a wider footprint; and no other texels are as close."""
+    """Where neighbors have about the same light, for edges of shadows are seen through a wider footprint; and no other texels are as close."""
     settings = {"width": size[0], "height": size[1], "lights": 6, "samples": 64, "holdout": 0}
     whole, parted = (bake(scene, receiver, f"step{step}", step=step, **settings).capture for step in (1, 2))
     errors, by_place = [], []
@@ -108,7 +108,7 @@ def test_a_share_is_those_texels_of_the_whole_image(bake, scene: str, receiver: 
         rolled = [np.roll(expected, by, axis) for axis in (0, 1) for by in (-1, 1)]
         change = np.max([np.abs(one - expected).max(axis=2) for one in rolled], axis=0)
         covered = (whole.coverage() == 1)[light.share.indices]
-        even = covered & (change < ALIKE * expected.max())[light.share.indices]
+        even = covered & (change < FLAT * expected.max())[light.share.indices]
         power = (expected**2).mean()
         errors.append(float(((part - expected[light.share.indices])[even] ** 2).mean() / power))
         by_place.append([float(((part - one[light.share.indices])[covered] ** 2).mean()) for one in (expected, *rolled)])

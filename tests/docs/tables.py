@@ -26,7 +26,10 @@ STAND_INS = {
 }
 
 # The same in one script's calls alone.
-STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one whose direct light is apart
+STAND_INS_OF = {
+    "benchmarks/direct.py": {"CAPTURE": "indirect"},  # it wants one whose direct light is apart
+    "complete": {"CAPTURE": "quarter"},  # one whose lights have a share of the texels
+}
 
 # The tables below are by the words of a command: all of them, in any order, with ` *` at the end also among others.
 
