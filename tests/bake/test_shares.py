@@ -97,7 +97,7 @@ def test_a_stopped_bake_goes_on_to_the_same_bits(tmp_path: Path, transport: Tran
     ],
 )
 def test_a_share_is_those_texels_of_the_whole_image(bake, scene: str, receiver: str, size: tuple[int, int]) -> None:
-    """Where neighbors have about the same light, for edges of shadows are seen through a wider footprint; and no other texels are as close."""
+    """Where neighbors have about the same light: edges of shadows have a wider footprint. No other texels are as close."""
     settings = {"width": size[0], "height": size[1], "lights": 6, "samples": 64, "holdout": 0}
     whole, parted = (bake(scene, receiver, f"step{step}", step=step, **settings).capture for step in (1, 2))
     errors, by_place = [], []
