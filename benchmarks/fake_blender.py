@@ -73,6 +73,9 @@ class FakeBlender:
         whole = direct + 0.02 * noise + 0.1
         if fault == "nan":
             whole[1, 1] = np.nan
+        if region := request["region"]:
+            (x, y), step = region["offset"], region["step"]
+            whole, direct = whole[y::step, x::step], direct[y::step, x::step]
         images = {"response": whole[1:] if fault == "small" else whole, "direct": direct}
         files = {name: self._hand_over(f"light_{light['index']}_{name}", images[name]) for name in request["channels"]}
         if fault == "short":

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import bpy
@@ -15,6 +17,7 @@ from blender_bake.ipc import Events, WorkerError
 from blender_bake.receiver_objects import prepare, select
 from blender_bake.request import RenderRequest
 from blender_bake.seam_edges import seam_edges
+from blender_bake.share import UV_LAYER, Share
 from blender_bake.translucency import Switch, switched
 from blender_bake.viewers import Viewers
 
@@ -52,6 +55,9 @@ class LightmapReceiver:
         self._layers = dict(zip([obj.name for obj in self._objects], layers, strict=True))
         for obj, layer in zip(self._objects, layers, strict=True):
             obj.data.uv_layers.active = obj.data.uv_layers[layer]  # the one that a bake goes by
+        self._spread = True  # of light: over a texel's footprint
+        self._small: dict[tuple[int, int], bpy.types.Image] = {}  # images of shares, by size
+        self._whole_uvs: dict[str, np.ndarray] = {}  # (N, 2) by object, once a share is rendered
         self._owner = np.zeros(
             (self._height, self._width), np.int32
         )  # which object a covered texel belongs to: the last one that covers it
@@ -118,6 +124,47 @@ class LightmapReceiver:
         seams = np.concatenate(edges)
         return seams[None] if len(seams) else None
 
+    @contextmanager
+    def part(self, share: Share) -> Iterator[None]:
+        """Inside, bakes go to an image of every n-th texel, by UVs moved so that its texel centers are theirs; see `Share`.
+
+        Samples are spread over a footprint that is as many texels wide as of a whole image, so n times as wide on the surface.
+        """
+        whole = self._image, self._width, self._height
+        size = share.size(self._width, self._height)
+        if size not in self._small:
+            self._small[size] = bpy.data.images.new("srbf share", *size, alpha=True, float_buffer=True)
+        for obj in self._objects:
+            self._move_uvs(obj, share)
+        self._image.user_remap(self._small[size])
+        self._image, (self._width, self._height) = self._small[size], size
+        self._spread = not share.at_centers
+        try:
+            yield
+        finally:
+            self._image.user_remap(whole[0])
+            self._image, self._width, self._height = whole
+            self._spread = True
+            for obj in self._objects:
+                obj.data.uv_layers.active = obj.data.uv_layers[self._layers[obj.name]]
+
+    def _move_uvs(self, obj: bpy.types.Object, share: Share) -> None:
+        """Make a layer of the object's moved UVs the active one, which a bake goes by; textures keep to theirs."""
+        layers = obj.data.uv_layers
+        uv = self._whole_uvs.get(obj.name)
+        if uv is None:
+            flat = np.empty(2 * len(obj.data.loops), np.float32)
+            layers[self._layers[obj.name]].uv.foreach_get("vector", flat)
+            uv = self._whole_uvs[obj.name] = flat.reshape(-1, 2).astype(np.float64)
+            if layers.new(name=UV_LAYER, do_init=False) is None:
+                raise WorkerError(
+                    f"expected at most 7 UV layers of {obj.name!r} for a share of its texels, found {len(layers)}; "
+                    "remove one that nothing uses, or bake without `share`"
+                )
+        moved = layers[UV_LAYER]
+        moved.uv.foreach_set("vector", share.coordinates(uv, self._width, self._height).ravel())
+        layers.active = moved
+
     def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
         """`response`, `direct` and `indirect` of the same seed: one is exactly part of the other. See `RenderRequest`."""
         images = {}
@@ -163,7 +210,7 @@ class LightmapReceiver:
         return views
 
     def _light(self, kind: str, samples: int, seed: int, parts: set[str]) -> np.ndarray:
-        return self._bake(kind, self._objects, samples, seed, spread=True, pass_filter=parts)[:, :, :3]
+        return self._bake(kind, self._objects, samples, seed, spread=self._spread, pass_filter=parts)[:, :, :3]
 
     def _bake(
         self, kind: str, objects: list[bpy.types.Object], samples: int, seed: int, *, spread: bool = False, **options: Any

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from blender_bake.exr import read_passes
 from blender_bake.ipc import Events, WorkerError
 from blender_bake.reflected import lets_light_through, reflection_alone
 from blender_bake.request import RenderRequest
+from blender_bake.share import Share
 from blender_bake.translucency import Switch, switched
 
 GEOMETRY_FILTER = 0.01  # pixels: one sample so close to the center that its position reprojects onto it
@@ -47,6 +49,7 @@ class ViewReceiver:
         self._last: dict[str, np.ndarray] = {}
         self._centers: dict[str, np.ndarray] | None = None  # position, normal and hit
         self._denoiser: Denoiser | None = None
+        self._share: Share | None = None
         self._scratch = Path(job["scratch"])
         soundness.warn_of_occluders(scene, set(), events)
         soundness.warn_of_hidden(scene, events)
@@ -149,6 +152,35 @@ class ViewReceiver:
             self._centers = {"position": center["Position"] * hit, "normal": normal * hit, "hit": hit}
         return self._centers
 
+    @contextmanager
+    def part(self, share: Share) -> Iterator[None]:
+        """Inside, renders have every n-th pixel each way, through a camera moved so that its pixel centers are theirs.
+
+        The filter is as wide on the film as of a whole image. WorkerError of panoramas, which no shift of the film moves, and of a size
+        that is no multiple of n, whose frame has another shape.
+        """
+        data, render, cycles = self._camera.data, self._scene.render, self._scene.cycles
+        width, height = render.resolution_x, render.resolution_y
+        if data.type not in {"PERSP", "ORTHO"}:
+            raise WorkerError(f"expected a perspective or orthographic camera for a share of a view, found {data.type}; leave `share` out")
+        if width % share.step or height % share.step:
+            raise WorkerError(f"expected a size that is a multiple of {share.step} for a share of a view, found {width}x{height}")
+        self._materials()  # measured of the whole image
+        before = data.shift_x, data.shift_y, cycles.filter_width
+        side = width if _fits_width(data, width, height) else height  # pixels in a shift of 1
+        middle = (share.step - 1) / 2
+        data.shift_x += (share.x - middle) / side
+        data.shift_y -= (share.y - middle) / side
+        cycles.filter_width = before[2] / share.step
+        render.resolution_x, render.resolution_y = width // share.step, height // share.step
+        self._share = share
+        try:
+            yield
+        finally:
+            data.shift_x, data.shift_y, cycles.filter_width = before
+            render.resolution_x, render.resolution_y = width, height
+            self._share = None
+
     def render(self, request: RenderRequest, switch: Switch | None) -> dict[str, np.ndarray]:
         """`response`, `direct`, `indirect` and `denoised`, see `RenderRequest`: of one render where nothing is translucent, else of two."""
         samples, seed = request.samples, request.seed
@@ -205,7 +237,7 @@ class ViewReceiver:
         Where a pixel is covered in part, that color is multiplied back and the color of many samples divided by, so that the mean over
         passes is right; elsewhere the ratio is kept, which has less noise on textures.
         """
-        coverage, diffuse = self._measured_coverage(), self._materials()["Diffuse Color"][:, :, :3]
+        coverage, diffuse = self._own(self._measured_coverage()), self._own(self._materials()["Diffuse Color"][:, :, :3])
         ratio = light[:, :, :3]
         partial = (coverage < 1) & (diffuse > 0)
         expected = ratio * passes["Diffuse Color"][:, :, :3] / np.where(partial, diffuse, 1)
@@ -227,8 +259,12 @@ class ViewReceiver:
             lobes.remove(self._layer)
         return self._measured_passes
 
+    def _own(self, whole: np.ndarray) -> np.ndarray:
+        """The pixels of `whole` that are rendered now."""
+        return whole if self._share is None else self._share.of_image(whole)
+
     def _over_coverage(self, image: np.ndarray) -> np.ndarray:
-        coverage = self._measured_coverage()
+        coverage = self._own(self._measured_coverage())
         seen = coverage > 0
         return np.where(seen, image / np.where(seen, coverage, 1), 0)
 
@@ -272,6 +308,11 @@ class ViewReceiver:
             events.warn("nothing in view is diffuse: irradiance is taken with every surface white Lambert instead")
         elif dark.any():
             events.warn(f"{int(dark.sum())} pixels show nothing diffuse (metal, glass, black): they have no irradiance and hold 0")
+
+
+def _fits_width(data: bpy.types.Camera, width: int, height: int) -> bool:
+    """Whether the camera's frame is as wide as its sensor, not as high."""
+    return data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and width >= height)
 
 
 def find_camera(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object:

@@ -161,7 +161,7 @@ class Capture(LightImages):
             return self
         if not self.has_direct_of(roles):
             raise ManifestError(f"expected a direct image of every light in {self.folder}, found lights without; bake it again")
-        return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights)
+        return CombinedCapture(self.folder, {**self.manifest, "transport": "combined"}, self.lights, operators=self.operators)
 
     def indices(self, role: Role) -> list[int]:
         """Indices of the lights of a role, in order.
@@ -277,7 +277,7 @@ class Capture(LightImages):
         responses = self.sample(range(len(self.lights)), whole)
         manifest, lights = self.manifest, self.lights
         if texels is not None:
-            lights = tuple(replace(light, direct=None) for light in lights)  # whole images, which no longer fit
+            lights = tuple(replace(light, direct=None, share=None) for light in lights)  # whole images, which no longer fit
             of_whole_images = {*self.channels, "channels", "seams"} - {"coverage"}
             manifest = {key: value for key, value in manifest.items() if key not in of_whole_images}
             manifest |= {"width": len(texels), "height": 1}
@@ -361,4 +361,4 @@ class CombinedCapture(Capture):
     def _stored(self, index: int, rows: Rows = None) -> Float32[ndarray, "n 3"]:
         direct = self.lights[index].direct
         assert direct is not None
-        return super()._stored(index, rows).astype(np.float32) + self._read_rows(direct, rows)
+        return super()._stored(index, rows).astype(np.float32) + self._rows_of(index, direct, rows)

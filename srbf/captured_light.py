@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from srbf.errors import InputError, ManifestError
+from srbf.receiver_share import Share
 
 LightKind = Literal["directional", "point", "named", "patch", "surfel", "pool"]
 Role = Literal["train", "validation", "holdout"]
@@ -28,7 +29,8 @@ class CapturedLight:
     the scene has it set: its `objects` shine. A patch is a part of the surfaces that reflects irradiance 1, by its number `patch`.
     `harmonics`, of a capture toward every viewer: the images of the radiance's spherical harmonics.
     `direct`, of an indirect capture, is the image of the direct diffuse light that `file` lacks. `region`: which receivers `file` holds,
-    as the file of a mask or as flat indices (row by row from the top); None: all of them. `column`: the texel of a cubemap that it is,
+    as the file of a mask or as flat indices (row by row from the top); None: all of them. `share`: its images are smaller, and have
+    these texels alone; the others are interpolated. `column`: the texel of a cubemap that it is,
     whose image is made on request, and `file` its name alone. `noise`: about the relative RMSE that few samples leave in the
     image, where that was measured.
     """
@@ -45,6 +47,7 @@ class CapturedLight:
     harmonics: tuple[str, ...] = ()
     column: int | None = None
     noise: float | None = None
+    share: Share | None = None
 
     @staticmethod
     def of_manifest(entry: Mapping[str, Any], where: str) -> CapturedLight:
@@ -58,6 +61,9 @@ class CapturedLight:
             place = place / length
         x, y, z = place.tolist()
         region = entry.get("region")
+        share = Share.of_manifest(entry["share"], where) if "share" in entry else None
+        if share is not None and (region is not None or "harmonics" in entry):
+            raise ManifestError(f"expected {where} with a share of the texels, a region or harmonics, found two of them; keep one")
         return CapturedLight(
             (x, y, z),
             entry["role"],
@@ -70,6 +76,7 @@ class CapturedLight:
             entry.get("patch"),
             tuple(entry.get("harmonics", ())),
             noise=entry.get("noise"),
+            share=share,
         )
 
     @property

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -12,10 +14,12 @@ from numpy import ndarray
 from srbf.arrays import Bool, Float, Float32, Int
 from srbf.captured_light import CapturedLight
 from srbf.compute.threads import cores, each
-from srbf.errors import InputError
-from srbf.io.image import holds_half
+from srbf.errors import ImageError, InputError
+from srbf.io.image import holds_half, read_image, require_finite
 from srbf.io.image_blocks import blocks
 from srbf.receiver_images import ReceiverImages, Rows
+from srbf.receiver_share import Share
+from srbf.texel_interpolation import interpolation
 
 BLOCK_BYTES = 64 << 20  # float32 images of one block: small beside the maps, large enough for a matrix product
 STREAM_BYTES = 192 << 20  # images of one block of the stream, as stored: sums over lights are read and written once a block
@@ -23,14 +27,36 @@ STRIP = 16  # rows: what the EXRs compress at a time
 OnImage = Callable[[int, ndarray], None]  # (position within the lights requested, image (P, 3) as stored)
 
 
+class Interpolations:
+    """Maps from shares of a capture's texels to all of them, made on first use and kept for captures that are made of it."""
+
+    def __init__(self) -> None:
+        self._made: dict[Share, Any] = {}
+        self._lock = threading.Lock()
+
+    def of(self, images: LightImages, share: Share) -> Any:
+        """(P, K) sparse, see `interpolation`."""
+        with self._lock:
+            if share not in self._made:
+                known = np.zeros((images.height, images.width), bool)
+                known[share.indices] = True
+                self._made[share] = interpolation(known, images.coverage(), images.channel("position"), images.channel("normal"))
+            return self._made[share]
+
+    def __reduce__(self) -> tuple[type[Interpolations], tuple[()]]:
+        return Interpolations, ()
+
+
 @dataclass(frozen=True)
 class LightImages(ReceiverImages):
     """What a capture holds of each light: the columns of T.
 
-    `lights`: direction or position, role and file of each.
+    `lights`: direction or position, role and file of each. Where a light has a `share` of the texels, the others are interpolated
+    whenever its image is read.
     """
 
     lights: tuple[CapturedLight, ...]
+    operators: Interpolations = field(default_factory=Interpolations, kw_only=True, compare=False, repr=False)
 
     def harmonics(self, index: int) -> Float32[ndarray, "K H W 3"]:
         """Coefficients of the radiance toward any viewer under one light, see `srbf.basis.exitant_harmonics`.
@@ -80,7 +106,10 @@ class LightImages(ReceiverImages):
         (6, 8, 3)
         """
         self.require_whole([index])
-        return self._read(self.lights[index].file, 3)
+        light = self.lights[index]
+        if light.share is None:
+            return self._read(light.file, 3)
+        return self._interpolated(light.share, light.file).reshape(self.height, self.width, 3)
 
     def partial_image(self, index: int) -> tuple[Float32[ndarray, "H W 3"], Bool[ndarray, "H W"]]:
         """The responses to one light, and the region that its image holds. Values outside the region are not looked at: they may be NaN.
@@ -286,11 +315,30 @@ class LightImages(ReceiverImages):
         return blocks(read, len(indices), self.width * height, size, stored, buffers)
 
     def _stored_type(self, indices: Sequence[int]) -> np.dtype:
-        """Of `_stored` of these lights: float16 where all are."""
+        """Of `_stored` of these lights: float16 where all are, and whole."""
+        if any(self.lights[index].share is not None for index in indices):
+            return np.dtype(np.float32)
         with ThreadPoolExecutor(cores()) as readers:
             half = all(readers.map(lambda index: holds_half(self.folder / self.lights[index].file), indices))
         return np.dtype(np.float16 if half else np.float32)
 
     def _stored(self, index: int, rows: Rows = None) -> Float[ndarray, "n 3"]:
         """An image of T as stored, float16 or float32, of the right size and finite; all texels, or those of some rows."""
-        return self._read_rows(self.lights[index].file, rows)
+        return self._rows_of(index, self.lights[index].file, rows)
+
+    def _rows_of(self, index: int, file: str, rows: Rows) -> Float[ndarray, "n 3"]:
+        """The image `file` of a light, as stored where it is whole."""
+        share = self.lights[index].share
+        if share is None:
+            return self._read_rows(file, rows)
+        whole = self._interpolated(share, file)
+        return whole if rows is None else np.concatenate([whole[begin * self.width : end * self.width] for begin, end in rows])
+
+    def _interpolated(self, share: Share, file: str) -> Float32[ndarray, "P 3"]:
+        path = self.folder / file
+        image = read_image(path, 3)
+        width, height = share.size(self.width, self.height)
+        if image.shape[:2] != (height, width):
+            raise ImageError(f"expected {width}x{height} texels of a share in {path}, found {image.shape[1]}x{image.shape[0]}")
+        require_finite(image, path)
+        return self.operators.of(self, share) @ image.reshape(-1, 3)

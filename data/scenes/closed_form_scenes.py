@@ -160,6 +160,13 @@ def layers():
     bpy.context.scene.collection.objects.link(empty)
 
 
+def full():
+    """The square with eight UV layers, as many as a mesh can have."""
+    square = quad("Plane")
+    for i in range(7):
+        add_uv(square.data, f"other {i}", UNIT_UV)
+
+
 def scattered():
     """The square with a geometry-nodes modifier that puts an instance of a black plate 0.3 m above its middle."""
     obj = quad("Plane")
@@ -327,6 +334,7 @@ SCENES = {
     "emissive": emissive,
     "metal": metal,
     "layers": layers,
+    "full": full,
     "hostile": hostile,
     "subdivided": subdivided,
     "scattered": scattered,

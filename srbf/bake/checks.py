@@ -70,12 +70,12 @@ class FirstLights:
             )
 
 
-def bytes_needed(settings: BakeSettings, lights: int, summed: int) -> int:
-    """Bytes of an uncompressed capture of `lights` lights, `summed` of which keep their running sums."""
+def bytes_needed(settings: BakeSettings, lights: float, summed: float) -> int:
+    """Bytes of an uncompressed capture of `lights` lights, `summed` of which keep their running sums; one with a share counts as such."""
     texels = settings.width * settings.height
     images = (2 if settings.transport == "indirect" else 1) + (0 if settings.gloss is None else (settings.gloss + 1) ** 2)
     sums = images + 1  # validation lights have their squares
-    return texels * (lights * images * 3 * HALF_BYTES + summed * sums * 3 * FLOAT_BYTES + GEOMETRY_CHANNELS * FLOAT_BYTES)
+    return round(texels * (lights * images * 3 * HALF_BYTES + summed * sums * 3 * FLOAT_BYTES + GEOMETRY_CHANNELS * FLOAT_BYTES))
 
 
 def check_disk(folder: Path, needed: int) -> None:

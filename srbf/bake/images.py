@@ -20,6 +20,7 @@ from srbf.encode.dilation import dilate, nearest_covered
 from srbf.errors import BakeError, ImageError, ManifestError
 from srbf.io import files
 from srbf.io.image import HALF_MAX, read_image, write_image
+from srbf.receiver_share import Share
 
 MASKS = ("hit", "valid")  # of the receiver, see `srbf.channels.Channel`; coverage, the third, is a channel itself
 SEAMS = "seams"  # (1, E, 8), an image that is no channel: it has no texels
@@ -44,8 +45,8 @@ class CaptureImages:
         self._say = say
         self._received: dict[str, ndarray] = {}
         self._residual: Float32[ndarray, "H W 3"] | None = None
-        self._nearest: Int[ndarray, "H W"] | None = None
-        self._size: tuple[int, ...] = (0, 0)
+        self._valid: ndarray = np.zeros((0, 0), np.float32)  # (H, W), above 0 where light can be read off the receiver
+        self._nearest_of: dict[Share | None, Int[ndarray, "H W"] | None] = {}  # of a share's texels, or of all
         self._normals: Float32[ndarray, "H W 3"] | None = None
         self.prepared: dict[str, Any] | None = None
         path = folder / ACCUMULATION / PREPARED
@@ -68,12 +69,12 @@ class CaptureImages:
         masks = {"coverage": received["coverage"], **{name: received.pop(name) for name in MASKS}}
         nearest = {name: nearest_covered(mask[:, :, 0]) for name, mask in masks.items()}
         save_array(self._folder / ACCUMULATION / VALID_MASK, masks["valid"])
-        self._nearest, self._size = nearest["valid"], masks["valid"].shape[:2]
+        self._valid, self._nearest_of = masks["valid"][:, :, 0], {None: nearest["valid"]}
         residual, seams = received.pop("residual", None), received.pop(SEAMS, None)
         self._residual = None
         (self._folder / ACCUMULATION / RESIDUAL).unlink(missing_ok=True)
         if residual is not None and residual.any():
-            self._residual = dilate(residual, self._nearest)
+            self._residual = dilate(residual, nearest["valid"])
             save_array(self._folder / ACCUMULATION / RESIDUAL, self._residual)
         if "ambient" in received and not received["ambient"].any():
             del received["ambient"]
@@ -112,24 +113,23 @@ class CaptureImages:
             )
 
     def require_size(self, light: PlannedLight, image: ndarray) -> None:
-        """BakeError where an image of `light` has not the size of the receiver."""
-        if image.shape != (*self._size, 3):
-            raise BakeError(
-                f"expected {(*self._size, 3)} values of light {light.index} from Blender, found {image.shape}; see the bake's log"
-            )
+        """BakeError where an image of `light` has not the size of the receiver, or of the light's share of it."""
+        size = self._own(self._valid, light).shape
+        if image.shape != (*size, 3):
+            raise BakeError(f"expected {(*size, 3)} values of light {light.index} from Blender, found {image.shape}; see the bake's log")
 
     def own_light(self, light: PlannedLight, mean: Float32[ndarray, "H W 3"]) -> Float32[ndarray, "H W 3"]:
         """`mean` as the capture holds it, before rounding: dilated, the residual emission subtracted. BakeError for NaN."""
         if not np.isfinite(mean).all():
             raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
-        mean = dilate(mean, self._nearest)
-        return mean if self._residual is None else mean - self._residual
+        mean = dilate(mean, self._nearest(light))
+        return mean if self._residual is None else mean - self._own(self._residual, light)
 
     def harmonics(self, light: PlannedLight, toward: Float32[ndarray, "H W N"]) -> Float32[ndarray, "H W M"]:
         """Harmonics of the radiance toward the viewers of a light's pass; BakeError for another size."""
         assert light.gloss is not None
         viewers = len(viewer_directions(light.gloss))
-        if toward.shape != (*self._size, 3 * viewers):
+        if toward.shape != (*self._valid.shape, 3 * viewers):
             raise BakeError(f"expected {viewers} viewers of light {light.index} from Blender, found {toward.shape}; see the bake's log")
         if self._normals is None:
             self._normals = read_image(self._folder / file_name("normal"), 3)
@@ -152,18 +152,28 @@ class CaptureImages:
         if direct is not None:
             if not np.isfinite(direct).all():
                 raise BakeError(f"Blender rendered NaN or Inf for light {light.index}; look for a broken material or normal in the scene")
-            direct = np.clip(dilate(direct, self._nearest), 0, HALF_MAX).astype(np.float16).astype(np.float32)
+            direct = np.clip(dilate(direct, self._nearest(light)), 0, HALF_MAX).astype(np.float16).astype(np.float32)
             own = own - direct  # as stored, so that the two add up again
             write_image(self._folder / light.direct_file, direct, "half")
         write_image(self._folder / light.file, self._clipped(light, own), "half")
 
     def _publish_harmonics(self, light: PlannedLight, harmonics: Float32[ndarray, "H W M"]) -> None:
-        every = self._clipped(light, dilate(harmonics, self._nearest))
+        every = self._clipped(light, dilate(harmonics, self._nearest(light)))
         for k, file in enumerate(light.harmonics_files):
             own = every[:, :, 3 * k : 3 * k + 3]
             if k == 0 and self._residual is not None:  # what still shines, the same toward all viewers
                 own = own - self._residual * np.float32(np.sqrt(4 * np.pi))
             write_image(self._folder / file, own, "half")
+
+    @staticmethod
+    def _own(whole: ndarray, light: PlannedLight) -> ndarray:
+        """The texels of `whole` (H, W, ...) that the light's images have."""
+        return whole if light.share is None else whole[light.share.indices]
+
+    def _nearest(self, light: PlannedLight) -> Int[ndarray, "H W"] | None:
+        if light.share not in self._nearest_of:
+            self._nearest_of[light.share] = nearest_covered(np.ascontiguousarray(self._own(self._valid, light)))
+        return self._nearest_of[light.share]
 
     def _clipped(self, light: PlannedLight, own: Float32[ndarray, "H W C"]) -> Float32[ndarray, "H W C"]:
         if not np.isfinite(own).all():
@@ -194,8 +204,8 @@ class CaptureImages:
         for name, checksum in prepared["files"].items():
             if not (self._folder / name).is_file() or files.sha256_of(self._folder / name) != checksum:
                 raise ImageError(f"expected {name} as it was written, found another")
-        valid = load_array(self._folder / ACCUMULATION / VALID_MASK)
-        self._nearest, self._size = nearest_covered(valid[:, :, 0]), valid.shape[:2]
+        self._valid = load_array(self._folder / ACCUMULATION / VALID_MASK)[:, :, 0]
+        self._nearest_of = {}
         residual = self._folder / ACCUMULATION / RESIDUAL
         self._residual = load_array(residual) if residual.is_file() else None
         self.prepared = prepared

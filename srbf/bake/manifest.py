@@ -57,6 +57,7 @@ def capture_manifest(
                 "file": light.file,
                 **({"direct": light.direct_file} if light.has_direct else {}),
                 **({} if light.gloss is None else {"harmonics": list(light.harmonics_files)}),
+                **({} if light.share is None else {"share": light.share.json()}),
                 "samples": samples,
                 **({} if noise is None else {"noise": round(noise, 6)}),
             }

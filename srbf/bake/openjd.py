@@ -16,6 +16,7 @@ from srbf.bake.run import Bake
 from srbf.bake.settings import BakeSettings, LightSet, plan_lights
 from srbf.errors import InputError
 from srbf.io import files
+from srbf.receiver_share import share_word
 
 TEMPLATE = "template.json"
 PARAMETERS = "parameters.json"
@@ -93,6 +94,7 @@ def arguments(settings: BakeSettings) -> list[str]:
         "quantity": settings.quantity,
         "transport": settings.transport,
         "gloss": settings.gloss,
+        "share": None if settings.step == 1 else share_word(settings.step),
         "seed": settings.seed,
         "sun-angle": repr(float(settings.sun_angle)),
         "light-set": None if points is None else f"point:{points.spacing!r}",

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from srbf.bake.settings import PlannedLight, Rendered
+from srbf.receiver_share import Share
 
 
 @dataclass(frozen=True)
@@ -13,7 +14,8 @@ class RenderRequest:
     """A light's images with `samples` samples per texel of one `seed`.
 
     light: None for the scene's own light alone (the ambient image).
-    region: flat indices of the receivers to render, row by row from the top; None: all. A worker refuses a region that it cannot render.
+    region: the receivers to render, a share of the texels or flat indices, row by row from the top; None: all. A worker refuses a region
+    that it cannot render.
     channels: which images. `response`, all of the light; `direct`, its direct diffuse part, of the same seed; `indirect`, the rest;
     `denoised`, the response without its noise, biased; `toward`, the radiance toward each of the job's viewers, of an indirect capture
     without the direct diffuse light.
@@ -22,7 +24,7 @@ class RenderRequest:
     light: PlannedLight | None
     samples: int
     seed: int
-    region: tuple[int, ...] | None = None
+    region: Share | tuple[int, ...] | None = None
     channels: tuple[Rendered, ...] = ("response",)
 
     def message(self) -> dict[str, Any]:
@@ -31,6 +33,6 @@ class RenderRequest:
             "light": None if self.light is None else {"index": self.light.index, **self.light.placed.json()},
             "samples": self.samples,
             "seed": self.seed,
-            "region": None if self.region is None else list(self.region),
+            "region": self.region.json() if isinstance(self.region, Share) else self.region and list(self.region),
             "channels": list(self.channels),
         }

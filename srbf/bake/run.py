@@ -238,7 +238,8 @@ class _Passes:
 
     def run(self) -> None:
         new = [light for light in self._lights if not (self._folder / light.file).is_file()]
-        check_disk(self._folder, bytes_needed(self._settings, len(new), len([light for light in new if self._is_summed(light)])))
+        summed = [light for light in new if self._is_summed(light)]
+        check_disk(self._folder, bytes_needed(self._settings, *(sum(light.part for light in some) for some in (new, summed))))
         with self._renderer() as pool, self._alarm(pool):
             if self._images.prepared is None:
                 if self._shard is not None and not self._shard.is_preparation:
@@ -343,7 +344,7 @@ class _Passes:
             light for light in self._order if self._accumulation.samples(light) < self._goal_of(light) and light.index not in self._failed
         ]
         level = min((self._accumulation.passes(light) for light in due), default=0)
-        first = 1 if self._auto else FIRST_SAMPLES
+        first = 1 if self._auto or self._settings.step > 1 else FIRST_SAMPLES
         return [self._task(light, level, first) for light in due if self._accumulation.passes(light) == level]
 
     def _task(self, light: PlannedLight, level: int, first: int) -> Task:

@@ -21,6 +21,7 @@ from srbf.errors import InputError
 from srbf.importing.light_list import read_light_list
 from srbf.probe_grid import ProbeGrid
 from srbf.receiver_images import Quantity, Transport
+from srbf.receiver_share import MOST_STEPS, Share, share_word, shares_in_turn
 from srbf.sphere import Domain, domain_of, mean_spacing, point_set, random_directions
 
 Kind = Literal["lightmap", "vertices", "view", "probes"]
@@ -234,6 +235,8 @@ class BakeSettings:
         One of the .blend's scenes; None: the active one.
     gloss
         Order of the spherical harmonics that hold the radiance toward every viewer, 1 to 4; None: the radiance toward one alone.
+    step
+        Of a train light's share: every n-th texel across and down, another set for the next light; 1 to 8, 1: all texels.
 
     Raises
     ------
@@ -272,6 +275,7 @@ class BakeSettings:
     denoise: bool = False  # of a view's train images
     scene: str | None = None  # of the .blend's scenes; None: the active one
     gloss: int | None = None  # order of the harmonics of the viewer's direction
+    step: int = 1  # texels from one to the next of a train light's share
 
     def __post_init__(self) -> None:
         for name in ("width", "height", "lights", "samples", "holdout_samples"):
@@ -302,6 +306,8 @@ class BakeSettings:
             self._check_light_set(self.light_set)
         if self.gloss is not None:
             self._check_gloss(self.gloss)
+        if self.step != 1:
+            self._check_share()
         if self.points is not None:
             if self.light_list is not None or self.sun_angle > 0:
                 raise InputError("expected point lights without `light_list` and `sun_angle`, which belong to directional ones")
@@ -329,6 +335,29 @@ class BakeSettings:
             raise InputError(f"expected a receiver lightmap:OBJECT or vertices:OBJECT with {what}, found {self.receiver.kind}")
         if light_set.kind in ("patches", "surfels", "gather") and self.transport != "indirect":
             raise InputError(f"expected `transport=indirect` with {what}, found combined: what surfaces reflect is indirect light")
+
+    def _check_share(self) -> None:
+        if not 1 <= self.step <= MOST_STEPS:
+            raise InputError(f"expected a share of every 1st to {MOST_STEPS}th texel each way, found {self.step}")
+        what = f"`share={share_word(self.step)}`"
+        if self.receiver.kind not in ("lightmap", "view"):
+            raise InputError(f"expected a lightmap or a view with {what}, found {self.receiver.kind}; leave `share` out")
+        if self.light_set is not None or self.points is not None:
+            found = "point lights" if self.light_set is None else f"`light_set={self.light_set.kind}`"
+            raise InputError(
+                f"expected directional lights with {what}, found {found}: neighbors fill what a light lacks; leave `share` out"
+            )
+        if self.denoise or self.samples == "auto":
+            found = "`denoise`" if self.denoise else "`samples=auto`"
+            raise InputError(f"expected a fixed number of `samples` and no `denoise` with {what}, found {found}; leave one of them out")
+        if self.receiver.kind == "view" and (self.width % self.step or self.height % self.step):
+            up = "x".join(str(-(-side // self.step) * self.step) for side in (self.width, self.height))
+            raise InputError(
+                f"expected a view's size to be a multiple of {self.step} with {what}, found {self.width}x{self.height}; "
+                f"`size={up}` is the next"
+            )
+        if min(self.width, self.height) < self.step:
+            raise InputError(f"expected {self.step} texels or more each way with {what}, found {self.width}x{self.height}")
 
     def _check_gloss(self, order: int) -> None:
         if not 1 <= order <= MAX_ORDER:
@@ -371,7 +400,7 @@ class BakeSettings:
         record: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         record["receiver"] = self.receiver.record()
         record["no_shadow"] = list(self.no_shadow)
-        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None), ("gloss", None)):
+        for name, old in (("transport", "combined"), ("no_shadow", []), ("denoise", False), ("scene", None), ("gloss", None), ("step", 1)):
             if record[name] == old:
                 del record[name]  # as in captures older than these settings
         del record["points"], record["light_set"]
@@ -393,6 +422,7 @@ class PlannedLight:
     """A light to bake: index in the capture, what and where it is, role, samples per texel, seed of its noise.
 
     `parts`: which images the worker renders of it, the one that the capture keeps first; `direct` is kept in a file of its own.
+    `share`: the texels that its images have; None: all.
     """
 
     index: int
@@ -402,6 +432,7 @@ class PlannedLight:
     seed: int
     parts: tuple[Rendered, ...] = ("response",)
     gloss: int | None = None
+    share: Share | None = None
 
     @property
     def place(self) -> tuple[float, float, float]:
@@ -411,6 +442,11 @@ class PlannedLight:
     @property
     def kind(self) -> LightKind:
         return self.placed.kind
+
+    @property
+    def part(self) -> float:
+        """Of the texels, about, that its images have."""
+        return 1.0 if self.share is None else 1 / self.share.step**2
 
     @property
     def has_direct(self) -> bool:
@@ -459,6 +495,7 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
         train, validation, holdout = ([PlacedLight("directional", tuple(place)) for place in group.tolist()] for group in groups)
     if settings.gloss is not None:
         parts = {role: (*own, "toward") for role, own in parts.items()}
+    shares: list[Share | None] = [None] * len(train) if settings.step == 1 else [*shares_in_turn(len(train), settings.step)]
     planned: list[PlannedLight] = []
     roles: list[tuple[Role, list[PlacedLight], int]] = [
         ("train", train, 1 if settings.samples == "auto" else settings.samples),
@@ -468,7 +505,9 @@ def plan_lights(settings: BakeSettings) -> list[PlannedLight]:
     for role, lights, samples in roles:
         for light in lights:
             index = len(planned)
-            planned.append(PlannedLight(index, light, role, samples, noise_seed(settings.seed, index), parts[role], settings.gloss))
+            share = shares[index] if role == "train" else None
+            seed = noise_seed(settings.seed, index)
+            planned.append(PlannedLight(index, light, role, samples, seed, parts[role], settings.gloss, share))
     return planned
 
 

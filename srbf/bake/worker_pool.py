@@ -49,7 +49,7 @@ class Task:
     def request(self) -> RenderRequest:
         """What the worker is asked for."""
         channels = ("denoised",) if self.denoise else self.light.parts
-        return RenderRequest(self.light, self.samples, self.seed, channels=channels)
+        return RenderRequest(self.light, self.samples, self.seed, self.light.share, channels)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from srbf.cli.group import Commands
 COMMANDS = {  # where each is, and what the list of commands says of it
     "bake": ("srbf.cli.bake:bake", "Render a Blender scene under many lights: a capture."),
     "import": ("srbf.cli.import_:import_capture", "Make a capture of images and a light list."),
+    "complete": ("srbf.cli.complete:complete", "Fill the texels that a capture's lights lack."),
     "fit": ("srbf.cli.fit:fit", "Compress a capture: an asset."),
     "relight": ("srbf.cli.relight:relight", "Light an asset by any number of lights: an image."),
     "evaluate": ("srbf.cli.evaluate:evaluate", "Print the error of an asset."),

@@ -12,6 +12,7 @@ from srbf.bake.cubemap_set import WORD, CubemapSet
 from srbf.bake.cubemap_trace import totals
 from srbf.bake.estimate import estimate
 from srbf.bake.gather_set import GatherSet
+from srbf.bake.light_choice import Goal, with_chosen_lights
 from srbf.bake.light_sets import parse_light_set
 from srbf.bake.openjd import PARAMETERS, TEMPLATE, write_bundle
 from srbf.bake.point_lights import PointGrid
@@ -68,7 +69,9 @@ def bake(
     size: flag.SizeOf = None,
     texels_per_meter: flag.TexelsPerMeter = None,
     samples: flag.Samples = None,
+    share: flag.ShareOf = None,
     time_limit: flag.TimeLimit = None,
+    error: flag.ErrorGoal = None,
     holdout_samples: flag.HoldoutSamples = 64,
     denoise: flag.Denoise = False,
     quantity: flag.QuantityOf = None,
@@ -86,7 +89,8 @@ def bake(
     restart: flag.Restart = False,
 ) -> None:
     """Bake SCENE under many lights, one at a time, in passes. If it is stopped, the same command resumes it."""
-    count = DEFAULT_LIGHTS if lights is None else lights
+    count = DEFAULT_LIGHTS if lights in (None, "auto") else lights
+    goal = _goal(lights, time_limit, error, share, sun_angle, light_set, light_list)
     width, height = size or Size(DEFAULT_SIZE, DEFAULT_SIZE)
     with flags_alone():
         named = [Receiver.parse(word, uv_layer, unwrap) for word in receiver or []]
@@ -147,7 +151,7 @@ def bake(
                 height=height,
                 lights=count,
                 domain=domain or "hemisphere",
-                samples=samples or (2 if time_limit is None else UNLIMITED),
+                samples=samples or (UNLIMITED if time_limit is not None else 2 if share in (None, 1) and goal is None else 1),
                 validation=(0 if gathers else 16) if validation is None else validation,
                 holdout=holdout,
                 holdout_samples=holdout_samples,
@@ -163,6 +167,7 @@ def bake(
                 denoise=denoise,
                 scene=scene_name,
                 gloss=gloss,
+                step=1 if share is None else share,
             )
             if sun_angle == "auto" and light_set is not None:
                 raise typer.BadParameter("expected directional lights with --sun-angle auto, found --light-set; leave one of them out")
@@ -187,6 +192,8 @@ def bake(
         job = with_size(job, texels_per_meter if job.settings.receiver.kind == "lightmap" or not several else None, note)
         if size is None and job.settings.receiver.kind == "view":
             job = with_frame(job, DEFAULT_SIZE, force or restart, note)
+        if goal is not None:
+            job = with_chosen_lights(job, goal, force or restart, note)
         job = with_light_set(with_free_point_lights(job, note), note)
         if farm is not None:
             write_bundle(job, job.folder, farm_tasks, force)
@@ -201,6 +208,29 @@ def bake(
         note(f"{_done(shard)} {job.folder}" if baked else f"{job.folder} is complete already")
     if json_progress and not dry_run and farm is None and (told := totals([job.folder for job in jobs])) is not None:
         json_line(told)
+
+
+def _goal(
+    lights: int | str | None,
+    time_limit: float | None,
+    error: float | None,
+    share: int | None,
+    sun_angle: float | str,
+    light_set: str | None,
+    light_list: Path | None,
+) -> Goal | None:
+    """What `--lights auto` is to reach; wrong usage where other flags decide what it would, or `--error` is without it."""
+    if lights != "auto":
+        if error is not None:
+            raise typer.BadParameter(f"expected --lights auto with --error, found {lights or 'none'}; give it, or leave --error out")
+        return None
+    for name, value in (("--share", share), ("--light-set", light_set), ("--light-list", light_list)):
+        if value is not None:
+            raise typer.BadParameter(f"expected --lights auto without {name}, found both: a probe decides; leave one of them out")
+    if sun_angle == "auto":
+        raise typer.BadParameter("expected an angle with --lights auto, found --sun-angle auto, which follows from their number")
+    with flags_alone():
+        return Goal(time_limit, error)
 
 
 def _done(shard: Shard | None) -> str:

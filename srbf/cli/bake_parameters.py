@@ -17,8 +17,10 @@ from srbf.cli.values import (
     Parsed,
     Size,
     duration,
+    parse_share,
     size,
 )
+from srbf.receiver_share import share_step
 
 SCENE, LIGHTS, QUALITY, FARM, SAFETY = "Scene", "Lights", "Quality", "Farm", "Safety"
 
@@ -70,11 +72,12 @@ KeepSceneLights = Annotated[
 ]
 
 Lights = Annotated[
-    int | None,
+    Any,
     typer.Option(
-        metavar="COUNT",
-        parser=COUNT,
-        help="Directions to fit (Hammersley), or lights of a cloud (400).",
+        metavar="auto|COUNT",
+        parser=AUTO_OR_COUNT,
+        help="Directions to fit (Hammersley), or lights of a cloud (400); auto: as many, and such a --share, as a probe of the scene "
+        "finds best for --time-limit or --error.",
         show_default=False,
         rich_help_panel=LIGHTS,
     ),
@@ -274,7 +277,30 @@ Samples = Annotated[
     typer.Option(
         metavar="COUNT",
         parser=AUTO_OR_COUNT,
-        help="Samples per texel of each fitted light; auto: until the error stops improving. Default 2, with --time-limit no limit.",
+        help="Samples per texel of each fitted light; auto: until the error stops improving. Default 2, with --share or --lights auto 1, "
+        "with --time-limit no limit.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+ShareOf = Annotated[
+    int | None,
+    typer.Option(
+        "--share",
+        metavar="FRACTION",
+        parser=Parsed(share_step),
+        help="1/4, 1/9 or 1/16 of the texels for each fitted light, others for the next: as much from more directions. Default whole.",
+        show_default=False,
+        rich_help_panel=QUALITY,
+    ),
+]
+ErrorGoal = Annotated[
+    float | None,
+    typer.Option(
+        "--error",
+        metavar="ERROR",
+        parser=Parsed(parse_share),
+        help="With --lights auto: the relative RMSE at unseen lights to predict, as 8% or .08.",
         show_default=False,
         rich_help_panel=QUALITY,
     ),

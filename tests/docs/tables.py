@@ -26,7 +26,10 @@ STAND_INS = {
 }
 
 # The same in one script's calls alone.
-STAND_INS_OF = {"benchmarks/direct.py": {"CAPTURE": "indirect"}}  # it wants one whose direct light is apart
+STAND_INS_OF = {
+    "benchmarks/direct.py": {"CAPTURE": "indirect"},  # it wants one whose direct light is apart
+    "complete": {"CAPTURE": "quarter"},  # one whose lights have a share of the texels
+}
 
 # The tables below are by the words of a command: all of them, in any order, with ` *` at the end also among others.
 
@@ -37,6 +40,7 @@ SHORTER = {
     "srbf bake --light-set surfels *": f"--size 24 {TESTED} --surfels-per-m2 4",
     "srbf bake --light-set gather *": f"--size 24 {TESTED}",
     "srbf bake --light-set cubemap:32 *": "--light-set cubemap:8 --size 24 --validation 4 --holdout 2",
+    "srbf bake --lights auto *": f"--size 24 {TESTED} --error 90%",
     "srbf bake *": FEW,
     "srbf demo *": "--lights 28",  # its scenes are made smaller, too
     "srbf evaluate --leave-one-out *": "-k 4 --spread mean --ridge 0.1",

@@ -73,6 +73,7 @@ def prepare(folder: Path) -> None:
     for text in (
         "srbf bake scene.blend -o capture --receiver lightmap:Table",
         "srbf bake scene.blend -o indirect --receiver lightmap:Table --transport indirect",
+        "srbf bake scene.blend -o quarter --receiver lightmap:Table --share 1/4",
         "srbf bake torus.blend -o torus --receiver lightmap:Torus --domain sphere",
         "srbf fit capture -o asset -k 25",
         "srbf export asset --target gltf -o gltf",
