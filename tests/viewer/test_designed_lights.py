@@ -41,6 +41,7 @@ LIGHTS: list[dict[str, Any]] = [
             "outer": 0.6,
             "color": [0.6, 0.6, 0.6],
             "falloff": "inverse-square",
+            "size": 0.02,
         },
     },
     {"name": "Panel", "light": {"kind": "area", "position": [1.5, 1, 1.7], "u": [-0.6, 0, 0], "v": [0, 0.3, 0], "color": [0.3, 0.3, 0.5]}},
@@ -154,6 +155,17 @@ def test_lights_are_muted_changed_and_set_as_designed_again(chromium: Any, asset
     assert names(chromium) == ["Key", "Panel", "Globe", "Directional"]
 
 
+def test_lights_that_choose_objects_are_named_and_hand_their_choice_on(
+    chromium: Any, asset: Asset, serve: Callable[..., str], tmp_path: Path
+) -> None:
+    chosen = {**LIGHTS[0]["light"], "receivers": {"only": ["Room"]}}
+    replace(asset, manifest={**asset.manifest, "scene_lights": [{"name": "Key", "light": chosen}]}).save(tmp_path / "asset")
+    chromium("open", url=serve(tmp_path / "asset"), width=WIDTH, height=HEIGHT)
+    assert "shown without the objects that they choose: Key" in chromium("run", script="document.getElementById('status').textContent")
+    (frame,) = json.loads(chromium.file("Lights (FRAMES.json)"))["frames"]
+    assert frame["lights"][0]["receivers"] == {"only": ["Room"]}
+
+
 def test_more_lights_than_the_page_takes_are_named(chromium: Any, asset: Asset, serve: Callable[..., str], tmp_path: Path) -> None:
     many = [{"name": f"Bulb {i:02d}", "light": LIGHTS[0]["light"]} for i in range(18)]
     before, asset.manifest["scene_lights"] = asset.manifest["scene_lights"], many
@@ -208,6 +220,7 @@ def test_frames_have_their_names_and_exact_colors(chromium: Any, asset: Asset, p
     path.write_bytes(chromium.file("Lights (FRAMES.json)"))
     (frame,) = json.loads(path.read_text())["frames"]
     assert [light["name"] for light in frame["lights"]] == ["Key", "Fill <b>", "Panel"] and frame["off"] == ["Globe"]
+    assert frame["lights"][1]["size"] == 0.02
     assert [light["color"] for light in frame["lights"]] == [one["light"]["color"] for one in LIGHTS[:3]]
     (read,) = read_frames(path)
     for found, own in zip(read, list(scene_lights(asset).values())[:3], strict=True):

@@ -42,9 +42,11 @@ export function exactColor(light: LightState, designed: Designed): Triple {
 /** What the page does not show of the scene's lights, in one line; empty where it shows all of them. */
 export function missingLine({ manifest }: Asset): string {
   const beyond = (manifest.scene_lights ?? []).slice(MOST_LIGHTS).map(({ name }) => name);
+  const linked = (manifest.scene_lights ?? []).flatMap(({ name, light }) => (light.receivers ?? light.blockers ? [name] : []));
   const left = (manifest.scene_lights_left_out ?? []).map(({ name }) => name);
   return [
     beyond.length ? `lights past ${MOST_LIGHTS}: ${beyond.join(", ")}` : "",
+    linked.length ? `shown without the objects that they choose: ${linked.join(", ")}` : "",
     left.length ? `lights left out: ${left.join(", ")}` : "",
   ]
     .filter(Boolean)

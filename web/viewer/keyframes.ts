@@ -2,7 +2,7 @@
 import { DEFAULT_RADIUS, unit } from "../src/lights";
 import { cross, dot } from "../src/matrix";
 import { SrbfError, type Triple } from "../src";
-import { levelSides, type LightState, round, rounded } from "./light_state";
+import { keptKeys, levelSides, type LightState, round, rounded } from "./light_state";
 import { MOST_LIGHTS, type State } from "./state";
 
 type Entry = Record<string, unknown>;
@@ -93,7 +93,8 @@ export function stateOf(entry: Entry, where: string, usual: "linear" | "inverse-
   const intensity = entry.kind === "named" ? number("intensity", 1) : 1;
   if (intensity < 0) bad("an intensity of 0 or more", intensity);
   const own = typeof entry.name === "string" && entry.kind !== "named" ? { name: entry.name } : {};
-  const common = { on: true, ...own, ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
+  const kept = Object.fromEntries(keptKeys(entry.kind).flatMap((key) => (entry[key] === undefined ? [] : [[key, entry[key]]])));
+  const common = { on: true, ...own, ...(Object.keys(kept).length ? { kept } : {}), ...colored([color[0] * intensity, color[1] * intensity, color[2] * intensity]) };
   if (entry.kind === "named") return { kind: "named", ...common, name: typeof entry.name === "string" ? entry.name : bad("a name", entry.name) };
   if (entry.kind === "directional") return { kind: "directional", ...common, direction: rounded(triple("direction")) };
   if (entry.kind === "area") return areaOf(triple("position"), triple("u"), triple("v"), round(number("a0", 1)), common);

@@ -16,6 +16,8 @@ interface Common {
   kelvin?: number;
   /** Which of the scene's lights it is. */
   name?: string;
+  /** What FRAMES.json has of it and the page does not show: a spot's size, a sun's angle, which objects it lights and which shadow it. */
+  kept?: Record<string, unknown>;
 }
 
 interface PointLight extends Common {
@@ -214,6 +216,9 @@ export function aim(light: SpotState | AreaState): Triple {
   return direction.some((x) => x !== 0) ? direction : [0, 0, -1];
 }
 
+/** Keys of FRAMES.json that the page hands on as they are. */
+export const keptKeys = (kind: unknown): readonly string[] => ["receivers", "blockers", ...(kind === "spot" ? ["size"] : []), ...(kind === "directional" ? ["angle"] : [])];
+
 /** `value` as a light's state. @throws SrbfError on anything else. */
 export function checkLight(value: unknown): LightState {
   const light = value as Record<string, unknown>;
@@ -230,6 +235,7 @@ export function checkLight(value: unknown): LightState {
   if (!Number.isFinite(light.intensity)) bad("a number of intensity");
   if (light.solo !== undefined && typeof light.solo !== "boolean") bad("true or false of solo");
   if (light.name !== undefined && (typeof light.name !== "string" || light.name === "")) bad("a text of name");
+  if (light.kept !== undefined && (typeof light.kept !== "object" || light.kept === null || Object.keys(light.kept).some((key) => !keptKeys(light.kind).includes(key)))) bad(`${keptKeys(light.kind).join(", ")} of kept`);
   if (light.kelvin !== undefined && !((light.kelvin as number) > 0)) bad("a number above 0 of kelvin");
   if (light.kind === "directional") triple("direction");
   else if (light.kind === "environment") {
