@@ -286,9 +286,10 @@ def test_a_job_says_all_that_decides_a_pixel(tmp_path: Path) -> None:
     missing = (
         set(BakeSettings.__dataclass_fields__)
         - named
-        - {"width", "height", "light_list", "points", "light_set", "denoise", "no_shadow", "gloss"}
+        - {"width", "height", "light_list", "points", "light_set", "denoise", "no_shadow", "gloss", "step"}
     )
     assert not missing and "--no-cast-shadow=Roof" in flags
+    assert "--share=1/4" in arguments(BakeSettings(Receiver("view"), width=8, height=8, samples=1, step=2))
     assert "--denoise" in arguments(BakeSettings(Receiver("view"), denoise=True))
     atlas = Receiver("lightmap", "A", also=("B",))
     assert {"--receiver=lightmap:A", "--receiver=lightmap:B"} <= set(arguments(BakeSettings(atlas)))

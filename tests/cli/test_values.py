@@ -20,7 +20,7 @@ from srbf.cli.values import AUTO_OR_ANGLE, AUTO_OR_COUNT, POSITIVE, Number, Size
         (["--size", "0"], "found '0'"),
         (["--samples", "many"], "--samples: expected auto or a whole number of 1 or more, found 'many'"),
         (["--samples", "0"], "found '0'"),
-        (["--lights", "1.5"], "--lights: expected a whole number of 1 or more, found '1.5'"),
+        (["--lights", "1.5"], "--lights: expected auto or a whole number of 1 or more, found '1.5'"),
         (["--holdout", "-1"], "--holdout: expected a whole number of 0 or more"),
         (["--sun-angle", "wide"], "--sun-angle: expected auto or a number from 0 to 3.14159, found 'wide'"),
         (["--sun-angle", "nan"], "found 'nan'"),

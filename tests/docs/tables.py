@@ -93,6 +93,8 @@ NOT_RUN = {
     "python benchmarks/lights_inside.py *": "renders lights of five kinds twice: minutes",
     "python benchmarks/deep_framebuffer.py *": "the same for a view",
     "python benchmarks/deep_framebuffer_paper.py *": "bakes a view twice, then renders lights of four kinds: minutes",
+    "python benchmarks/deep_framebuffer_motion.py *": "wants a capture and an asset of a view, and relights hundreds of lights",
+    "python -m scripts.gallery.shot": "bakes a view and renders three rigs of lights by Cycles: minutes",
     "python benchmarks/deep_framebuffer_passes.py *": "wants an asset of a view: half a minute at its smallest",
     "python benchmarks/transfer_frame.py *": "wants an asset of surfels: a minute at its smallest",
     "python benchmarks/transfer_paper.py *": "wants a capture of 40,000 surfels",
