@@ -36,7 +36,9 @@ describe("methods", () => {
     for (const method of METHODS) expect(methodNamed(method.name)).toBe(method);
     expect(methodNamed("magic")).toBeUndefined();
     const imported = sources("src").flatMap((file) => [...readFileSync(join(ROOT, file), "utf8").matchAll(/shaders\/(\w+\.glsl)"/g)].map(([, name]) => name));
-    expect(readdirSync(join(ROOT, "src/shaders")).sort()).toEqual(imported.sort());
+    const shaders = readdirSync(join(ROOT, "src/shaders"));
+    const included = shaders.flatMap((file) => [...readFileSync(join(ROOT, "src/shaders", file), "utf8").matchAll(/#include "(\w+\.glsl)"/g)].map(([, name]) => name));
+    expect(shaders.sort()).toEqual([...new Set([...imported, ...included])].sort());
     for (const { shader } of METHODS) for (const name of ["srbfSum", "srbfRelit", "srbfRelitSurface"]) expect(shader).toContain(`vec3 ${name}(`);
   });
 });
