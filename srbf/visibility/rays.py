@@ -39,6 +39,7 @@ EDGE_BUDGET = 64  # samples of edges per texel of the image, in the mean
 SPREAD_ROUNDS = 6  # in which texels beside a penumbra's are found to be part of it
 CACHED_SAMPLES = 1 << 22  # kept from light to light
 TEXEL_BATCH = 1 << 16
+BATCH = 1 << 16  # samples at a time, in each thread
 ENVIRONMENT_POINTS = 8  # of a texel, from each of which rays go to an environment
 ENVIRONMENT_BATCH = 1 << 18  # such rays at a time
 LEAST_BUMP, LEAST_BUMP_COS, SAME_PLACE = 1e-2, 0.2, 1e-2  # change of a normal; its cosine; off the place, over the distance to the eye
@@ -149,21 +150,29 @@ class RayTracer:
 
         `blockers`: what casts its shadows, None: all.
         """
+        return self._casting(blockers).passed(self._origins(samples, chosen, direction), direction, distance)
+
+    def _casting(self, blockers: Objects | None) -> ShadowRays:
         if blockers not in self._shadow_rays:
             self._shadow_rays[blockers] = ShadowRays(casting(self._receivers.triangles, blockers))
-        return self._shadow_rays[blockers].passed(self._origins(samples, chosen, direction), direction, distance)
+        return self._shadow_rays[blockers]
 
     def lit(self, samples: Samples, light: CastingLight) -> Bool[ndarray, " n"]:
         """Whether a light shines on the object that each sample is of."""
         return lit_at(lit_triangles(self._receivers.triangles, light), samples.triangle)
 
     def _irradiance(self, light: CastingLight) -> Float32[ndarray, "P 3"]:
+        self._casting(light.blockers)  # once, before threads ask for it
         sums = TexelSums.empty(self._receivers.height, self._receivers.width, self._scale(light), _has_size(light))
         weight = np.zeros(len(sums.total))
-        for start in range(0, len(self._texels), TEXEL_BATCH):
-            samples = self._first(start)
+        starts = range(0, len(self._texels), max(1, BATCH // self._few))
+
+        def first(number: int) -> None:
+            samples = self._first(starts[number], starts.step)
             self._add(sums, samples, light, range(self._few))
-            weight += np.bincount(samples.texel, samples.weight, len(weight))
+            weight[self._texels[starts[number] : starts[number] + starts.step]] = samples.weight.reshape(self._few, -1).sum(axis=0)
+
+        each(first, len(starts))
         sums = sums.relative(self._texels)
         partly = (weight > 0) & (weight < self._few)
         refined = np.zeros(len(weight), bool)
@@ -228,14 +237,18 @@ class RayTracer:
 
     def _refine(self, sums: TexelSums, light: CastingLight, texels: Int[ndarray, " e"], numbers: range) -> None:
         """Add samples `numbers` of `texels`."""
-        step = max(1, TEXEL_BATCH * SAMPLES // max(1, len(numbers)))
-        for start in range(0, len(texels) if len(numbers) else 0, step):
-            self._add(sums, self._samples(texels[start : start + step], numbers), light, numbers)
+        starts = range(0, len(texels) if len(numbers) else 0, max(1, BATCH // max(1, len(numbers))))
 
-    def _first(self, start: int) -> Samples:
+        def add(number: int) -> None:
+            own = texels[starts[number] : starts[number] + starts.step]
+            self._add(sums, self._samples(own, numbers), light, numbers)
+
+        each(add, len(starts))
+
+    def _first(self, start: int, count: int) -> Samples:
         if start in self._kept:
             return self._kept[start]
-        texels = self._texels[start : start + TEXEL_BATCH]
+        texels = self._texels[start : start + count]
         samples = self.samples_at(np.tile(texels, self._few), _balanced(self._turn[texels], self._few).reshape(-1, 2))
         if len(self._texels) * self._few <= CACHED_SAMPLES:
             self._kept[start] = samples

@@ -68,22 +68,33 @@ class TexelSums:
         visible: Float32[ndarray, "n 3"],
         irradiance: Float64[ndarray, " n"],
     ) -> None:
-        """Add samples: what each sees of the light, and its unshadowed irradiance."""
+        """Add samples: what each sees of the light, and its unshadowed irradiance.
+
+        They are ordered by sample: distinct texels, and the same again for each further sample. Threads may add to different texels.
+        """
+        if not len(texel):
+            return
+        texels = texel[: np.flatnonzero(texel == texel[0])[1:2].max(initial=0) or None]
         light = visible * irradiance[:, None].astype(np.float32)
         every = np.broadcast_to(share, light.shape)
         weight = every * importance[:, None] if self.sized else every
-        for channel in range(3):
-            plain, own = every[:, channel], weight[:, channel]
-            self._count(self.total, channel, texel, plain * (irradiance if self.sized else light[:, channel]))
-            self._count(self.share, channel, texel, plain)
-            if self.seen is not self.total:
-                self._count(self.seen, channel, texel, own * visible[:, channel])
-            if self.sized:
-                self._count(self.weight, channel, texel, own)
-        real = weight.max(axis=1) > COUNTS
+
+        def by_sample(values: Float[ndarray, "n 3"]) -> Float[ndarray, "s T 3"]:
+            return values.reshape(-1, len(texels), 3)
+
+        def count(sums: Float64[ndarray, "P 3"], values: Float[ndarray, "n 3"]) -> None:
+            sums[texels] += by_sample(values).sum(axis=0, dtype=np.float64)
+
+        count(self.total, every * irradiance[:, None] if self.sized else every * light)
+        count(self.share, every)
+        if self.seen is not self.total:
+            count(self.seen, weight * visible)
+        if self.sized:
+            count(self.weight, weight)
+        real = (weight.max(axis=1) > COUNTS)[:, None]
         measured = visible if self.sized else light
-        np.minimum.at(self.low, texel[real], measured[real])
-        np.maximum.at(self.high, texel[real], measured[real])
+        self.low[texels] = np.minimum(self.low[texels], by_sample(np.where(real, measured, np.float32(np.inf))).min(axis=0))
+        self.high[texels] = np.maximum(self.high[texels], by_sample(np.where(real, measured, np.float32(0))).max(axis=0))
 
     def mean(self) -> Float64[ndarray, "P 3"]:
         """Mean light of every texel."""
@@ -92,10 +103,6 @@ class TexelSums:
 
     def _visible(self) -> Float64[ndarray, "P 3"]:
         return self.seen / np.maximum(self.weight, MIN_DIFFUSE)
-
-    @staticmethod
-    def _count(sums: Float64[ndarray, "P 3"], channel: int, texel: Int[ndarray, " n"], values: Float[ndarray, " n"]) -> None:
-        sums[:, channel] += np.bincount(texel, values, len(sums))
 
     def ragged(self) -> Bool[ndarray, " P"]:
         """Texels whose samples differ, or that differ from a neighbor."""
